@@ -336,17 +336,11 @@ def search_tracks(
     for trial in range(trials):
         posterior /= posterior.sum(axis=(1, 2), keepdims=True)
         if stop is not None and trial >= stop[1]:
-            running &= _interval_widths(search, posterior) > stop[0]
+            ends = [[quantile(search.grid.thresholds, one, p) for p in (0.025, 0.975)] for one in posterior.sum(axis=2)]
+            running &= np.diff(np.asarray(ends, float), axis=1)[:, 0] > stop[0]
         place = search.next_of(posterior) if trial or begin is None else np.full(tracks, begin)
         right = draws[:, trial] < observers.probability(at[place])
         levels[running, trial], successes[:, trial] = at[place[running]], right & running
         answered = psi[place]
         posterior *= np.where(right[:, None, None], answered, 1.0 - answered)
     return Answers(levels, successes)
-
-
-def _interval_widths(search: Search, posterior: Floats) -> Floats:
-    """Return the width of each track's equal-tailed 95 % interval [u]."""
-    marginals = posterior.sum(axis=2)
-    ends = [[quantile(search.grid.thresholds, one, share) for share in (0.025, 0.975)] for one in marginals]
-    return np.diff(np.asarray(ends, float), axis=1)[:, 0]

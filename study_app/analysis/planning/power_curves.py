@@ -53,6 +53,10 @@ class Curve:
     effect: float | None
     detectable: tuple[float | None, ...] | None
 
+    def points(self, place: int) -> float | None:
+        """Return ``detectable`` at one of the sizes."""
+        return None if self.detectable is None else self.detectable[place]
+
     def needed(self, sizes: Sequence[int]) -> int | None:
         """Return the smallest of the sizes from which on the power is 80 %."""
         enough = [share >= WANTED for share in self.power]
@@ -227,13 +231,8 @@ def _csv_rows(found: Powers) -> Iterator[dict[str, Any]]:
                 "power_high": round(high, 4),
                 "without_effect": None if curve.alarms is None else round(curve.alarms[place], 6),
                 "effect_points": None if curve.effect is None else round(curve.effect, 3),
-                "detectable_points": _points(curve, place),
+                "detectable_points": None if (points := curve.points(place)) is None else round(points, 3),
             }
-
-
-def _points(curve: Curve, place: int) -> float | None:
-    points = None if curve.detectable is None else curve.detectable[place]
-    return None if points is None else round(points, 3)
 
 
 def power_markdown(found: Powers) -> str:
@@ -248,7 +247,12 @@ def power_markdown(found: Powers) -> str:
                 lines += _markdown_table(shown, found, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
             if any(one.detectable for one in curves):
                 lines += ["", "The smallest difference of mean answers that 80 % of studies show, in points:", ""]
-                lines += _markdown_table([one for one in curves if one.detectable], found, first, _detectable_cell)
+                lines += _markdown_table(
+                    [one for one in curves if one.detectable],
+                    found,
+                    first,
+                    lambda curve, at: "beyond" if (points := curve.points(at)) is None else f"{points:.2f}",
+                )
     return "\n".join(lines) + "\n"
 
 
@@ -324,11 +328,6 @@ def _markdown_table(
             cells.append(str(curve.needed(found.sizes) or "–"))
         lines.append(f"| {' | '.join(cells)} |")
     return lines
-
-
-def _detectable_cell(curve: Curve, at: int) -> str:
-    points = None if curve.detectable is None else curve.detectable[at]
-    return "beyond" if points is None else f"{points:.2f}"
 
 
 def _name(curve: Curve, found: Powers) -> str:

@@ -5,7 +5,9 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
+
+from pydantic import TypeAdapter
 
 from study_app import __version__
 from study_app.analysis.data.blocks import spoken
@@ -24,7 +26,6 @@ from study_app.protocol.trials.stimuli import assumed_for
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
 from study_app.psychophysics.families import Family
 from study_app.psychophysics.precision import BETWEEN_PEOPLE
-from study_app.store.atomic import parse_json
 from study_app.store.exclusions import named
 from study_app.store.sites.merged import DASH, folders_of
 
@@ -75,22 +76,12 @@ def read_commitment(folder: Path) -> Commitment | None:
     except (OSError, UnicodeDecodeError) as error:
         raise AnalysisError(f"{path} cannot be read ({error}): restore it from a copy") from error
     try:
-        values: dict[str, Any] = parse_json(found[-1])
-        one = Commitment(**{**values, "rules": tuple(values["rules"])})
-        _check_types(one)
-    except (IndexError, KeyError, TypeError, ValueError) as error:
+        return TypeAdapter(Commitment).validate_json(found[-1], strict=True)
+    except (IndexError, ValueError) as error:
         raise AnalysisError(
             f"{path} does not end with what `liquid-study preregister` writes there ({type(error).__name__}): restore "
             "it from a copy, or remove it"
         ) from error
-    return one
-
-
-def _check_types(one: Commitment) -> None:
-    """Refuse what `written` never writes (TypeError)."""
-    texts = all(isinstance(text, str) for text in (one.study, one.version, one.protocol_hash, *one.rules))
-    if not (texts and isinstance(one.participants, int | None) and isinstance(one.precision, int | float | None)):
-        raise TypeError("values of other types")
 
 
 DEFAULTS: Final = Analysis()
@@ -353,28 +344,16 @@ def deviations(study: Study) -> Deviations | None:
     planned = (study.protocol.get("analysis") or {}).get("participants")
     if committed is None:
         return None if planned is None else Deviations(None, tuple(_other_participants(study, planned)))
-    return Deviations(
-        committed,
-        (
-            *_sites(sites, committed),
-            *_protocol(study, committed),
-            *_other_participants(study, committed.participants),
-            *_other_exclusions(study, committed),
-            *_decisions(study),
-        ),
-    )
+    return Deviations(committed, tuple(_differences(study, sites, committed)))
 
 
-def _sites(sites: Mapping[str, Commitment | None], committed: Commitment) -> Iterator[str]:
-    """Yield the sites of a merged study that have no preregistration, or another one than the one compared with."""
+def _differences(study: Study, sites: Mapping[str, Commitment | None], committed: Commitment) -> Iterator[str]:
+    """Yield where a study, or a site's preregistration, differs from what was committed to."""
     for site, own in sites.items():
         if own is None:
             yield f"site {site} has no {FILE}"
         elif own != committed:
             yield f"the preregistration of site {site} is another one than that of the first site, used here"
-
-
-def _protocol(study: Study, committed: Commitment) -> Iterator[str]:
     if study.name != committed.study:
         yield f"the preregistration is that of another study, {committed.study}"
     rows = study.participants
@@ -387,25 +366,20 @@ def _protocol(study: Study, committed: Commitment) -> Iterator[str]:
             f"{counted(len(other), 'session')} ran under another protocol (version {versions}) than the preregistered "
             f"one (version {committed.version}, SHA-256 {committed.protocol_hash[:12]}…): {who}{more}"
         )
+    yield from _other_participants(study, committed.participants)
+    by_person = [one for one in study.exclusions if one.rule_or_person not in committed.rules]
+    for one in by_person[:SHOWN]:
+        yield f"an exclusion by no preregistered rule: {named(one)}: {one.reason} ({one.rule_or_person})"
+    if len(by_person) > SHOWN:
+        yield f"{len(by_person) - SHOWN} more exclusions by no preregistered rule, in report.json"
+    if study.decided.changed:
+        yield "the decisions about the analysis differ between sessions: all results are exploratory"
 
 
 def _other_participants(study: Study, planned: int | None) -> Iterator[str]:
     if planned is not None and study.n != planned:
         kind = "fewer" if study.n < planned else "more"
         yield f"{kind} participants: {study.n} are analysed, {planned} were planned"
-
-
-def _other_exclusions(study: Study, committed: Commitment) -> Iterator[str]:
-    other = [one for one in study.exclusions if one.rule_or_person not in committed.rules]
-    for one in other[:SHOWN]:
-        yield f"an exclusion by no preregistered rule: {named(one)}: {one.reason} ({one.rule_or_person})"
-    if len(other) > SHOWN:
-        yield f"{len(other) - SHOWN} more exclusions by no preregistered rule, in report.json"
-
-
-def _decisions(study: Study) -> Iterator[str]:
-    if study.decided.changed:
-        yield "the decisions about the analysis differ between sessions: all results are exploratory"
 
 
 def deviations_section(study: Study) -> Iterator[str]:

@@ -95,7 +95,8 @@ def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> st
     most_ms = longest_ms(liquid, estimator)
     if delay_ms <= most_ms:
         return None
-    percent = _withheld_percent(liquid, estimator, delay_ms)
+    rows = _rows(liquid, estimator, "light")
+    percent = float(np.interp(delay_ms, [it.delay_ms for it in rows], [it.withheld_percent for it in rows]))
     if percent <= WITHHELD_PERCENT:
         return None
     force_n = steady(protocol.scene_for(name), STIRRED.speed_mps).drag_n
@@ -104,12 +105,6 @@ def _of_table(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> st
         f"hand ({percent / 100 * force_n:.2g} of {force_n:.2g} N at {STIRRED.speed_mps:.2g} m/s): choose at most "
         f"{most_ms:g} ms"
     )
-
-
-def _withheld_percent(liquid: str, estimator: str, delay_ms: float) -> float:
-    """Return the share that is withheld [%], interpolated in the stored table."""
-    rows = _rows(liquid, estimator, "light")
-    return float(np.interp(delay_ms, [it.delay_ms for it in rows], [it.withheld_percent for it in rows]))
 
 
 def _of_energy(protocol: Protocol, name: str, delay_ms: float) -> str | None:

@@ -257,11 +257,6 @@ class ThresholdPlan:
         with np.errstate(divide="ignore"):  # a level of 0 has the logarithm −∞
             return np.log10(np.maximum(found, 0.0)) if log else found
 
-    def middle_half(self, count: int) -> Floats:
-        """Return thresholds [u], evenly spaced over the middle half of the levels."""
-        low, high = self.stimulus.domain
-        return low + (high - low) * (0.25 + 0.5 * (np.arange(count) + 0.5) / count)
-
     def answered(self, thresholds: Floats, random: Generator, lapses: float = LAPSES) -> Answered | None:
         """Return what observers with thresholds (n,) [u] answer; None: the method's tracks are not simulated."""
         stimulus, design = self.stimulus, self.design
@@ -333,8 +328,13 @@ def expected(plan: ThresholdPlan) -> Expected | None:
     Only thresholds below the highest level that is presented in full have estimates; where those are not the larger
     half of all, none is expected.
     """
-    simulated, observers = _affordable(plan)
-    truth = plan.middle_half(observers)
+    cells = CELLS * (6 if plan.design.has_noise else 1) * (30 if getattr(plan.method, "learn", "") == "all" else 1)
+    per_trial = cells * plan.stimulus.steps
+    trials = min(plan.trials, MOST_TRIALS, max(10, MOST_WORK // (per_trial * FEWEST)))
+    simulated = plan if trials == plan.trials else plan.with_trials(trials)
+    observers = max(FEWEST, min(OBSERVERS, MOST_WORK // (per_trial * simulated.trials)))
+    low, high = plan.stimulus.domain
+    truth = low + (high - low) * (0.25 + 0.5 * (np.arange(observers) + 0.5) / observers)  # the middle half
     halves, variances = [], []
     for one in simulated.each_standard():
         found = one.simulate(truth, np.random.default_rng(SEED))
@@ -352,16 +352,6 @@ def expected(plan: ThresholdPlan) -> Expected | None:
         spread=shrunk * (sum(variances) / len(variances)) ** 0.5,
         threshold=plan.stimulus.level_of(float(np.median(truth))),
     )
-
-
-def _affordable(plan: ThresholdPlan) -> tuple[ThresholdPlan, int]:
-    """Return the plan with as many trials as are simulated, and the number of observers."""
-    method = plan.method
-    cells = CELLS * (6 if plan.design.has_noise else 1) * (30 if getattr(method, "learn", "") == "all" else 1)
-    per_trial = cells * plan.stimulus.steps
-    trials = min(plan.trials, MOST_TRIALS, max(10, MOST_WORK // (per_trial * FEWEST)))
-    simulated = plan if trials == plan.trials else plan.with_trials(trials)
-    return simulated, max(FEWEST, min(OBSERVERS, MOST_WORK // (per_trial * simulated.trials)))
 
 
 def precision_plan(protocol: Protocol, block: Block) -> ThresholdPlan | MeanPlan | None:

@@ -60,10 +60,6 @@ class BlockOrder(_Kept):
         """How many breaks come between its trials."""
         return 0 if self.break_every is None else (self.trials - 1) // self.break_every
 
-    def break_after(self, index: int) -> bool:
-        """Return whether a break follows trial ``index`` (from 1)."""
-        return self.break_every is not None and index < self.trials and index % self.break_every == 0
-
 
 @dataclass(frozen=True, slots=True)
 class FormOrder:

@@ -129,7 +129,7 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, row
             items = _shuffled(step, seed, f"{participant}/{step.id}/{index}")
             steps.append(Trial(number, step.id, step.phase, step.part, index, step.trials, code, items))
             number += 1
-            if step.break_page is not None and step.break_after(index):
+            if step.break_page and step.break_every and index < step.trials and index % step.break_every == 0:
                 steps.append(PageStep(step.break_page))
     return Schedule(participant, seed, tuple(steps))
 
