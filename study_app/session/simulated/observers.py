@@ -119,21 +119,18 @@ def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: floa
     return np.arange(len(position_m)) / RATE_HZ, position_m
 
 
-def _strokes_across(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
-    """Go to and fro from left to right, at any height."""
-    y = _between(draw, -1, 1) * reach_m[1] * 0.5
-    ends = [np.array([side * reach_m[0], y, 0.0]) for side in (1, -1, 1, -1)]
-    return _through(draw, start_m, ends)
+def _strokes(along: int, aside: int, sides: tuple[int, ...]) -> Figure:
+    """Return a figure that goes to and fro along an axis, at any place of another axis."""
 
+    def figure(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
+        ends_m = np.zeros((len(sides), 3))
+        ends_m[:, along], ends_m[:, aside] = (
+            np.array(sides) * reach_m[along],
+            _between(draw, -1, 1) * reach_m[aside] * 0.5,
+        )
+        return _through(draw, start_m, list(ends_m))
 
-def _strokes_up(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
-    x = _between(draw, -1, 1) * reach_m[0] * 0.5
-    return _through(draw, start_m, [np.array([x, side * reach_m[1], 0.0]) for side in (1, -1, 1)])
-
-
-def _strokes_in_depth(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
-    x = _between(draw, -1, 1) * reach_m[0] * 0.5
-    return _through(draw, start_m, [np.array([x, 0.0, side * reach_m[2]]) for side in (1, -1, 1)])
+    return figure
 
 
 def _zigzag(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
@@ -176,7 +173,13 @@ def _stroke(begin_m: Floats, end_m: Floats, pace_mps: float) -> Floats:
     return np.asarray(begin_m + done[:, None] * way)
 
 
-FIGURES: tuple[Figure, ...] = (_strokes_across, _circles, _zigzag, _strokes_up, _strokes_in_depth)
+FIGURES: tuple[Figure, ...] = (
+    _strokes(0, 1, (1, -1, 1, -1)),
+    _circles,
+    _zigzag,
+    _strokes(1, 0, (1, -1, 1)),
+    _strokes(2, 0, (1, -1, 1)),
+)
 
 
 def _rows(duration_s: float) -> int:
@@ -330,18 +333,9 @@ def _norm(vectors: Any) -> Any:
 
 
 class ProgrammedBall:
-    """A ball on a path of ``duration_s`` [s], which repeats.
+    """A ball on a path of ``duration_s`` [s], which repeats, through a task in a tank of these full sizes [m].
 
-    Parameters
-    ----------
-    task : AnyTask
-        The task that it moves through.
-    workspace_m : tuple of float
-        Full sizes of the tank along x, y, z [m].
-    hidden_after_lead : bool
-        Whether the ball is not drawn once the lead of the task is over.
-    seed : int
-        What the path of an exploration is drawn from.
+    With ``hidden_after_lead`` it is not drawn once the task's lead is over; ``seed`` is that of an exploration.
     """
 
     def __init__(
