@@ -1,6 +1,7 @@
 """The study designer's place: header, outline, form, file and problems."""
 
 from functools import partial
+from typing import Any
 
 from PySide6.QtCore import Qt, Signal, SignalInstance
 from PySide6.QtGui import QKeyEvent, QResizeEvent
@@ -34,7 +35,16 @@ from study_app.viewmodels.designer.new_study import TemplateChoice
 from study_app.viewmodels.designer.outline_rows import ElementPath, OutlineRow
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.prompts import DeletePrompt
-from study_app.viewmodels.designer.requests import AskSeries, GoTo, LeaveText, MoveTo, RetypeFile, SetText, SetValue
+from study_app.viewmodels.designer.requests import (
+    AskSeries,
+    GoTo,
+    LeaveText,
+    MoveTo,
+    RetypeFile,
+    SetText,
+    SetValue,
+    with_path,
+)
 
 
 class DesignerPlace(Place):
@@ -276,8 +286,14 @@ class DesignerPlace(Place):
 
     def _select(self, path: ElementPath) -> None:
         """Select an element, after what is being typed."""
+        self.selected.emit(self._after_typing(path))
+
+    def _after_typing(self, asked: Any) -> Any:
+        """Hand on what is being typed; return a path or request with the id that the form's element has then."""
+        before = () if self.form.form is None else self.form.form.path
         self.flush()
-        self.selected.emit(path)
+        after = () if self.form.form is None else self.form.form.path
+        return asked if before == after else with_path(asked, before, after)
 
     def _ask(self, asked: SignalInstance) -> None:
         self.flush()
@@ -297,7 +313,7 @@ class DesignerPlace(Place):
     def _take_asked(self, asked: object) -> None:
         """Hand on a request, after what is being typed; those of the place itself are done here."""
         if not (isinstance(asked, SetText | LeaveText) or (isinstance(asked, SetValue) and asked.typing)):
-            self.flush()
+            asked = self._after_typing(asked)
         if isinstance(asked, AskSeries):
             self.series_asked.emit(asked)
         elif isinstance(asked, GoTo):

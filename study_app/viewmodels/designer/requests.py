@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 from study_app.protocol.source.document import Path
@@ -221,6 +221,13 @@ Request: TypeAlias = (
 )  # fmt: skip
 
 
-def with_path(path: Path, before: Path, after: Path) -> Path:
-    """Return a path in which that of an element is another one, as after a new id."""
-    return (*after, *path[len(before) :]) if path[: len(before)] == before else path
+def with_path(asked: Any, before: Path, after: Path) -> Any:
+    """Return a request, or a path, in which the path of an element is another one, as after a new id."""
+    if isinstance(asked, tuple):
+        if asked[: len(before)] == before:
+            return (*after, *asked[len(before) :])
+        return tuple(with_path(one, before, after) for one in asked)
+    if is_dataclass(asked) and not isinstance(asked, type):
+        parts = {part.name: getattr(asked, part.name) for part in fields(asked)}
+        return replace(asked, **{name: with_path(value, before, after) for name, value in parts.items()})
+    return asked
