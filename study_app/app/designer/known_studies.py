@@ -28,7 +28,7 @@ from study_app.viewmodels.designer.new_study import (
     template_choice,
 )
 from study_app.viewmodels.designer.outline_rows import FIRST
-from study_app.viewmodels.designer.versions.standing import VersionChip
+from study_app.viewmodels.designer.versions import VersionChip
 from study_app.viewmodels.home import holds_liquids_alone, is_shipped, sources
 from study_app.workspace import workspace
 

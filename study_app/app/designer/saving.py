@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.known_studies import source_of
 from study_app.app.designer.open_study import OpenStudy, why_read_only
-from study_app.app.designer.versions.comparison import Comparison, compare, newest, version_of
+from study_app.app.designer.versions.changes_controller import compare, newest, version_of
 from study_app.app.designer.versions.file_watch import FileWatch
 from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.authoring.drafts import draft_of
@@ -19,12 +19,11 @@ from study_app.authoring.versions.runs import Standing, check_version
 from study_app.authoring.writer.refused import Refused, free_in
 from study_app.errors import StudyError
 from study_app.gui.designer.prompts import DiscardCard
-from study_app.gui.designer.versions.save_card import SaveCard
+from study_app.gui.designer.versions import SaveCard
 from study_app.gui.designer.view import DesignerPlace
 from study_app.number_text import counted
 from study_app.viewmodels.designer.designer_view import Banner, BannerAction
-from study_app.viewmodels.designer.versions.changes_view import FILE
-from study_app.viewmodels.designer.versions.standing import save_prompt
+from study_app.viewmodels.designer.versions import FILE, Comparison, save_prompt
 from study_app.viewmodels.home import time_words
 
 DRAFT_MS: Final = 50
@@ -190,7 +189,7 @@ class Saving(QObject):
         run = newest(self.runs.known)
         found = Comparison() if run is None else compare(version_of(opened, run), opened.study)
         problems = len(opened.study.faults)
-        self.card = card = SaveCard(save_prompt(standing, self.runs.known, found.groups, found.note, problems))
+        self.card = card = SaveCard(save_prompt(standing, self.runs.known, found, problems))
         card.save_asked.connect(self.save_as_version)
         card.another_asked.connect(self.save_as_another)
         card.changes_asked.connect(self.place.close_prompt)

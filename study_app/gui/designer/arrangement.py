@@ -39,16 +39,13 @@ class Crumb(PressedByEnter):
         self.setFixedHeight(32)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for all words."""
+    def sizeHint(self) -> QSize:
         return QSize(self.fontMetrics().horizontalAdvance(self.whole) + 24, 32)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for some letters."""
+    def minimumSizeHint(self) -> QSize:
         return QSize(min(self._least_px, self.sizeHint().width()), 32)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Show as many words as there is room for."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         room = self.width() - 22
         self.setText(self.fontMetrics().elidedText(self.whole, Qt.TextElideMode.ElideRight, room))
@@ -75,7 +72,6 @@ class PathBar(QWidget):
         self.row = hbox(self.outline, self._steps, STRETCH, spacing=4, margins=0, parent=self)
 
     def show_form(self, form: Form) -> None:
-        """Show the way to an element."""
         if form.around == self._shown:
             return
         self._shown = form.around
@@ -129,7 +125,6 @@ class Arrangement(QWidget):
         return [self.outline, self.top, *([] if self.prompt is None else [self.prompt]), *beside]
 
     def show_side(self, side: str) -> None:
-        """Show form or pane where they share a column."""
         self.side = side
         self.arrange(self._width)
 
@@ -202,14 +197,12 @@ class Arrangement(QWidget):
     def _place_drawer(self) -> None:
         self.outline.setGeometry(QRect(0, 46, DRAWER_PX, max(200, self.height() - 46)))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Keep the drawer as high as the place."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if self.drawer:
             self._place_drawer()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Close the drawer at Esc."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.drawer and self.outline.isVisible() and event.key() == Qt.Key.Key_Escape:
             self.close_drawer()
         else:

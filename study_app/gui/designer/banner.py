@@ -51,8 +51,7 @@ class BannerCard(Card):
             self.asked.emit("close")
         return closes
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint a tinted surface with an accent edge, unlike the cards of the study."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(QColor(self.theme.accent))

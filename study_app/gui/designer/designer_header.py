@@ -39,18 +39,15 @@ class ChipButton(Themed, PressedByEnter):
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
     def show_state(self, tone: Tone, icon: str, words: str) -> None:
-        """Show another state."""
         self._state = (tone, icon, words)
         self.setAccessibleName(f"{words}: {self._does}")
         self.updateGeometry()
         self.update()
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for icon and words; a fixed size would not outlast a change of theme."""
+    def sizeHint(self) -> QSize:
         return QSize(chip_size(self.words, small=False).width(), 32)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the same room."""
+    def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
     @property
@@ -58,8 +55,7 @@ class ChipButton(Themed, PressedByEnter):
         """What the chip says."""
         return self._state[2]
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the chip, and a ring where it is focused."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         body = QRectF(0, self.height() / 2 - 14, self.sizeHint().width(), 28)
@@ -124,7 +120,6 @@ class DesignerHeader(QWidget):
         self.show_state(self.state)
 
     def show_state(self, state: HeaderState) -> None:
-        """Show another state."""
         before, self.state = self.state, state
         self._announce(before, state)
         if state.studies != before.studies or state.chosen != before.chosen or not self.study.count():
@@ -181,12 +176,10 @@ class DesignerHeader(QWidget):
         if state.draft.startswith("Draft") and not before.draft.startswith("Draft"):
             say(self, state.draft)
 
-    def focusInEvent(self, _event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Pass the keyboard focus on."""
+    def focusInEvent(self, _event: QFocusEvent) -> None:
         self.keyboard_left.emit()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Show shorter texts if there is little room."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.play.show_wide(self.width() >= WIDE_FROM)
         self._make_room()

@@ -83,8 +83,7 @@ class KeysCard(Card):
             self._before = None
             self.hide()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Close at Esc; scroll by the arrows."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.put_away()
         elif lines := SCROLLS.get(Qt.Key(event.key()), 0):

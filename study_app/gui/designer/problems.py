@@ -85,18 +85,15 @@ class ProblemLine(Themed, QWidget):
         lead_by_tab(self.go, self.repairs)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         own = f"QPushButton {{ text-align: left; padding: 0; color: {theme.text}; }}"
         self.go.setStyleSheet(f"{own} QPushButton:disabled {{ color: {theme.text3}; }}")
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Open the problem."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self.opened.emit()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Tint the one that one is at."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if self.here:
             paint_ground(self, self.theme.selected)
 
@@ -157,7 +154,6 @@ class ProblemsCard(Card):
         self._show()
 
     def show_warnings(self, rows: tuple[ProblemRow, ...]) -> None:
-        """Show the warnings after the problems."""
         self._warnings = rows
         self._show()
 
@@ -223,8 +219,7 @@ class ProblemsCard(Card):
         """Whether the pointer is over the list: it keeps its height then, else a click would hit what is below."""
         return self.isVisible() and self.underMouse()
 
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
-        """Take the height that the problems need; without any the list is closed."""
+    def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
         self._show()
         if self._moved:  # later: Qt says that the pointer leaves where what is under it is replaced, too

@@ -36,8 +36,7 @@ class Prompt(Card):
         self.cancel.clicked.connect(self.given_up)
         self.buttons = hbox(self.cancel, STRETCH, spacing=10)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Give up at Esc."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.given_up.emit()
         else:

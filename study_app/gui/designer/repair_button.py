@@ -30,13 +30,11 @@ class RepairButton(ActionButton):
         self.show_action("", words)
         self.setAccessibleName(f"{words}: {problem.name}")
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Note what led here."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self.by_keys = event.reason() != Qt.FocusReason.MouseFocusReason
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Note that a click leads here, also where a key did before."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         self.by_keys = False
         super().mousePressEvent(event)
 

@@ -23,7 +23,6 @@ class _Segment(Themed, QAbstractButton):
         self.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
 
     def show_words(self, words: str) -> None:
-        """Show another text."""
         if words != self.text():
             self.setText(words)
             self.setAccessibleName(words)
@@ -35,19 +34,16 @@ class _Segment(Themed, QAbstractButton):
             strip.update()
         return super().event(event)
 
-    def nextCheckState(self) -> None:  # noqa: N802 - Qt's name
+    def nextCheckState(self) -> None:
         """Leave it to `Segments` which is chosen."""
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the words."""
+    def sizeHint(self) -> QSize:
         return QSize(round(QFontMetricsF(font("label", weight=600)).horizontalAdvance(self.text())) + 18, self._height)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the same room."""
+    def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the raised surface of the chosen one, and the words."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t, painter = self.theme, QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         body = QRectF(self.rect()).adjusted(1, 1, -1, -1)
@@ -102,8 +98,7 @@ class Segments(Themed, QWidget):
             QWidget.setTabOrder(self.buttons[-1], made)
         self.buttons.append(made)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Choose the neighbour by the arrow keys, and by Enter, as by Space, the one that has the keyboard."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()), 0)
         at = next((number for number, button in enumerate(self.buttons) if button.hasFocus()), None)
         if at is not None and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
@@ -114,8 +109,7 @@ class Segments(Themed, QWidget):
         else:
             super().keyPressEvent(event)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the sunk strip, and the ring."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)

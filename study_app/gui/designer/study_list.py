@@ -33,8 +33,7 @@ class StudyLine(QStyledItemDelegate):
         super().__init__(studies)
         self._studies = studies
 
-    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the words and the mark, as far as the window has it."""
+    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
         wanted = super().sizeHint(option, index) + QSize(MARK_PX, 0)
         return QSize(min(wanted.width(), self._studies.window().width() * 2 // 3), wanted.height())
 
@@ -86,14 +85,12 @@ class StudyList(Choice):
         file = words[length:].partition(BEFORE_ORIGIN)[0]
         return super().fitted(cut_title(title + file, length, self.fontMetrics(), room_px) + file, room_px)
 
-    def showPopup(self) -> None:  # noqa: N802 - Qt's name
-        """Open the list; where no study is open, at its first line."""
+    def showPopup(self) -> None:
         super().showPopup()
         if self.currentIndex() < 0:
             self.view().setCurrentIndex(self.model().index(0, self.modelColumn()))
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Open the list at the keys of `OPENS` and at a letter; Qt would open another study at some of them."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         shift_or_pad = Qt.KeyboardModifier.KeypadModifier | Qt.KeyboardModifier.ShiftModifier
         letter = event.text().strip() if event.text().isprintable() else ""
         if (event.key() in OPENS or letter) and not event.modifiers() & ~shift_or_pad:

@@ -220,11 +220,9 @@ class DesignerPlace(Place):
         self.measures.area.verticalScrollBar().setValue(0)
 
     def show_header(self, state: HeaderState) -> None:
-        """Show the header's state."""
         self.header.show_state(state)
 
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
-        """Show the rows of the outline."""
         self.outline.show_outline(rows, selected)
 
     def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
@@ -232,7 +230,6 @@ class DesignerPlace(Place):
         self.problem_steps.show_repairs(row, words)
 
     def show_new(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
-        """Show what a new study can begin from."""
         self.new_page.card.questions.clear()
         self.new_page.show_choices(choices, chosen)
         self.stack.setCurrentWidget(self.new_page)
@@ -306,7 +303,6 @@ class DesignerPlace(Place):
             self.add_asked.emit()
 
     def show_addable(self, every: tuple[Addable, ...]) -> None:
-        """Show what can be added."""
         button = self.outline.add if self.outline.add.isVisible() else self.header
         self.adding.open(every, button.mapToGlobal(button.rect().topLeft()))
 
@@ -363,14 +359,12 @@ class DesignerPlace(Place):
         self.flush()
         self.left.emit()
 
-    def focusNextPrevChild(self, forward: bool) -> bool:  # noqa: N802 - Qt's name
-        """Let Tab go through the parts as they are seen, once what is typed is handed on, which may make them anew."""
+    def focusNextPrevChild(self, forward: bool) -> bool:
         self.flush()
         parts = [self.nothing, self.header, self.banner, *self.parts.in_order]
         return go_on(parts, super().focusNextPrevChild, forward=forward)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Close the line above the parts at an Esc that no part took."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() != Qt.Key.Key_Escape or not self.banner.close_by_key():
             super().keyPressEvent(event)
 
@@ -378,8 +372,7 @@ class DesignerPlace(Place):
         """Return that form and file need the width."""
         return True
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Make room."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.parts.arrange(self.width())
         self.keys.make_room()

@@ -7,7 +7,7 @@ from study_app.number_text import counted
 from study_app.viewmodels.designer.file_text import FileText
 from study_app.viewmodels.designer.form.form_rows import Form
 from study_app.viewmodels.designer.problem_rows import ProblemRow
-from study_app.viewmodels.designer.versions.standing import VersionChip
+from study_app.viewmodels.designer.versions import VersionChip
 from study_app.viewmodels.tones import Tone
 
 BETWEEN: Final = "  ·  "

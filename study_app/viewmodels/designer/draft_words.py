@@ -1,12 +1,13 @@
 """What a draft of a study holds, in words; apart from `home`, which begins without the designer's modules."""
 
+import tomllib
 from pathlib import Path
 from typing import Final
 
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of
 from study_app.authoring.outline import study_title, title_of
-from study_app.authoring.versions.changes import changes
+from study_app.protocol.differences import document_differences
 from study_app.viewmodels.designer.problem_rows import element_of
 
 NAMED_AT_MOST: Final = 3
@@ -22,12 +23,12 @@ def edited_words(saved: str, draft: str, folder: Path) -> str:
     """Return the elements in which a draft differs from its file, in words: ": Water, Welcome and 2 more"."""
     study = Study(draft, folder)
     try:
-        found = changes(saved, study)
+        found = document_differences(tomllib.loads(saved), tomllib.loads(draft))
     except ValueError:  # the text of one of them is not TOML
         return ""
-    places = (one.path for one in found if one.path)
+    places = (one.place[:2] for one in found)
     titles = dict.fromkeys(
-        label_of(path[1]) if path[0] == "study" and len(path) > 1 else title_of(study.document, element_of(study, path))
+        label_of(path[1]) if path[0] == "study" else title_of(study.document, element_of(study, path))
         for path in places
     )
     named, more = list(titles)[:NAMED_AT_MOST], len(titles) - NAMED_AT_MOST

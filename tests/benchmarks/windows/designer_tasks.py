@@ -24,7 +24,7 @@ from study_app.authoring.drafts import draft_of
 from study_app.authoring.edited_study import read
 from study_app.gui.designer.designer_header import DesignerHeader
 from study_app.gui.designer.problems import ProblemsCard
-from study_app.gui.designer.versions.change_list import ChangeLine
+from study_app.gui.designer.versions import DifferenceText
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import shipped_file
 from tests.app.designer.support.inputs import name_of, wait_until
@@ -101,7 +101,7 @@ class Tasks:
         """What differs from the version that was saved."""
         self.user.choose("Study", "Three drinks  ·  threedrinks.toml")
         self.user.choose("View of the study", "Changes")
-        wait_until(lambda: self.user.window.findChildren(ChangeLine), "the differences")
+        wait_until(lambda: self.user.window.findChild(DifferenceText).toPlainText(), "the differences")
 
     def rename(self) -> None:
         """A liquid renamed, another one deleted with all that needs it, both undone."""

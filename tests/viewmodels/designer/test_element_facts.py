@@ -14,7 +14,6 @@ from study_app.authoring.new_study import template
 from study_app.authoring.repairs import repairs
 from study_app.authoring.study_facts import facts
 from study_app.authoring.templates import FOLDER
-from study_app.authoring.versions.changes import changes
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.files import shipped_file
@@ -94,8 +93,6 @@ def test_a_value_of_a_wrong_type_is_a_fault_that_every_view_shows(name: str, pat
     assert len(problems) == len(study.faults)
     for fault in study.faults:
         repairs(study, fault)
-    assert changes(sound.text, study)
-    assert changes(study.text, sound)
     protocol = sound_part(study, sound.document)
     for selected in {("study",), path[:2], path[:4]}:
         if not isinstance(value_at(study.document, selected), dict):

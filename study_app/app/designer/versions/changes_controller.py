@@ -1,31 +1,96 @@
-"""The tab Changes: compares the open study with a version, and reverts single differences."""
+"""The tab Changes: compares the open study with a version, and restores a version."""
 
+import json
+from collections.abc import Iterable
 from contextlib import suppress
 from datetime import datetime
+from difflib import unified_diff
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from PySide6.QtCore import QObject, QTimer
 
 from study_app.app.designer.editing import Editing
 from study_app.app.designer.open_study import OpenStudy
-from study_app.app.designer.versions.comparison import Version, compare, file_version, kept_version, newest, version_of
 from study_app.app.designer.versions.known_runs import KnownRuns
-from study_app.authoring.versions.contents import kept_versions
-from study_app.authoring.versions.runs import Run, run_of
-from study_app.authoring.writer.refused import Refused
+from study_app.authoring.edited_study import Study
+from study_app.authoring.versions.contents import content_hash, kept_content, kept_versions
+from study_app.authoring.versions.runs import Run, run_of, source_of
 from study_app.errors import StoreError
 from study_app.gui.designer.pane.right_pane import PanePage
-from study_app.gui.designer.versions.changes_card import ChangesCard
+from study_app.gui.designer.versions import ChangesCard
 from study_app.gui.designer.view import DesignerPlace
+from study_app.protocol.differences import differences
+from study_app.protocol.source.files import unbundled, with_liquid_files
 from study_app.store.folders import SessionFolder
-from study_app.viewmodels.designer.file_text import retyped
-from study_app.viewmodels.designer.versions.change_rows import ChangeRow
-from study_app.viewmodels.designer.versions.changes_view import FILE, ChangesView, VersionChoice, version_choices
-from study_app.viewmodels.designer.versions.side_by_side import Hunk, reverted, side_by_side
+from study_app.store.receipt import without_conditions
+from study_app.viewmodels.designer.file_text import shown
+from study_app.viewmodels.designer.versions import FILE, ChangesView, Comparison, VersionChoice, version_choices
 
 TAB: Final = "changes"
 REST_MS: Final = 200
+NO_COPY: Final = (
+    "No copy of this version is kept on this computer. What differs is taken from a receipt, which does not say what "
+    "the conditions are."
+)
+FAULTY: Final = "No copy of this version is kept on this computer: solve the problems of the study to list differences."
+EQUAL: Final = "The study does not differ from this version."
+
+
+class Version(NamedTuple):
+    """A version to compare with: its source (text and liquid files) where a copy is kept, and a run with a receipt."""
+
+    source: str | None
+    run: Run | None = None
+
+    @property
+    def text(self) -> str | None:
+        """The text of the study's own file."""
+        return None if self.source is None else unbundled(self.source.encode())[0].decode()
+
+
+def version_of(opened: OpenStudy, run: Run) -> Version:
+    """Return a version that was run: its copy is kept, or it is what the file holds."""
+    source = source_of(run)
+    if source is None:
+        file = with_liquid_files(opened.saved.encode(), opened.study.folder)
+        source = file.decode() if content_hash(file) == run.hash else None
+    return Version(source, run)
+
+
+def kept_version(hash_: str) -> Version:
+    """Return a version that was saved."""
+    content = kept_content(hash_)
+    return Version(None if content is None else content.decode("utf-8", "replace"))
+
+
+def file_version(file: Path) -> Version:
+    """Return what a study's file holds at this moment."""
+    try:
+        return Version(file.read_bytes().decode("utf-8", "replace"))
+    except OSError:
+        return Version(None)
+
+
+def compare(version: Version, study: Study) -> Comparison:
+    """Return how a study differs from a version: line by line, or in sentences where only a receipt is known."""
+    if version.source is None:
+        held = None if version.run is None else version.run.protocol
+        if held is None or study.protocol is None:
+            return Comparison((), FAULTY)
+        return Comparison(differences(held, json.loads(json.dumps(without_conditions(study.protocol)))), NO_COPY)
+    now = study.text
+    if unbundled(version.source.encode())[1]:  # kept with its liquid files
+        now = with_liquid_files(now.encode(), study.folder).decode()
+    before, after = (shown(text).split("\n") for text in (version.source, now))
+    _, _, *lines = unified_diff(before, after, lineterm="") if before != after else ("", "")
+    return Comparison(tuple(lines), "" if lines else EQUAL)
+
+
+def newest(known: Iterable[Run]) -> Run | None:
+    """Return what participants were run with last; where there are none, what was run last as a pilot or rehearsal."""
+    ran = tuple(known)
+    return next((run for run in reversed(ran) if run.sessions), ran[-1] if ran else None)
 
 
 class ChangesController(QObject):
@@ -48,9 +113,7 @@ class ChangesController(QObject):
         editing.edited.connect(self._resting.start)
         runs.changed.connect(self.show)
         self.card.version_chosen.connect(self.compare_with)
-        self.card.go_asked.connect(lambda row: self.editing.select(row.element))
-        self.card.revert_asked.connect(self.revert)
-        self.card.revert_text_asked.connect(self.revert_text)
+        self.card.restore_asked.connect(self.restore)
 
     def compare_with(self, key: str) -> None:
         """Show the tab with a version by its hash, the file ("file"), by default that of the last session."""
@@ -84,10 +147,8 @@ class ChangesController(QObject):
             return
         version = self._version(opened, chosen)
         found = compare(version, opened.study)
-        text = version.text
-        sides = None if text is None else side_by_side(text, opened.study.text)
-        can_revert = not opened.read_only and text is not None
-        self.card.show_view(ChangesView(choices, chosen, found.groups, found.note, sides, can_revert))
+        can_restore = not opened.read_only and version.text not in {None, opened.study.text}
+        self.card.show_view(ChangesView(choices, chosen, found, can_restore))
 
     def _choices(self, opened: OpenStudy) -> tuple[VersionChoice, ...]:
         file = ""
@@ -116,28 +177,12 @@ class ChangesController(QObject):
         run = next((one for one in self._known() if one.hash == key), None)
         return kept_version(key) if run is None else version_of(opened, run)
 
-    # one step each
-
-    def revert(self, row: ChangeRow) -> None:
-        """Take one difference back."""
+    def restore(self) -> None:
+        """Give the study the text of the version, as one step."""
         self.place.flush()
-        self.show()
-        rows = (one for group in self.card.view.groups for one in group.rows)
-        now = next((one for one in rows if one.change.sentence == row.change.sentence), None)
-        if now is None:
-            return
-        try:
-            self.editing.make(f"Revert {now.title}", *now.change.revert, select=now.element or None)
-        except Refused as refusal:
-            self.place.message.emit("This was not reverted", f"{refusal}.")
-        self.show()
-
-    def revert_text(self, hunk: Hunk) -> None:
-        """Give some lines the text that they had in the version."""
-        self.place.flush()
-        self.show()
-        opened, sides = self.editing.writable, self.card.view.sides
-        if opened is None or sides is None or hunk not in sides.hunks:
-            return
-        self.editing.type_text("Revert lines", retyped(opened.study.text, reverted(opened.study.text, hunk)))
-        self.show()
+        opened, chosen = self.editing.writable, self.card.view.chosen
+        text = None if opened is None else self._version(opened, chosen).text
+        if text is not None:
+            words = next(one.words for one in self.card.view.versions if one.key == chosen)
+            self.editing.type_text(f"Restore {words}", text)
+            self.show()

@@ -12,7 +12,7 @@ from study_app.app.designer.editing import Editing
 from study_app.authoring.versions.runs import Run, Standing, keep_what_was_run, recorded_items, runs
 from study_app.errors import StoreError
 from study_app.gui.widgets.background import Background
-from study_app.viewmodels.designer.versions.standing import VersionChip, version_chip
+from study_app.viewmodels.designer.versions import VersionChip, version_chip
 
 REST_MS: Final = 150
 

@@ -8,7 +8,7 @@ from study_app.app.designer.editing import Editing
 from study_app.app.designer.versions.known_runs import KnownRuns
 from study_app.authoring.names import references_to
 from study_app.authoring.writer.comments import Comment, comments_naming
-from study_app.gui.designer.versions.rename_cards import CommentsCard, UnlockCard, title_of
+from study_app.gui.designer.versions import CommentsCard, UnlockCard, title_of
 from study_app.gui.designer.view import DesignerPlace
 from study_app.number_text import counted
 from study_app.protocol.source.document import Path, value_at

@@ -76,8 +76,7 @@ class FormCard(Card):
         self.foot = FormFoot()
         add_parts(self.column, self.head, Rule(), self.own, (self.area, 1), self.foot)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Leave the room to the editors where there is little."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.foot.setVisible(self.height() >= FOOT_FROM)
 
@@ -242,7 +241,6 @@ class FormCard(Card):
         return made
 
     def show_selected(self, paths: tuple[tuple[str | int, ...], ...]) -> None:
-        """Show which other questions are selected with the one that is edited."""
         self._together = paths
         for row in self.others:
             row.show_chosen(row.line.path in paths)

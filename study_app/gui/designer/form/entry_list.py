@@ -140,8 +140,7 @@ class EntryList(Field):
         if target is not None:
             self.move_entries(self._together(at), target)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the line where the dragged entries would come."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if self._target is not None and self.rows:
             last = self._target == len(self.rows)
             row = self.rows[-1 if last else self._target].geometry()

@@ -90,8 +90,7 @@ class EntryRow(Themed, QWidget):
         """Return by how many places a key moves the entry."""
         return _arrow(event) if _held(event) == Qt.KeyboardModifier.AltModifier and self.grip else 0
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Go on by the arrows, with Alt move; cancel a drag at Esc."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         extends = _held(event) == Qt.KeyboardModifier.ShiftModifier
         if by := self._by(event):
             self.moved.emit(by)
@@ -114,8 +113,7 @@ class EntryRow(Themed, QWidget):
         else:
             super().keyPressEvent(event)
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Select the row, and note where a drag may begin."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         left = event.button() == Qt.MouseButton.LeftButton
         self._pressed = max(1, round(event.position().y())) if left else 0
         if left:
@@ -124,13 +122,11 @@ class EntryRow(Themed, QWidget):
             shift, control = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
             self.pressed.emit(bool(held & shift), bool(held & control))
 
-    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Open what the row names."""
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self.opened.emit()
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Drag."""
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if not self.grip or not event.buttons() & Qt.MouseButton.LeftButton or not self._pressed:
             return
         y = round(event.position().y())
@@ -140,8 +136,7 @@ class EntryRow(Themed, QWidget):
         if self._dragging:
             self.dragged.emit(self.mapToParent(event.position().toPoint()).y())
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Drop; where nothing was dragged, a plain click selects this row alone."""
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if self._dragging:
             self._let_go()
             self.dropped.emit()
@@ -155,8 +150,7 @@ class EntryRow(Themed, QWidget):
         self._dragging, self._pressed = False, 0
         self.unsetCursor()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the edge and the grip."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setBrush(QColor(self.theme.selected) if self.chosen else Qt.BrushStyle.NoBrush)

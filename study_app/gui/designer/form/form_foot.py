@@ -26,13 +26,11 @@ class FormFoot(Themed, QWidget):
         vbox(hbox(self.title, (self.place, 1)), self.words, spacing=3, margins=(12, 8, 12, 8), parent=self)
 
     def show_help(self, title: str, place: str, words: str) -> None:
-        """Show the help of a field."""
         self.title.setText(title)
         self.place.show_text(place)
         self.words.setText(words)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the sunk surface."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)

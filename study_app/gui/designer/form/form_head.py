@@ -30,8 +30,7 @@ class Tile(Themed, QWidget):
         self.icon = "ring"
         self.setFixedSize(TILE, TILE)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the square and the icon."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(QColor(self.theme.selected))
@@ -110,7 +109,6 @@ class FormHead(QWidget):
         self.feel.clicked.connect(self._ask_to_feel)
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
-        """Show which element it is."""
         if self.form is None or self.form.path != form.path or self.form.id != form.id:
             self.refuse("")
         self.form = form

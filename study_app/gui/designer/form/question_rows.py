@@ -65,8 +65,7 @@ class QuestionRow(Themed, QWidget):
         hbox(*missing, STRETCH, self.write, spacing=6, margins=0, parent=made)
         return made
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Open the question, or select it with others."""
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() != Qt.MouseButton.LeftButton or not self.rect().contains(event.position().toPoint()):
             return
         shift = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
@@ -76,14 +75,12 @@ class QuestionRow(Themed, QWidget):
             self.opened.emit()
 
     def show_chosen(self, chosen: bool) -> None:
-        """Show whether it is selected with the question that is edited."""
         if chosen != self.chosen:
             self.chosen = chosen
             self.setAccessibleDescription("Selected" if chosen else "")
             self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Tint the row where it is selected."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if self.chosen:
             paint_ground(self, self.theme.selected)
 
@@ -132,7 +129,6 @@ class LanguageNames(QWidget):
 class Panel(Themed, QWidget):
     """The tinted ground of the question that is edited, with an accent line at its left."""
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the ground."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         paint_ground(self, self.theme.selected)
         QPainter(self).fillRect(QRectF(0, 2, 3, self.height() - 4), QColor(self.theme.accent))

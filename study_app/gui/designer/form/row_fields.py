@@ -45,12 +45,10 @@ class Field(QWidget):
         self.box: QBoxLayout = hbox(spacing=8, margins=0, parent=self)
 
     def show_row(self, row: FormRow) -> None:
-        """Show the value of a row of the same kind and choices."""
         self.row = row
         self.show_value()
 
     def show_value(self) -> None:
-        """Show the value."""
         raise NotImplementedError
 
     def take_keyboard(self) -> None:
@@ -254,7 +252,6 @@ class ChecksField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        """Show which are chosen."""
         row = self.row.row
         chosen = row.value if isinstance(row.value, tuple) else row.default or ()
         for value, check in self.checks.items():
@@ -277,7 +274,6 @@ class UnknownField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        """Show the value as it would be written."""
         self.value.show_text(written(self.row.row.value))
 
 

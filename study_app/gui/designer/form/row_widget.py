@@ -122,8 +122,7 @@ class RowWidget(Themed, QWidget):
                 part.flush()
         self.field.asked.emit(RemoveKey(self.row.row.path))
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Remove the key from the file by its shortcut, unless the editor took it to delete a word."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if removes_key(event) and self.remove is not None and self.remove.isEnabled():
             self._remove()
         else:
@@ -134,7 +133,6 @@ class RowWidget(Themed, QWidget):
             self.field.asked.emit(SwitchKey(self.row.row.path, str(key)))
 
     def show_row(self, row: FormRow) -> None:
-        """Show the row's value and faults."""
         if row != self.row:
             self.refusal = ""
             self.row = row

@@ -40,7 +40,6 @@ class TankView(Themed, QWidget):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def show_targets(self, shown: TargetsInTank, chosen: int) -> None:
-        """Show targets."""
         self.shown, self.chosen = shown, min(chosen, max(0, len(shown.points) - 1))
         self._dragged = None
         self._say()
@@ -54,12 +53,10 @@ class TankView(Themed, QWidget):
         where = "no targets" if point is None else f"target {self.chosen + 1} of {len(points)} at {written(point)}"
         self.setAccessibleDescription(f"{where}; arrow keys move it, Page Up and Page Down choose another one")
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the tank in its proportions, with a heading."""
+    def sizeHint(self) -> QSize:
         return QSize(200, 138)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the least room."""
+    def minimumSizeHint(self) -> QSize:
         return QSize(120, 138)
 
     # places
@@ -92,8 +89,7 @@ class TankView(Themed, QWidget):
 
     # mouse and keys
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Choose the nearest target."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         away = [
             ((self.place(point) - event.position()).manhattanLength(), number)
             for number, point in enumerate(self.shown.points)
@@ -102,21 +98,18 @@ class TankView(Themed, QWidget):
         if event.button() == Qt.MouseButton.LeftButton and away:
             self.picked.emit(min(away)[1])
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Drag the chosen target."""
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         point = self.shown.points[self.chosen] if self.shown.points else None
         if event.buttons() & Qt.MouseButton.LeftButton and point is not None:
             self._dragged = self._point(event.position(), self._dragged or point)
             self.update()
 
-    def mouseReleaseEvent(self, _event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Let go of it: this is the step."""
+    def mouseReleaseEvent(self, _event: QMouseEvent) -> None:
         if (point := self._dragged) is not None:
             self._dragged = None
             self.moved.emit(self.chosen, point, False)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Move the chosen target, choose another one, or give up a drag."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         key, count = Qt.Key(event.key()), len(self.shown.points)
         if key == Qt.Key.Key_Escape and self._dragged is not None:
             self._dragged = None
@@ -133,19 +126,16 @@ class TankView(Themed, QWidget):
         else:
             super().keyPressEvent(event)
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Say that it is focused."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self.came.emit()
         self.update()
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Take the ring away."""
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the tank and the targets."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t, painter, tank = self.theme, QPainter(self), self._tank()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(QColor(t.text2))

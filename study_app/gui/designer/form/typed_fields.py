@@ -136,8 +136,7 @@ class _Typed(_Base):
         """Leave to the place the keys that are its own."""
         return True if self.leaves_to_place(event) else super().event(event)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Restore at Esc; leave the key that deletes a word to the row where no word follows or all is marked."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.restore()
         elif removes_key(event) and self.nothing_to_delete():
@@ -145,15 +144,13 @@ class _Typed(_Base):
         else:
             super().keyPressEvent(event)
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Remember what is there, unless it is refused: Esc still restores what was there before."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         if self.property("state") != "refused":
             self._before = self.words()
         self.came.emit()
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Hand on what was typed; after a click elsewhere once that is done."""
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         if event.reason() != Qt.FocusReason.MouseFocusReason:
             self.flush()
@@ -180,8 +177,7 @@ class TypedLine(_Typed, QLineEdit):
         self.textEdited.connect(lambda _text: self.note())
         self.returnPressed.connect(self.accept)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Count by the arrow keys."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         steps = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}
         if event.key() in steps and not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier:
             self.flush()
@@ -240,8 +236,7 @@ class TypedText(_Typed, QPlainTextEdit):
         at = self.textCursor()
         return at.selectionStart(), at.selectionEnd(), self.document().characterCount() - 1  # a separator ends it
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for some lines."""
+    def sizeHint(self) -> QSize:
         return QSize(120, 118)
 
     def show_text(self, text: str) -> None:
@@ -274,28 +269,23 @@ class TypedSentence(TypedText):
         self.setVerticalScrollBarPolicy(scrolls)
         self.setFixedHeight(max(FIELD_PX, min(most, math.ceil(needed)) + SENTENCE_EDGE_PX))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Take the height of the lines."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the lines."""
+    def sizeHint(self) -> QSize:
         return QSize(120, self.height())
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Mark the sentence where Tab leads to it, as in a field of one line."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         if event.reason() in {Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason}:
             self.selectAll()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Accept at Enter."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.accept()
         else:
             super().keyPressEvent(event)
 
-    def insertFromMimeData(self, source: QMimeData) -> None:  # noqa: N802 - Qt's name
-        """Paste a text as one paragraph: a space for each line break, other spaces as they are."""
+    def insertFromMimeData(self, source: QMimeData) -> None:
         self.insertPlainText(LINE_BREAK.sub(" ", source.text()))

@@ -31,8 +31,7 @@ class MeasurePlot(Plot):
         self.shown: Any = None
         describe_plot(self, name, "")
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return a small size: a plot takes what is left."""
+    def sizeHint(self) -> QSize:
         return QSize(220, 110)
 
     def show_plot(self, shown: Any) -> None:
@@ -55,7 +54,6 @@ class MeasurePlot(Plot):
         raise NotImplementedError
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         self._draw()
 

@@ -27,7 +27,6 @@ class CardGrid(Themed, QWidget):
         self._rows: list[QHBoxLayout] = []
 
     def show_cards(self, cards: tuple[object, ...]) -> None:
-        """Show other cards."""
         if cards == self.cards:
             return
         pointed = self.isVisible() and self.underMouse()
@@ -52,13 +51,11 @@ class CardGrid(Themed, QWidget):
         for part, (height, title) in zip(self.parts, heights, strict=False):
             part.setMinimumHeight(height if title == part.accessibleName() else 0)
 
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
-        """Let each card be as high as it needs to be."""
+    def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
         self._let_shrink()
 
-    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 - Qt's name
-        """Let each card be as high as it needs to be: the pointer's leaving is not told of what is hidden."""
+    def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
         self._let_shrink()
 

@@ -37,7 +37,6 @@ class Control(QWidget):
         self.field.setAccessibleName(f"{words}, {unit}" if unit else words)
 
     def show_number(self, text: str) -> None:
-        """Show a number."""
         self._value = float(text)
         self.field.show_text(text)
 

@@ -43,13 +43,11 @@ class NumbersRow(QWidget):
         self._lay(NUMBERS)
 
     def show_numbers(self, shown: tuple[NumberCard, ...]) -> None:
-        """Show other numbers."""
         self.setVisible(bool(shown))
         for part, one in zip(self.parts, shown, strict=False):
             part.show_card(one)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Take two rows where one is too narrow."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._lay(NUMBERS if self.width() >= ONE_ROW_FROM else NUMBERS // 2)
 
@@ -83,8 +81,7 @@ class PlotCard(Card):
 class WarningBar(Themed, QWidget):
     """A field in the colour of warnings."""
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the field."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         paint_ground(self, self.theme.warn_bg)
 
 
@@ -110,7 +107,6 @@ class ForcesCard(Card):
         add_parts(self.column, head, (plot, 1), self.bar)
 
     def show_forces(self, shown: ForcesPlot) -> None:
-        """Show other forces."""
         self.shown = shown
         self.unit.show_text(shown.heading)
         for chip, state in zip(self.chips, (*shown.verdicts, None), strict=False):
@@ -174,8 +170,7 @@ class MeasuresPage(Themed, QWidget):
         if self.isVisible():
             self._show()
 
-    def showEvent(self, event: object) -> None:  # noqa: N802 - Qt's name
-        """Show what came while the page was hidden."""
+    def showEvent(self, event: object) -> None:
         super().showEvent(event)  # type: ignore[arg-type]
         self._show()
 

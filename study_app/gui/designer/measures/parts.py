@@ -58,7 +58,6 @@ class NumberPart(Card):
         add_parts(self.column, self.title, across, below, self.more, STRETCH)
 
     def show_card(self, shown: NumberCard) -> None:
-        """Show another number."""
         if shown == self.shown:
             return
         self.shown = shown
@@ -76,8 +75,7 @@ class NumberPart(Card):
         self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {words}{also}")
         self._fit()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Write the number smaller where it would be cut."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
 
@@ -104,15 +102,13 @@ class Strip(Themed, QWidget):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def show_segments(self, segments: tuple[Segment, ...]) -> None:
-        """Show other steps."""
         self.segments = segments
         listed = [words for words, *_ in segments]
         self.setAccessibleName("Session, in order: " + ", ".join(listed))
         self.setToolTip("\n".join((*listed, "Click a step to open it")))
         self.update()
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Ask to open the step that is clicked."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() != Qt.MouseButton.LeftButton:
             return
         x = 0.0
@@ -122,8 +118,7 @@ class Strip(Themed, QWidget):
                 self.open_asked.emit(path)
                 return
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the steps."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter, x = QPainter(self), 0.0
         painter.setPen(Qt.PenStyle.NoPen)
         for _, share, chosen, _ in self.segments:
@@ -152,8 +147,7 @@ class Made(Card):
         self.column.addStretch()
         self._beside = True
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Put what is beside the title below it where it would be cut."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         margins = self.column.contentsMargins()
         needed = self.heading.sizeHint().width() + self.aside.sizeHint().width() + 2 * self.title_row.spacing()
@@ -260,8 +254,7 @@ class _Cell(Themed, QWidget):
         self._count = count
         self.setAccessibleName(name)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint field and count."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)

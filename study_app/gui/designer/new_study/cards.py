@@ -47,28 +47,24 @@ class TemplateButton(Themed, QAbstractButton):
         name = self.choice.source.removeprefix("template:")
         return name if name in PICTURES and not self.choice.copy else ""
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room of a card."""
+    def sizeHint(self) -> QSize:
         return QSize(200, 2 * RING + (COPY_PX if self.choice.copy else PICTURE_PX + WORDS_PX))
 
     @property
     def _wide(self) -> int:
         return self.width() - 2 * RING
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Say what led here."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self.came.emit(event.reason() == Qt.FocusReason.MouseFocusReason)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Go to the card before or after this one: from the end of a row Qt goes to any row."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
             self.passed.emit(1 if event.key() == Qt.Key.Key_Right else -1)
         else:
             super().keyPressEvent(event)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the card."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         t, painter = self.theme, QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self.hasFocus():

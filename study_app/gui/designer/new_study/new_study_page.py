@@ -95,7 +95,6 @@ class ChosenCard(Card):
         add_parts(self.column, self.title, (self.area, 1), self.refusal, self.make, foot)
 
     def show_choice(self, choice: TemplateChoice) -> None:
-        """Show a template or a copy."""
         self.title.setText(choice.title)
         before = (self.about, self.details)
         self.about, self.details = QWidget(), QWidget()
@@ -127,8 +126,7 @@ class ChosenCard(Card):
         asked = (*self.questions.languages.values(), *self.questions.own.values())
         lead_by_tab(self.questions.name, (*asked, self.refusal.use, self.make))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Show the questions before the session where there is no room for both."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.inside.removeWidget(self.begin)
         self.inside.insertWidget(1 if self.height() < LOW_BELOW else 2, self.begin)
@@ -191,7 +189,6 @@ class NewStudyPage(Themed, QWidget):
         return self.card.refusal
 
     def show_choices(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
-        """Show what a study can begin from."""
         self._choices = choices
         inside = QWidget()
         column = vbox(spacing=12, margins=(0, 0, 12 - RING, 0), parent=inside)
@@ -269,8 +266,7 @@ class NewStudyPage(Themed, QWidget):
         elif chosen is not None:
             self.begin_asked.emit(chosen.source, self.card.questions.short_name(), answers)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Begin at Enter on a card or a language, as in the fields; go back at Esc."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         begins = isinstance(self.focusWidget(), Check | TemplateButton)
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and begins:
             self._begin()
@@ -279,8 +275,7 @@ class NewStudyPage(Themed, QWidget):
         else:
             super().keyPressEvent(event)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Make room: fewer cards side by side in a narrow window."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         narrow = self.width() < NARROW_BELOW
         self.card.setFixedWidth(SIDE_NARROW_PX if narrow else SIDE_PX)

@@ -21,13 +21,11 @@ class RecoveryBar(Themed, QWidget):
         self.setAccessibleName("Known answer")
 
     def show_recovery(self, shown: Recovery) -> None:
-        """Show a known answer."""
         self.shown = shown
         self.setAccessibleDescription(shown.sentence)
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint axis, bar and line."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if self.shown is None:
             return
         t, painter, shown = self.theme, QPainter(self), self.shown

@@ -51,7 +51,6 @@ class AddList(Themed, QFrame):
         self.list.itemActivated.connect(lambda _item: self._choose())
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         row = f"border-radius: 6px; color: {theme.text};"
         chosen = f"background: {theme.selected}; color: {theme.accent};"
@@ -97,8 +96,7 @@ class AddList(Themed, QFrame):
             self.close()
             self.chosen.emit(item.data(Qt.ItemDataRole.UserRole))
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Let arrows and Enter in the field act on the list."""
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
             if event.key() in MOVES:
                 self.list.keyPressEvent(event)

@@ -93,7 +93,6 @@ class OutlineCard(Card):
         self.duplicate.clicked.connect(self.duplicate_asked)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         self._sign.setIcon(icon("search", theme.text2, 16))
 
@@ -269,8 +268,7 @@ class OutlineCard(Card):
         if self.words.text().strip() and self._go_to_first() and not self._open_field():
             self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Go from the words that find into the tree by Down, to the first element that was found."""
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         down = event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Down
         if down and (not self.words.text().strip() or self._go_to_first()):
             self.tree.setFocus(Qt.FocusReason.OtherFocusReason)

@@ -24,8 +24,7 @@ class RowPainter(QStyledItemDelegate):
         self.theme: Theme | None = None
         self.movable = True
 
-    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for a row."""
+    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
         return QSize(100, HEADING_PX if not index.data(ROW_ROLE).path else ROW_PX)
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:

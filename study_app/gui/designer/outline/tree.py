@@ -48,7 +48,6 @@ class Tree(Themed, QTreeView):
         self._pressed: tuple[QPoint, tuple[ElementPath, ...]] | None = None
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         self.theme = self.rows.theme = theme
         self.viewport().update()
 
@@ -68,8 +67,7 @@ class Tree(Themed, QTreeView):
                 return True
         return super().event(event)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Hand on what means a step; Esc cancels a drag."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.dragged and event.key() == Qt.Key.Key_Escape:
             self._let_go()
         elif event.key() == Qt.Key.Key_Delete and not event.modifiers():
@@ -85,8 +83,7 @@ class Tree(Themed, QTreeView):
 
     # dragging
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Note where a drag may begin; a press on one of several selected rows keeps them until it is released."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         index = self.indexAt(event.position().toPoint())
         row = index.data(ROW_ROLE) if index.isValid() else None
         self._pressed = None
@@ -102,8 +99,7 @@ class Tree(Themed, QTreeView):
                 return
         super().mousePressEvent(event)
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Drag rows: a line shows where they would come."""
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         at = event.position().toPoint()
         if self._pressed is None or not event.buttons() & Qt.MouseButton.LeftButton:
             super().mouseMoveEvent(event)
@@ -119,8 +115,7 @@ class Tree(Themed, QTreeView):
             self.target = self._target(at)
             self.viewport().update()
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Drop what was dragged."""
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         dragged, target, pressed = self.dragged, self.target, self._pressed
         self._let_go()
         if dragged:
@@ -165,8 +160,7 @@ class Tree(Themed, QTreeView):
             above = above.parent()
         return False
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the rows, and the line where dragged ones would come."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         if self.target is not None:
             painter = QPainter(self.viewport())

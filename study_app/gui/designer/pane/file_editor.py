@@ -52,8 +52,7 @@ class _Colours(QSyntaxHighlighter):
             self.formats.append(made)
         self.rehighlight()
 
-    def highlightBlock(self, text: str) -> None:  # noqa: N802 - Qt's name
-        """Colour one line."""
+    def highlightBlock(self, text: str) -> None:
         if not self.formats:
             return
         for match in _PIECES.finditer(text):
@@ -68,12 +67,10 @@ class _Gutter(QWidget):
         super().__init__(editor)
         self._editor = editor
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the longest number."""
+    def sizeHint(self) -> QSize:
         return QSize(self._editor.gutter_px(), 0)
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the numbers."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         self._editor.paint_gutter(QPainter(self), event.rect())
 
 
@@ -124,8 +121,7 @@ class FileEditor(Themed, QPlainTextEdit):
             if self.isVisible():
                 self._catch_up()
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
-        """Bring the text up to date."""
+    def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self._catch_up()
 
@@ -177,7 +173,6 @@ class FileEditor(Themed, QPlainTextEdit):
         self._showing = False
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         self._showing = True
         self._colours.apply_theme(theme)
@@ -189,8 +184,7 @@ class FileEditor(Themed, QPlainTextEdit):
         self.viewport().update()
         self._gutter.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the marks of lines, then the text."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self.viewport())
         width = self.viewport().width()
         for line, top, height in visible_lines(self):
@@ -232,13 +226,11 @@ class FileEditor(Themed, QPlainTextEdit):
         else:
             self._gutter.update(0, place.y(), self._gutter.width(), place.height())
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Place the gutter."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._place_gutter()
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Hand on what was typed."""
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         self.flush()
 
@@ -271,7 +263,6 @@ class FileCard(Card):
         self.column.addWidget(self.editor, 1)
 
     def show_file(self, file: FileText, *, scroll: bool, read_only: bool) -> None:
-        """Show a file."""
         self.name.show_text(file.name)
         self.editor.setReadOnly(read_only)
         self.editor.show_file(file, scroll=scroll)

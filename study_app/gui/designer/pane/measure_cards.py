@@ -57,14 +57,12 @@ class FactsRow(QScrollArea):
         if self.isVisible():
             self._show()
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
-        """Show what came while the cards were hidden."""
+    def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self._show()
         self.appeared.emit()
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Take another height when the cards need one."""
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         handled = super().eventFilter(watched, event)
         if watched is self.widget() and event.type() == QEvent.Type.LayoutRequest:
             self.make_room(self._window_px, self._left_px)

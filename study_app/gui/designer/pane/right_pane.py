@@ -77,7 +77,6 @@ class RightPane(QWidget):
         self.show_tab(page.name if first else self.tab or page.name)
 
     def show_tab(self, name: str) -> None:
-        """Show the page of a tab."""
         page = next(one for one in self.pages if one.name == name)
         changed, self.tab = name != self.tab, name
         self.tabs.tips = {one.name: one.tip for one in self.pages}
@@ -106,8 +105,7 @@ class RightPane(QWidget):
             if row.indexOf(page.aside) < 0:
                 row.addWidget(page.aside)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Put the controls where there is room."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.make_room()
 

@@ -117,7 +117,6 @@ class LivePage(Themed, QGraphicsView):
         self._time_frames()
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``; those of a page stay."""
         super().apply_theme(theme)
         self._colour_ground()
 
@@ -127,7 +126,6 @@ class LivePage(Themed, QGraphicsView):
         self.setBackgroundBrush(QBrush(QColor(colour)))
 
     def show_screen(self, screen: ScreenSize) -> None:
-        """Show the page as on another screen."""
         self._screen = screen
         if self._view.page is not None:
             self._open(self._view).show_page(self._view.page)
@@ -237,37 +235,31 @@ class LivePage(Themed, QGraphicsView):
 
     # Qt's events
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Leave the page at Esc; any other key is the page's."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.left.emit()
         else:
             super().keyPressEvent(event)
 
-    def keyReleaseEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Keep Esc from the page: it would pause."""
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
         if event.key() != Qt.Key.Key_Escape:
             super().keyReleaseEvent(event)
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Show the ring and say how to leave; the page has had its focus before."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         QAbstractScrollArea.focusInEvent(self, event)
         say(self, LEAVES)
         self.viewport().update()
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Hide the ring; the page keeps its focus."""
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         QAbstractScrollArea.focusOutEvent(self, event)
         self.viewport().update()
 
-    def viewportEvent(self, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Keep the page active in a window that is not."""
+    def viewportEvent(self, event: QEvent) -> bool:
         if event.type() in {QEvent.Type.WindowActivate, QEvent.Type.WindowDeactivate}:
             return True
         return super().viewportEvent(event)
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the page, round corners where it is whole, and while it receives keys a ring and how to leave."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         painter = QPainter(self.viewport())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -291,13 +283,11 @@ class LivePage(Themed, QGraphicsView):
             painter.drawText(words, Qt.AlignmentFlag.AlignCenter, LEAVES)
         painter.end()
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Scale the page."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._scale()
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
-        """Show what changed meanwhile."""
+    def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if self._proxy is not None:
             self._proxy.show()
@@ -305,8 +295,7 @@ class LivePage(Themed, QGraphicsView):
         self._time_frames()
         self.shown.emit()
 
-    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 - Qt's name
-        """Stop everything that moves."""
+    def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
         self._frames.stop()
         if self._proxy is not None and isValid(self._proxy):  # the scene is freed before a view that is still shown

@@ -98,7 +98,6 @@ class ParticipantTab(Card):
         self.zoom.chosen.connect(self._show_fitted)
 
     def show_view(self, view: ParticipantView) -> None:
-        """Show another page."""
         before, self.view = self.view, view
         self.setAccessibleName(view.name)
         if before.language and view.language != before.language:
@@ -177,7 +176,6 @@ class ParticipantTab(Card):
         other = self.column.minimumSize().height() - self.page.minimumHeight()
         return min(QWIDGETSIZE_MAX, self.page.maximumHeight() + other)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Give the page the height that it needs."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._make_room()

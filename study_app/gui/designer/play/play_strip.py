@@ -71,8 +71,7 @@ class PlayStrip(Card):
         if self.buttons:
             next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Close what can be closed at Esc."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape and "close" in self.buttons:
             self.asked.emit("close")
         else:

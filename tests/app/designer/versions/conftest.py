@@ -48,6 +48,7 @@ def click(qtbot: Any, part: Any) -> None:
     qtbot.mouseClick(part, Qt.MouseButton.LeftButton)
 
 
-def rows(designer: Any) -> list[str]:
-    """The sentences of the differences that are shown."""
-    return [line.row.change.sentence for line in designer.controller.changes.card.list.lines]
+def lines(designer: Any) -> list[str]:
+    """The lines of the difference that is shown, without its context."""
+    shown = designer.controller.changes.card.difference.toPlainText().splitlines()
+    return [line.partition("  #")[0].rstrip() for line in shown if line[:1] in {"-", "+"}]

@@ -33,7 +33,6 @@ class ConditionRow(EntryRow):
         self.liquid = self.button("drop", f"Open the liquid of {entry.title}")
 
     def show_line(self, line: ConditionLine) -> None:
-        """Show what is known of the condition."""
         self.note.show_text(line.note)
         self.force.setText(f"{line.force}, clipped" if line.clipped else line.force)
         self.liquid.setEnabled(line.liquid is not None)
@@ -66,7 +65,6 @@ class ConditionsField(EntriesField):
         return made
 
     def show_value(self) -> None:
-        """Show what is known of each condition."""
         for shown, line in zip(self.rows, self.row.facts, strict=True):
             if isinstance(shown, ConditionRow):
                 shown.show_line(line)

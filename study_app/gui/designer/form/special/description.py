@@ -21,7 +21,6 @@ class DescriptionField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        """Show the text."""
         value = self.row.row.value
         self.line.show_text(value if isinstance(value, str) else "")
 

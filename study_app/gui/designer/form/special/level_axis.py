@@ -46,25 +46,21 @@ class End(Themed, QSlider):
         self.setValue(round(span.share(level) * span.steps))
         self.blockSignals(False)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Move by a step of the axis."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         step = KEYS.get(Qt.Key(event.key()))
         if step is None:
             event.ignore()
             return
         self.moved.emit(self.span.value(self.span.share(self.level) + step / self.span.steps), False)
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Hold the handle."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         self.held = event.button() == Qt.MouseButton.LeftButton
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Follow the pointer."""
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self.held:
             self.moved.emit(self._at(event), True)
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
-        """Let the handle go: one step for the whole drag."""
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if self.held:
             self.held = False
             self.moved.emit(self.level, False)
@@ -73,13 +69,11 @@ class End(Themed, QSlider):
         x = self.axis.mapFromGlobal(event.globalPosition()).x()
         return self.span.value((x - MARGIN) / max(1.0, self.axis.width() - 2 * MARGIN))
 
-    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 - Qt's name
-        """Show the ring."""
+    def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the knob, with a ring where it has the keyboard."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter, middle = QPainter(self), QPointF(HANDLE_PX / 2, HANDLE_PX / 2)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(QPen(QColor(self.theme.accent if self.isEnabled() else self.theme.ctl), 2))
@@ -105,7 +99,6 @@ class AxisView(Themed, QWidget):
             end.moved.connect(lambda level, held, at=at: self._move(at, level, held=held))
 
     def show_axis(self, axis: LevelAxis) -> None:
-        """Show other levels."""
         self.axis = axis
         span = self._span
         for end, level in zip(self.ends, (axis.low, axis.high), strict=True):
@@ -145,17 +138,14 @@ class AxisView(Themed, QWidget):
         for end in self.ends:
             end.move(round(self._x(end.level) - HANDLE_PX / 2), round(TRACK_Y - HANDLE_PX / 2))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Put the handles where their levels are."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._place()
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the axis."""
+    def sizeHint(self) -> QSize:
         return QSize(260, HEIGHT)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint track, levels, limits and ticks."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if self.axis is None:
             return
         painter, axis, t = QPainter(self), self.axis, self.theme

@@ -36,12 +36,10 @@ class OrderField(ChoiceField):
             self.chip.setToolTip(found.sentence)
             self.chip.setAccessibleDescription(found.sentence)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the wider of the two."""
+    def minimumSizeHint(self) -> QSize:
         return QSize(max(NARROWEST, self.chip.sizeHint().width()), super().minimumSizeHint().height())
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Put the chip below the choice where there is no room beside it."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         beside = self.width() >= NARROWEST + self.chip.sizeHint().width() + 8
         directions = QBoxLayout.Direction

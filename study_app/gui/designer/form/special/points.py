@@ -54,7 +54,6 @@ class PointsField(Field):
         self.lines.append(lines)
 
     def show_value(self) -> None:
-        """Show the words of each point."""
         for lines, words in zip(self.lines, self.row.facts.points, strict=True):
             for line, text in zip(lines, words, strict=True):
                 line.show_text(text)

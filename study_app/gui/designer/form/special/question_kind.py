@@ -34,7 +34,6 @@ class KindField(ChoiceField):
         return STATEMENT.capitalize() if choice.value is None else choice_words(choice, None)
 
     def show_value(self) -> None:
-        """Show which kind it is."""
         super().show_value()
         if self.all is not None:
             kinds = [(choice.value, self.words(choice)) for choice in self.row.row.choices]
@@ -51,12 +50,10 @@ class KindField(ChoiceField):
             self.list.setVisible(not fits)
             self.setFocusProxy(self.all if fits else self.list)
 
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for the list."""
+    def minimumSizeHint(self) -> QSize:
         return QSize(NARROWEST, super().minimumSizeHint().height())
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Show the kinds side by side where there is room."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._make_room()
 

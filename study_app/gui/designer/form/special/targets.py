@@ -66,7 +66,6 @@ class TargetsField(Field):
         self.lines.append(lines)
 
     def show_value(self) -> None:
-        """Show each target."""
         self.chosen = min(self.chosen, max(0, len(self.lines) - 1))
         for view in (self.front, self.above):
             view.show_targets(self.row.facts, self.chosen)

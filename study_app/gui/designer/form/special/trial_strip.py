@@ -27,7 +27,6 @@ class PhaseButton(Themed, QAbstractButton):
         self.phase: Phase | None = None
 
     def show_phase(self, phase: Phase) -> None:
-        """Show another phase."""
         self.phase = phase
         opens = f"Opens “{phase.opens}”" if phase.opens else ""
         self.setAccessibleName(f"{phase.name}, {phase.duration}")
@@ -37,8 +36,7 @@ class PhaseButton(Themed, QAbstractButton):
         self.setCursor(Qt.CursorShape.PointingHandCursor if phase.field else Qt.CursorShape.ArrowCursor)
         self.update()
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint picture, name and duration, with a ring where it has the keyboard."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if self.phase is None:
             return
         painter, t, phase = QPainter(self), self.theme, self.phase
@@ -99,7 +97,6 @@ class StripView(Themed, QWidget):
         self.setFixedHeight(HEIGHT)
 
     def show_strip(self, strip: TrialStrip) -> None:
-        """Show another trial."""
         self.strip = strip
         self.setAccessibleName("One trial")
         self.setAccessibleDescription(strip.sentence)
@@ -127,17 +124,14 @@ class StripView(Themed, QWidget):
             button.setGeometry(round(x), 18, round(width), HEIGHT - 18)
             x += width + GAP
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Give each phase its width."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._place()
 
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for a trial."""
+    def sizeHint(self) -> QSize:
         return QSize(260, HEIGHT)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the heading."""
+    def paintEvent(self, _event: QPaintEvent) -> None:
         if self.strip is None:
             return
         painter = QPainter(self)

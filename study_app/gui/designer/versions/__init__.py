@@ -1,1 +1,0 @@
-"""Versions in the designer: the card that asks before saving, and the tab Changes."""

@@ -1,1 +1,0 @@
-"""Versions of a study as the designer shows them. No Qt here."""
