@@ -86,7 +86,6 @@ class MainController(QObject):
                 "help": self._help,
             },
             theme=theme_named(self.machine.settings.theme),
-            prepares={"lab": self.lab_and_designer.prepare_lab, "designer": self.lab_and_designer.prepare_designer},
         )
         self.loop = QEventLoop()
         self.code = 0
@@ -96,10 +95,7 @@ class MainController(QObject):
         self._bugs: set[str] = set()
         self.results_controller: ResultsController | None = None
         self.lab_and_designer.go_asked.connect(self.window.go)
-        self.lab_and_designer.prepared.connect(self.window.prepared)
-        self.lab_and_designer.not_prepared.connect(self.window.not_prepared)
         self.lab_and_designer.saved.connect(self._show_saved)
-        self.window.went.connect(self.lab_and_designer.forget_wanted)
         self.window.closed.connect(self._leave)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
@@ -117,7 +113,7 @@ class MainController(QObject):
         elif self._follows_machine and chosen_workspace() is None:
             self._ask_for_workspace()
         QTimer.singleShot(LOOK_AFTER_MS, self.devices, self.devices.look)
-        QTimer.singleShot(LOOK_AFTER_MS, self.lab_and_designer, self.lab_and_designer.prepare_lab)
+        QTimer.singleShot(LOOK_AFTER_MS, self.lab_and_designer, self.lab_and_designer.preload)
 
     def show_bug(self, error: BaseException) -> bool:
         """Show an exception that no slot caught, once, unless a session shows it; return that it is printed, too."""

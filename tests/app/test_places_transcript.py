@@ -342,26 +342,25 @@ def test_lab_and_designer(qapp: Any, monkeypatch: Any, pytestconfig: pytest.Conf
     monkeypatch.setattr("study_app.gui.lab.view.LabPlace", lambda: lab_place)
     monkeypatch.setattr("study_app.app.designer.controller.DesignerController", lambda _results: designer)
 
-    def compose(_place: Any, *, device: str, options: Any, first: Any) -> Any:
-        done.append(f"lab with {device} {dict(options)} {first}")
+    def compose(_place: Any, *, device: str, options: Any) -> Any:
+        done.append(f"lab with {device} {dict(options)}")
         return lab
 
-    monkeypatch.setattr("study_app.app.lab.controller.compose_lab", compose)
+    monkeypatch.setattr("study_app.app.lab.controller.LabController", compose)
     of_window: Any = main_controller
     both = of_window.LabAndDesigner(WorkstationController(), Path("results"))
-    for name in ("go_asked", "prepared", "not_prepared", "saved"):
+    for name in ("go_asked", "saved"):
         getattr(both, name).connect(lambda *values, name=name: done.append(f"{name} {values}"))
     steps: dict[str, Any] = {
-        "open": lambda: both.open_designer("demo"), "another place": lambda: both.forget_wanted("home"),
-        "make at once": both.make_designer, "open again": lambda: both.open_designer("other"),
+        "open without designer": lambda: both.open_designer("demo"), "make": both.make_designer,
+        "open again": lambda: both.open_designer("other"),
         "new": lambda: both.begin_study("template:x", "mine"), "new without name": lambda: both.begin_study("blank"),
         "feel before the lab": lambda: designer.feeling.asked.emit(LIQUIDS), "lab": both.make_lab,
         "feel": lambda: designer.feeling.asked.emit(LIQUIDS),
         "put back": lambda: lab_place.put_back_asked.emit("A", "s"),
         "returned": designer.feeling.returned.emit, "saved": designer.saving.saved.emit,
         "kept": designer.playing.kept.emit, "other study": designer.editing.opened_other.emit,
-        "loaded": lambda: both._loaded("first"), "results": lambda: both.show_results(Path("new")),
-        "wanted for the lab": lambda: both.forget_wanted("lab"), "signal": lambda: both.end_by_signal(2),
+        "results": lambda: both.show_results(Path("new")), "signal": lambda: both.end_by_signal(2),
         "end": lambda: both.end("patience"),
     }  # fmt: skip
     lines = list[str]()

@@ -20,7 +20,6 @@ from study_app.app.exception_hooks import UncaughtExceptions
 from study_app.app.guarded_slots import guarded
 from study_app.app.lab.costs import Prices
 from study_app.app.lab.device_opening import LabOpening
-from study_app.app.lab.initial_settings import InitialSettings, prepare_initial_settings
 from study_app.app.lab.lab_estimation import LabEstimation
 from study_app.app.lab.preset_saving import LabSaving
 from study_app.app.lab.view_values import lab_view
@@ -31,30 +30,18 @@ from study_app.evidence.appraisal_worker import AppraisalClient, start_appraisal
 from study_app.gui.home.startup_window import LONG_AFTER_S
 from study_app.gui.lab.view import LabPlace
 from study_app.lab.ab_comparison import Setting, Side, Workbench
-from study_app.lab.presets import Choice, spoken
+from study_app.lab.presets import Choice, liquids_at_hand, spoken
 from study_app.viewmodels.lab import LabView
 
 if TYPE_CHECKING:
     from study_app.lab.live import Live
 
+INITIAL_A: Final = Choice("rek2024", "water", "Water")
+INITIAL_B: Final = Choice("rek2024", "light_oil", "Light oil")
 FRAME_MS: Final = 33
 APPRAISE_AFTER_MS: Final = 300
 COMPILING: Final = "Compiling the force model, once after an installation or an update; this takes about a minute"
 log = logging.getLogger(__name__)
-
-
-def compose_lab(
-    place: LabPlace,
-    *,
-    device: str = DEFAULT_DEVICE,
-    options: Mapping[str, Path] | None = None,
-    first: InitialSettings | None = None,
-) -> LabController:
-    """Give a lab's place its device, servo and costs: they come as it is entered and go as it is left.
-
-    ``device`` is the one it begins with, ``options`` the values of devices' options, ``first`` what was prepared.
-    """
-    return LabController(place, device=device, options=options, first=first)
 
 
 class LabController(QObject):
@@ -66,7 +53,7 @@ class LabController(QObject):
     device, options : the device it begins with, and the values of devices' options, by name
     open_live, make_appraiser : what opens a device by its name, what begins the process that appraises
     chance : what a blinding is drawn from
-    first : what it begins with, where that was prepared
+    bench, liquids : what it begins with, and the liquids that can be chosen
     """
 
     def __init__(
@@ -78,20 +65,20 @@ class LabController(QObject):
         open_live: Callable[..., Live] | None = None,
         make_appraiser: Callable[[], AppraisalClient] = start_appraisal_worker,
         chance: random.Random | None = None,
-        first: InitialSettings | None = None,
+        bench: Workbench | None = None,
+        liquids: tuple[Choice, ...] | None = None,
     ) -> None:
         super().__init__(place)
-        first = first if first is not None else prepare_initial_settings()
         self.place = place
         self.live: Live | None = None
         self.device = device
-        self.bench = first.bench
+        self.bench = Workbench(INITIAL_A.setting(), INITIAL_B.setting()) if bench is None else bench
         self.trouble = self.study = ""
         self._refused: tuple[str, str] | None = None
         self._entered = False
         self._prices = Prices(make_appraiser)
         self._opening = LabOpening(open_live, options)
-        self._saving = LabSaving(first.liquids)
+        self._saving = LabSaving(liquids_at_hand() if liquids is None else liquids)
         self.estimation = LabEstimation(place, self)
         self.chance = chance if chance is not None else random.SystemRandom()
         self._said = ""

@@ -50,6 +50,11 @@ class Background(QObject):
         if self._thread is None:
             self._begin(job)
 
+    def wait(self) -> None:
+        """Wait until the job that runs has ended."""
+        if self._thread is not None:
+            self._thread.join()
+
     def _begin(self, job: Callable[[], Any]) -> None:
         made = self._made
 

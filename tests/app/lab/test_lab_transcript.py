@@ -8,7 +8,6 @@ from typing import Any
 
 from study_app.app.lab import device_opening
 from study_app.app.lab.controller import LabController
-from study_app.app.lab.initial_settings import InitialSettings
 from study_app.app.session.termination import Patience
 from study_app.errors import DeviceNotFound, ServoFault
 from study_app.lab.ab_comparison import Workbench
@@ -196,7 +195,7 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any,
     honey, syrup = (Choice("rek2024", name, name.title()) for name in ("honey", "syrup"))
     lab = LabController(
         place, device="scripted", open_live=open_live, chance=random.Random(1), make_appraiser=lambda: lives[0],  # noqa: S311
-        first=InitialSettings(Workbench(honey.setting(), syrup.setting()), (honey, syrup)),
+        bench=Workbench(honey.setting(), syrup.setting()), liquids=(honey, syrup),
     )  # fmt: skip
     lab._cost_due.setInterval(10**8)
     lab.frames.setInterval(10**8)

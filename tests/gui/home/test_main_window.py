@@ -2,7 +2,7 @@
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QPushButton, QVBoxLayout
+from PySide6.QtWidgets import QPushButton, QVBoxLayout
 
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.navigation import DESTINATIONS
@@ -33,11 +33,7 @@ def log():
 
 @pytest.fixture
 def main(qtbot, log):
-    return opened(qtbot, {place.name: lambda name=place.name: Room(name, log) for place in DESTINATIONS}, {})
-
-
-def opened(qtbot, makes, prepares):
-    window = MainWindow(makes, prepares=prepares)
+    window = MainWindow({place.name: lambda name=place.name: Room(name, log) for place in DESTINATIONS})
     qtbot.addWidget(window)
     window.show()
     return window
@@ -118,13 +114,3 @@ def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
     assert main.focusWidget() is not began
     main.come_back()
     assert main.focusWidget() is began
-
-
-def test_whoever_goes_on_before_a_prepared_place_is_shown_gets_where_they_asked_to(qtbot):
-    window = opened(qtbot, {"home": Place, "lab": Place, "devices": Place}, {"lab": lambda: iter((None,))})
-    window.go("lab")
-    window.go("devices")
-    for _ in range(3):
-        QApplication.processEvents()
-    assert window.here == "devices"
-    window.close()
