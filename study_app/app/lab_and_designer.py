@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
-from study_app.app.session.termination import Patience
-from study_app.app.workstation_controller import WorkstationController
+from study_app.app.failures import Patience
+from study_app.app.machine import WorkstationController
 from study_app.gui.widgets.background import Background
 
 if TYPE_CHECKING:

@@ -9,20 +9,18 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QEventLoop, QObject, QTimer
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 
-from study_app.app.devices_controller import DevicesController
-from study_app.app.exception_hooks import UncaughtExceptions
+from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, ended_from_outside
 from study_app.app.lab_and_designer import LabAndDesigner
-from study_app.app.session.garbage_collection import collecting_here
+from study_app.app.machine import DevicesController, WorkstationController
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
-from study_app.app.session.termination import BY_SIGNAL_S, Patience, ended_from_outside
-from study_app.app.workstation_controller import WorkstationController
+from study_app.app.session.timing import collecting_here
 from study_app.app.workstation_settings import screen_number, theme_named
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import place
+from study_app.gui.home.dialogs import WorkspaceDialog
 from study_app.gui.home.main_window import MainWindow, bug_words
 from study_app.gui.home.view import HomePlace
-from study_app.gui.home.workspace import WorkspaceDialog
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.session.start import NewSession
 from study_app.store.workstation import MachineSettings, create_workspace

@@ -7,8 +7,7 @@ from PySide6.QtGui import QScreen
 from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError
 from study_app.gui.display.frame_clock import BY_CLOCK, LOCKED
-from study_app.gui.display.opengl import has_card
-from study_app.gui.display.screens import describe_screen, screen_shown, screens_shown
+from study_app.gui.display.screens import describe_screen, has_card, screen_shown, screens_shown
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.store import workstation
 from study_app.store.workstation import DEFAULTS, MachineSettings

@@ -1,6 +1,6 @@
 """A description of the computer on which times were measured.
 
-What else the machine does while the loops are timed; windows are lent by ``app.windows_load``.
+What else the machine does while the loops are timed; windows are lent by ``app.delay_session``.
 """
 
 import os

@@ -27,7 +27,7 @@ from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.workstation import recent_protocols
 from study_app.viewmodels.extent import counted_each, extent_of
-from study_app.viewmodels.session.stages import operator_language, step_title
+from study_app.viewmodels.session import operator_language, step_title
 from study_app.viewmodels.sessions import SessionFacts, started_words
 from study_app.workspace import workspace
 

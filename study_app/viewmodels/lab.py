@@ -7,7 +7,7 @@ how it is written.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,59 @@ from study_app.lab.limiters import Limiter
 from study_app.lab.parameters import sections
 from study_app.lab.presets import Choice
 from study_app.lab.wake_tail import Tail
-from study_app.viewmodels.estimation import NO_ESTIMATE, EstimateShown
 
 if TYPE_CHECKING:
     from study_app.lab.shadow import Trace
 
+Choices: TypeAlias = tuple[tuple[str, str], ...]
+
+OFF: Final = "off"
+FILE: Final = "file"
+DRAG: Final = "drag"
+WAKE: Final = "wake"
+SOURCES: Final[Choices] = (
+    (OFF, "No measured force"),
+    ("other", "Simulated sensor, other setting"),
+    ("device", "Force of the device"),
+    (FILE, "Growing CSV file …"),
+)
+LSL: Final[Choices] = (("lsl", "LSL stream"),)
+PARAMETERS: Final[Choices] = ((DRAG, "Drag coefficient"), (WAKE, "Drag coefficient and wake"))
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateRow:
+    """A parameter with its estimated value and 95 % interval, written out."""
+
+    name: str
+    value: str
+    interval: str
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateShown:
+    """An estimation: where the force comes from, which parameters, what was found, and what may be done with it.
+
+    ``message`` says why nothing is found or applied, or how much of the force is left. ``sound`` is whether the motion
+    identifies the values; only then ``may_apply`` can be true. ``follows`` is whether values are applied continuously.
+    """
+
+    sources: Choices = SOURCES
+    source: str = OFF
+    parameters: str = DRAG
+    rows: tuple[EstimateRow, ...] = ()
+    message: str = ""
+    sound: bool = False
+    may_apply: bool = False
+    may_follow: bool = False
+    follows: bool = False
+
+
+NO_ESTIMATE: Final = EstimateShown()
+
+
 Floats: TypeAlias = NDArray[np.float64]
 Point: TypeAlias = tuple[float, float, float]
-Choices: TypeAlias = tuple[tuple[str, str], ...]
 """Pairs of what is chosen and the words for it."""
 
 SPAN_S = 2.5

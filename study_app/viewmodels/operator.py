@@ -16,11 +16,9 @@ from study_app.store.delivered import Broken
 from study_app.store.journals.journal_events import Note
 from study_app.store.progress import Progress
 from study_app.store.tables.columns import SEALED
-from study_app.viewmodels.force_traces import ForceFigures, force_rows
 from study_app.viewmodels.number_words import grouped, minutes
-from study_app.viewmodels.servo_health import Tile, Vitals, health_tiles
-from study_app.viewmodels.session.stages import Stage, operator_language
-from study_app.viewmodels.session.track_health import track_words, unanswered_words
+from study_app.viewmodels.servo_health import ForceFigures, Tile, Vitals, force_rows, health_tiles
+from study_app.viewmodels.session import Stage, operator_language, track_words, unanswered_words
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
 StepState = Literal["done", "now", "open"]

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from study_app.app.crash_trace import CrashTrace
+from study_app.app.failures import CrashTrace
 
 CRASH = """
 import faulthandler, sys
 from pathlib import Path
-from study_app.app.crash_trace import CrashTrace
+from study_app.app.failures import CrashTrace
 trace = CrashTrace(Path(sys.argv[1]))
 def crash_here(liquid):
     faulthandler._sigsegv()

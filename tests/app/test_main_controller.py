@@ -11,9 +11,9 @@ import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QDialog, QLabel
 
+from study_app.app.failures import BY_SIGNAL_S
 from study_app.app.main_controller import MainController, home
 from study_app.app.session import live_session
-from study_app.app.session.termination import BY_SIGNAL_S
 from study_app.errors import DeviceLost
 from study_app.session.start import NewSession
 

@@ -12,12 +12,11 @@ from PySide6.QtCore import QEvent, QObject, Signal
 from PySide6.QtWidgets import QApplication, QDialog, QLabel
 
 from study_app.analysis import worker_messages as of
-from study_app.app import devices_controller, main_controller
-from study_app.app.devices_controller import DevicesController
+from study_app.app import main_controller
+from study_app.app.machine import DevicesController, WorkstationController
 from study_app.app.main_controller import MainController
 from study_app.app.results_controller import ResultsController
 from study_app.app.session.live_session import BUG
-from study_app.app.workstation_controller import WorkstationController
 from study_app.devices.descriptor import NONE, READY, Backend
 from study_app.errors import DeviceNotFound
 from study_app.gui.theme.theme import DARK
@@ -189,7 +188,7 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
 
         def connect(self, _slot: Any) -> None: ...
 
-    monkeypatch.setattr(devices_controller, "DiagnosisDialog", Dialog)
+    monkeypatch.setattr("study_app.app.machine.DiagnosisDialog", Dialog)
     devices = DevicesController(machine, look)
     devices.looked.connect(lambda shown: heard.append(f"looked {len(shown)}"))
     devices.troubled.connect(lambda *words: heard.append(f"troubled {words}"))

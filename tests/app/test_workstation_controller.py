@@ -7,9 +7,9 @@ import pytest
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QMainWindow
 
+from study_app.app.machine import WorkstationController
 from study_app.app.main_controller import MainController
 from study_app.app.session.live_session import LiveSession
-from study_app.app.workstation_controller import WorkstationController
 from study_app.app.workstation_settings import described, settings_here, text_scale_on
 from study_app.devices.descriptor import READY, Backend
 from study_app.gui.theme.theme import DARK, LIGHT
@@ -92,7 +92,7 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qt
         asked.append((name, held))
         return SimpleNamespace(show=lambda: None)
 
-    monkeypatch.setattr("study_app.app.devices_controller.diagnosis", diagnosis)
+    monkeypatch.setattr("study_app.app.machine.diagnosis", diagnosis)
     live = LiveSession(NewSession("demo", "P001", 1, 7, "", "en", device, True, None, Path("nowhere")), LIGHT)
     operator = QMainWindow()
     operator.theme = DARK

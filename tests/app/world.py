@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from study_app.app.session.bridge import SessionBridge
-from study_app.app.session.parts import Parts
+from study_app.app.session.operator import Parts
 from study_app.errors import StoreError
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.watch import WatchedJournal
@@ -18,7 +18,7 @@ from study_app.session.transitions.events import Continue
 from study_app.store.journals import journal_events
 from study_app.store.progress import Progress
 from study_app.viewmodels.operator import Session
-from study_app.viewmodels.session.stages import stages
+from study_app.viewmodels.session import stages
 
 
 class World:

@@ -13,9 +13,9 @@ pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missi
 from PySide6.QtCore import Qt
 
 from study_app.app.main_controller import MainController
+from study_app.gui.home.cards import StudyCard
+from study_app.gui.home.dialogs import NewSessionDialog
 from study_app.gui.home.main_window import FULL as HOME
-from study_app.gui.home.new_session_dialog import NewSessionDialog
-from study_app.gui.home.study_cards import StudyCard
 from study_app.gui.home.view import HomePlace
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT

@@ -43,7 +43,7 @@ SESSION = """
 import sys
 from pathlib import Path
 from PySide6.QtCore import QEventLoop, QTimer
-from study_app.app.session.garbage_collection import collecting_here
+from study_app.app.session.timing import collecting_here
 from study_app.app.session.live_session import LiveSession
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import LIGHT

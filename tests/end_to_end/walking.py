@@ -40,7 +40,7 @@ from study_app.session.transitions.table import advance, open_session
 from study_app.store.progress import Progress
 from study_app.viewmodels.operator import OperatorView, Session, operator_view
 from study_app.viewmodels.servo_health import ServoHealth
-from study_app.viewmodels.session.stages import stages
+from study_app.viewmodels.session import stages
 from tests.end_to_end.real_windows import Program, wait_for
 
 SHORTER = {

@@ -11,8 +11,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app import app
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.force_plots import ForceCard
-from study_app.gui.operator.plot_cards import HiddenForceCard
+from study_app.gui.operator.plots import ForceCard, HiddenForceCard
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import load
 from study_app.session import start

@@ -5,7 +5,7 @@ import threading
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.windows_load import lend
+from study_app.app.delay_session import lend
 from study_app.evidence.soak.soak import soak
 from study_app.evidence.timing.measurement import LEAD_IN, PERIOD_NS
 from study_app.protocol.load import load_scenes

@@ -24,7 +24,7 @@ def rooms(part: QWidget) -> Iterator[str]:
 def test_what_a_part_paints_and_tells(
     qtbot: Any, name: str, monkeypatch: pytest.MonkeyPatch, pytestconfig: pytest.Config
 ) -> None:
-    monkeypatch.setattr("study_app.gui.help.reader.text_of", lambda _name: PAGE_TEXT)
+    monkeypatch.setattr("study_app.gui.help.view.text_of", lambda _name: PAGE_TEXT)
     make, size, actions = PARTS[name]
     part = shown(qtbot, make(), size)
     qtbot.waitUntil(part.isActiveWindow)

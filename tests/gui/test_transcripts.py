@@ -10,7 +10,7 @@ import pytest
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.home import new_session_dialog
+from study_app.gui.home import dialogs
 from study_app.gui.sessions import session_page
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.main_view import Place
@@ -23,7 +23,7 @@ from tests.gui.windows import WINDOWS, two_screens
 SEED = 1234
 SLOW = ("operator, single-blind", "lab", "settings", "home", "results", "diagnosis", "help", "new session")
 """Windows with many states, which the quick circle leaves out."""
-CLOCKS = ("results.sidebar", "home.view", "home.sessions_card", "sessions.sessions_table")
+CLOCKS = ("results.view", "home.view", "home.cards", "sessions.sessions_table")
 
 
 class FixedTime(datetime):
@@ -38,7 +38,7 @@ class FixedTime(datetime):
 def alike_every_time(qapp: QApplication, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
     two_screens(monkeypatch)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(new_session_dialog, "draw_seed", lambda: SEED)
+    monkeypatch.setattr(dialogs, "draw_seed", lambda: SEED)
     READ.update(record=RECORD, motion=waves())
     monkeypatch.setattr(session_page, "read_record", lambda _folder: read("record"))
     monkeypatch.setattr(session_page, "motion", lambda _recording: read("motion"))

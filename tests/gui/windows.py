@@ -14,9 +14,8 @@ from study_app.devices.descriptor import NONE, NOT_AVAILABLE, READY, Backend
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.help.view import HelpPlace
+from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.home.main_window import MainWindow
-from study_app.gui.home.new_session_dialog import NewSessionDialog
-from study_app.gui.home.rehearsal_dialog import RehearsalDialog
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.lab.view import LabPlace
 from study_app.gui.preflight import PreflightWindow
@@ -33,7 +32,7 @@ from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
 from study_app.session.preflight import Facts, Screen, checks
 from study_app.store.workstation import DEFAULTS, MachineSettings
-from study_app.viewmodels.devices.list_view import devices_shown
+from study_app.viewmodels.devices import devices_shown
 from study_app.viewmodels.home import study_facts
 from study_app.viewmodels.preflight import PreflightView, preflight_view
 from study_app.viewmodels.results import Opened

@@ -14,8 +14,7 @@ from study_app.haptics.model.layout import (
     SAMPLE,
     records,
 )
-from study_app.viewmodels.force_traces import ROWS, STEP_NS, Forces
-from study_app.viewmodels.servo_health import TRACE_WINDOW_S
+from study_app.viewmodels.servo_health import ROWS, STEP_NS, TRACE_WINDOW_S, Forces
 
 MS = 1_000_000
 

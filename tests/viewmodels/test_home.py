@@ -27,8 +27,7 @@ from study_app.viewmodels.home import (
     sources,
     study_facts,
 )
-from study_app.viewmodels.session.columns import incidents, matching, states_of, status_chip, validity_chip
-from study_app.viewmodels.session.record import read_record
+from study_app.viewmodels.session import incidents, matching, read_record, states_of, status_chip, validity_chip
 from study_app.viewmodels.sessions import sessions, started_words
 from tests.journal_lines import event_of
 from tests.protocol.groups.grouped import GROUPS, STUDY

@@ -16,14 +16,10 @@ from typing import TYPE_CHECKING, Final
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
-from study_app.app.exception_hooks import UncaughtExceptions
-from study_app.app.guarded_slots import guarded
-from study_app.app.lab.costs import Prices
-from study_app.app.lab.device_opening import LabOpening
+from study_app.app.failures import Patience, UncaughtExceptions, guarded
+from study_app.app.lab.jobs import LabOpening, LabSaving, Prices
 from study_app.app.lab.lab_estimation import LabEstimation
-from study_app.app.lab.preset_saving import LabSaving
 from study_app.app.lab.view_values import lab_view
-from study_app.app.session.termination import Patience
 from study_app.devices.names import DEFAULT_DEVICE
 from study_app.errors import StudyError
 from study_app.evidence.appraisal_worker import AppraisalClient, start_appraisal_worker

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from PySide6.QtCore import QObject
 
-from study_app.app.guarded_slots import guarded
+from study_app.app.failures import guarded
 from study_app.errors import StudyError
 from study_app.gui.lab.view import LabPlace
 from study_app.lab.ab_comparison import Workbench
 from study_app.lab.estimation.lsl_stream import available
 from study_app.protocol.quantities import QUANTITIES
-from study_app.viewmodels.estimation import DRAG, LSL, OFF, SOURCES, WAKE, EstimateRow, EstimateShown
+from study_app.viewmodels.lab import DRAG, LSL, OFF, SOURCES, WAKE, EstimateRow, EstimateShown
 
 if TYPE_CHECKING:
     from study_app.lab.estimation.live_estimation import LiveEstimation

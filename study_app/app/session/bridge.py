@@ -13,18 +13,12 @@ from typing import Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from study_app.app.exception_hooks import ThreadExceptions, UncaughtExceptions
-from study_app.app.guarded_slots import guarded_session_slot
-from study_app.app.session.frame_budget import FrameBudget
-from study_app.app.session.garbage_collection import freeze_garbage, unfreeze_garbage
-from study_app.app.session.operator_monitor import OperatorMonitor
-from study_app.app.session.operator_requests import OperatorRequests
-from study_app.app.session.parts import Parts
-from study_app.app.session.reconnection import Reconnection
-from study_app.app.session.thread_priority import ThreadPriority
+from study_app.app.failures import ThreadExceptions, UncaughtExceptions, guarded_session_slot
+from study_app.app.session.operator import OperatorMonitor, OperatorRequests, Parts, Reconnection
+from study_app.app.session.timing import FrameBudget, ThreadPriority, freeze_garbage, unfreeze_garbage
 from study_app.errors import DeviceError, ServoFault, StudyError, VideoError
 from study_app.gui.display.frame_clock import Frames
-from study_app.gui.operator.strip import Strip
+from study_app.gui.operator.header import Strip
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import Page, TaskPage

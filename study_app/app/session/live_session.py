@@ -19,10 +19,8 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.app.crash_trace import CrashTrace
-from study_app.app.session.garbage_collection import unfreeze_garbage
-from study_app.app.session.preloading import load_windows
-from study_app.app.session.termination import BY_SIGNAL_S
+from study_app.app.failures import BY_SIGNAL_S, CrashTrace
+from study_app.app.session.timing import unfreeze_garbage
 from study_app.app.workstation_settings import described, screen_number, settings_here, text_scale_on
 from study_app.authoring.versions.contents import keep_content
 from study_app.devices.registry import descriptor_of
@@ -43,6 +41,18 @@ if TYPE_CHECKING:
     from study_app.outlets.session_outlets import Outlets
     from study_app.store.sessions.open_session import SessionStore
     from study_app.video.sources import Videos
+
+
+def load_windows() -> None:
+    """Load what a session's windows need while the note is shown: modules, and versions, read from the disk once."""
+    import study_app.app.machine  # noqa: PLC0415
+    import study_app.app.session.preflight_controller  # noqa: PLC0415
+    import study_app.app.session.session_windows  # noqa: PLC0415
+    import study_app.store.receipt  # noqa: PLC0415
+    import study_app.store.recordings  # noqa: PLC0415 - and pyarrow, which the recorder is made with
+
+    study_app.store.receipt.versions()
+
 
 CANCELLED = 130
 BUG = 1
@@ -270,7 +280,7 @@ class LiveSession(QObject):
 
     def diagnose(self) -> None:
         """Open the diagnosis of the haptic device over the operator's window; the bridge has stopped the force."""
-        from study_app.app.devices_controller import diagnosis  # noqa: PLC0415 - the note comes before it
+        from study_app.app.machine import diagnosis  # noqa: PLC0415 - the note comes before it
 
         assert self.bridge is not None  # noqa: S101 - it has just asked
         name = self.chosen.device

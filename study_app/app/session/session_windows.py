@@ -6,14 +6,13 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from study_app.app.session.bridge import SessionBridge
-from study_app.app.session.parts import Parts
+from study_app.app.session.operator import Parts
 from study_app.devices.registry import descriptor_of
 from study_app.devices.simulated.hand_commands import HandOrders, hand_of
 from study_app.errors import DisplayError
-from study_app.gui.display.opengl import has_card
-from study_app.gui.display.screens import place
+from study_app.gui.display.screens import has_card, place
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.strip import Strip
+from study_app.gui.operator.header import Strip
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.model import Protocol
@@ -31,7 +30,7 @@ from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.progress import progress_of
 from study_app.viewmodels.operator import Session
-from study_app.viewmodels.session.stages import stages
+from study_app.viewmodels.session import stages
 
 if TYPE_CHECKING:
     from PySide6.QtGui import QScreen

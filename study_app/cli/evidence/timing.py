@@ -20,7 +20,7 @@ from study_app.cli.options import ShowProgress, Target, exclude_each_other, prep
 from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:
-    from study_app.app.windows_load import WindowsThread
+    from study_app.app.delay_session import WindowsThread
     from study_app.evidence.computer import LoadName
 
 MOST_COMPARED_S = 300.0
@@ -135,7 +135,7 @@ def _choose_display() -> None:
 def windows_thread(load: LoadName) -> WindowsThread | None:
     """Return the windows' thread; None where there is no Qt and nothing is to be painted."""
     try:
-        from study_app.app.windows_load import lend
+        from study_app.app.delay_session import lend
     except DisplayError:
         if load != "none":
             raise

@@ -3,9 +3,9 @@
 from PySide6.QtCore import QRectF, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 
-from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import RADIUS_CARD
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_layout, hbox
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton, IconButton

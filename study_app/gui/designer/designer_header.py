@@ -7,9 +7,9 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from study_app.gui.designer.play.play_controls import PlayControls
 from study_app.gui.designer.play.play_strip import PlayStrip
 from study_app.gui.designer.study_list import StudyList
-from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter

@@ -24,8 +24,8 @@ from study_app.gui.designer.problems import ProblemsCard
 from study_app.gui.designer.prompts import DeleteCard, Prompt
 from study_app.gui.designer.selected_elements import SelectedElements
 from study_app.gui.designer.tab_order import go_on
-from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.main_view import Place, make_shortcuts
 from study_app.viewmodels.designer.addable import Addable

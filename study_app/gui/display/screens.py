@@ -1,11 +1,11 @@
 """Which window stands on which screen, and what a receipt should record of it."""
 
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
+from functools import cache, partial
+from typing import Any, Final
 
 from PySide6.QtCore import QPoint, QRect, QTimer
-from PySide6.QtGui import QGuiApplication, QScreen
+from PySide6.QtGui import QGuiApplication, QOffscreenSurface, QOpenGLContext, QScreen
 from PySide6.QtWidgets import QWidget
 
 from study_app.errors import DisplayError
@@ -120,3 +120,35 @@ def _inside(window: QWidget, room: QRect, *, corner: bool) -> QRect:
     share = 1.0 if corner else 0.5
     right, down = max(0, room.width() - size.width()), max(0, room.height() - size.height())
     return QRect(room.topLeft() + QPoint(round(share * right), round(share * down)), size)
+
+
+# What Qt's window system needs on Debian and its relatives, beyond a minimal installation.
+
+
+GL_RENDERER: Final = 0x1F01
+IN_SOFTWARE: Final = ("llvmpipe", "softpipe", "swrast", "swiftshader", "gdi generic", "software", "basic render")
+WITHOUT_OPENGL: Final = {"offscreen", "minimal", "vnc", "linuxfb"}
+
+
+@cache
+def renderer() -> str | None:
+    """Return what OpenGL draws with here, as it names itself; None where there is no OpenGL."""
+    if QGuiApplication.platformName() in WITHOUT_OPENGL:
+        return None
+    context = QOpenGLContext()
+    if not context.create():
+        return None
+    surface = QOffscreenSurface()
+    surface.create()
+    if not context.makeCurrent(surface):
+        return None
+    try:
+        return str(context.functions().glGetString(GL_RENDERER))
+    finally:
+        context.doneCurrent()
+
+
+def has_card() -> bool:
+    """Return whether OpenGL draws with a graphics card here, and not in software."""
+    name = renderer()
+    return name is not None and not any(word in name.lower() for word in IN_SOFTWARE)

@@ -1,20 +1,218 @@
 """The place Help: the list of pages, a search, and one page."""
 
+import posixpath
 from pathlib import Path
+from typing import Any
 
-from PySide6.QtCore import QEvent, QObject, QSize, Qt
-from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
-from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem
+from PySide6.QtCore import QEvent, QObject, QSize, Qt, QUrl, Signal
+from PySide6.QtGui import (
+    QColor,
+    QDesktopServices,
+    QFont,
+    QFontDatabase,
+    QImage,
+    QKeyEvent,
+    QKeySequence,
+    QResizeEvent,
+    QShortcut,
+    QTextBlock,
+    QTextBlockFormat,
+    QTextCharFormat,
+    QTextCursor,
+    QTextDocument,
+    QTextFormat,
+    QTextFrameFormat,
+    QTextLength,
+    QTextTable,
+)
+from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, QTextBrowser
 
 from study_app import documentation
-from study_app.gui.help.reader import PageReader
 from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
-from study_app.viewmodels.help import FIRST_PAGE, HelpEntry, entries, found
+from study_app.viewmodels.help import FIRST_PAGE, HelpEntry, anchor_of, entries, found, text_of
+
+ENDING = ".md"
+CELL_PADDING, MARGIN = 6, 28
+WIDEST_TEXT = 860  # px: longer lines are hard to read
+HEADING_SIZES = {1: 26, 2: 20, 3: 16, 4: 15}  # px
+CODE_SIZE = 14  # px
+PICTURE = "\N{OBJECT REPLACEMENT CHARACTER}"
+CODE = (QTextFormat.Property.BlockCodeFence, QTextFormat.Property.BlockCodeLanguage)
+
+
+def heading_font(level: int) -> QFont:
+    """Return the font of a heading of a level from 1."""
+    made = font("title" if level == 1 else "card")
+    made.setPixelSize(HEADING_SIZES[min(level, 4)])
+    return made
+
+
+def code_font() -> QFont:
+    """Return the font of what is typed."""
+    made = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
+    made.setPixelSize(CODE_SIZE)
+    return made
+
+
+def _face(used: QFont) -> QTextCharFormat:
+    made = QTextCharFormat()
+    made.setFont(used)
+    return made
+
+
+class PageReader(Themed, QTextBrowser):
+    """A page; ``page_asked(name, anchor)`` where a link leads to another one. Other links open outside the program."""
+
+    page_asked = Signal(str, str)
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self.page = ""
+        self._folder = folder
+        self._drawn: QTextDocument | None = None
+        self.setAccessibleName("Page")
+        self.setOpenLinks(False)
+        self.setFrameShape(QTextBrowser.Shape.NoFrame)
+        self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)  # else it changes the width: drawn twice
+        self.anchorClicked.connect(self._follow)
+
+    def show_page(self, name: str, anchor: str = "") -> None:
+        """Show a page from its beginning, or from the heading that an anchor names."""
+        if name != self.page:
+            self.page = name
+            self._draw()
+        self.verticalScrollBar().setValue(0)
+        if anchor:
+            self._scroll_to(anchor)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().apply_theme(theme)
+        self.setStyleSheet(f"QTextBrowser {{ background: {theme.surface}; color: {theme.text}; }}")
+        if self.page:
+            self._draw()
+
+    def loadResource(self, kind: int, name: QUrl | str) -> Any:
+        if kind != QTextDocument.ResourceType.ImageResource.value:
+            return super().loadResource(kind, name)
+        path = name.toString() if isinstance(name, QUrl) else name
+        picture = QImage(str(self._folder / self._here(path)))
+        ratio = self.devicePixelRatioF()
+        width = round(self._text_width() * ratio)
+        if picture.width() > width:
+            picture = picture.scaledToWidth(width, Qt.TransformationMode.SmoothTransformation)
+        picture.setDevicePixelRatio(ratio)
+        return picture
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Draw the page again, since pictures are as wide as the text; what is read stays in sight."""
+        at = self.verticalScrollBar().value() / max(1, self.verticalScrollBar().maximum())
+        super().resizeEvent(event)
+        if self.page and event.size().width() != event.oldSize().width():
+            self._draw()
+            self.verticalScrollBar().setValue(round(at * self.verticalScrollBar().maximum()))
+
+    def _here(self, path: str) -> str:
+        """Return where a path of the page leads to, from the folder of the pages."""
+        return posixpath.normpath(posixpath.join(posixpath.dirname(self.page), path))
+
+    def _text_width(self) -> int:
+        return max(200, min(WIDEST_TEXT, self.viewport().width() - 2 * MARGIN))
+
+    def _draw(self) -> None:
+        document = QTextDocument(self)
+        document.setDefaultFont(font("body", weight=400))
+        document.setDocumentMargin(MARGIN)
+        document.setMarkdown(text_of(self.page), QTextDocument.MarkdownFeature.MarkdownDialectGitHub)
+        self._style_blocks(document)
+        self._style_tables(document)
+        self.setDocument(document)  # last: laid out once
+        before, self._drawn = self._drawn, document
+        if before is not None:
+            before.deleteLater()  # with its cached pictures: it is this widget's, which would keep it
+
+    def _style_blocks(self, document: QTextDocument) -> None:
+        cursor = QTextCursor(document)
+        cursor.beginEditBlock()
+        block = document.begin()
+        while block.isValid():
+            cursor.setPosition(block.position())
+            in_table = cursor.currentTable() is not None
+            cursor.movePosition(QTextCursor.MoveOperation.EndOfBlock, QTextCursor.MoveMode.KeepAnchor)
+            shape = block.blockFormat()
+            if shape.headingLevel():
+                cursor.mergeCharFormat(_face(heading_font(shape.headingLevel())))
+                shape.setTopMargin(0 if shape.headingLevel() == 1 else 22)
+                shape.setBottomMargin(6)
+            elif any(shape.hasProperty(key) for key in CODE):
+                cursor.mergeCharFormat(_face(code_font()))
+                shape.setBackground(QColor(self.theme.sunk))
+                shape.setNonBreakableLines(False)
+            elif not in_table:
+                shape.setTopMargin(6)
+                shape.setBottomMargin(4)
+                if PICTURE not in block.text():
+                    shape.setLineHeight(125, QTextBlockFormat.LineHeightTypes.ProportionalHeight.value)
+            cursor.setBlockFormat(shape)
+            self._colour_links(block)
+            block = block.next()
+        cursor.endEditBlock()
+
+    def _colour_links(self, block: QTextBlock) -> None:
+        links = QTextCharFormat()
+        links.setForeground(QColor(self.theme.accent))
+        found: list[tuple[int, int]] = []
+        parts = block.begin()
+        while not parts.atEnd():
+            part = parts.fragment()
+            if part.charFormat().isAnchor():
+                found.append((part.position(), part.length()))
+            parts += 1
+        for start, length in found:
+            cursor = QTextCursor(block)
+            cursor.setPosition(start)
+            cursor.setPosition(start + length, QTextCursor.MoveMode.KeepAnchor)
+            cursor.mergeCharFormat(links)
+
+    def _style_tables(self, document: QTextDocument) -> None:
+        for frame in document.rootFrame().childFrames():
+            if isinstance(frame, QTextTable):
+                shape = frame.format()
+                shape.setBorder(1)
+                shape.setBorderCollapse(True)
+                shape.setBorderStyle(QTextFrameFormat.BorderStyle.BorderStyle_Solid)
+                shape.setBorderBrush(QColor(self.theme.border))
+                shape.setCellPadding(CELL_PADDING)
+                shape.setCellSpacing(0)
+                shape.setTopMargin(8)
+                shape.setBottomMargin(12)
+                shape.setWidth(QTextLength(QTextLength.Type.PercentageLength, 100))
+                frame.setFormat(shape)
+
+    def _scroll_to(self, anchor: str) -> None:
+        block = self.document().begin()
+        while block.isValid():
+            if block.blockFormat().headingLevel() and anchor_of(block.text()) == anchor:
+                at = self.document().documentLayout().blockBoundingRect(block).top()
+                self.verticalScrollBar().setValue(round(at) - MARGIN // 2)
+                return
+            block = block.next()
+
+    def _follow(self, link: QUrl) -> None:
+        path, anchor = link.path(), link.fragment()
+        if link.scheme() in {"http", "https"}:
+            QDesktopServices.openUrl(link)
+        elif not path:
+            self._scroll_to(anchor)
+        elif path.endswith(ENDING):
+            self.page_asked.emit(self._here(path.removesuffix(ENDING)), anchor)
+
 
 LIST_WIDTH, ROW_PX, HEAD_PX = 280, 30, 40
 PAGE = Qt.ItemDataRole.UserRole

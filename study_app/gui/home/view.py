@@ -14,12 +14,17 @@ from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
 from study_app.gui.application import open_here
 from study_app.gui.display.screens import screens_shown
-from study_app.gui.home.new_session_dialog import NewSessionDialog
-from study_app.gui.home.rehearsal_dialog import RehearsalDialog
-from study_app.gui.home.resume_banner import ResumeBanner
-from study_app.gui.home.sessions_card import SessionsCard
-from study_app.gui.home.sidebar import DeviceCard, LabCard
-from study_app.gui.home.study_cards import BrokenCard, CardGrid, Facts, StudyCard
+from study_app.gui.home.cards import (
+    BrokenCard,
+    CardGrid,
+    DeviceCard,
+    Facts,
+    LabCard,
+    ResumeBanner,
+    SessionsCard,
+    StudyCard,
+)
+from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background
@@ -32,7 +37,7 @@ from study_app.gui.widgets.main_view import Place, make_shortcuts
 from study_app.session.start import resumed
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.viewmodels.designer.keys import key_cap, with_key
-from study_app.viewmodels.devices.list_view import DeviceShown, looking
+from study_app.viewmodels.devices import DeviceShown, looking
 from study_app.viewmodels.extent import extent_of
 from study_app.viewmodels.home import (
     SHIPPED,

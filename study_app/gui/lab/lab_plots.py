@@ -9,7 +9,7 @@ from PySide6.QtCore import QPointF, QSize
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QStackedLayout, QWidget
 
-from study_app.gui.lab.parameter_form import HIDDEN
+from study_app.gui.lab.parameters import HIDDEN
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import describe_plot

@@ -3,11 +3,15 @@
 With the mouse as the device a click takes the pointer for the ball, as in a session; a click or Esc lets it go.
 """
 
+import itertools
 import math
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QColor,
     QFontMetricsF,
@@ -19,22 +23,168 @@ from PySide6.QtGui import (
     QPainterPath,
     QPaintEvent,
     QPen,
+    QPolygonF,
     QResizeEvent,
 )
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 
-from study_app.gui.lab.tail_painting import TailPlaces, draw_head, draw_ring, paint_floor, paint_tail, tail_places
 from study_app.gui.participant.pointer_capture import PointerCapture
 from study_app.gui.participant.tank import sprites
 from study_app.gui.participant.tank.backdrop import Backdrop, backdrop
-from study_app.gui.participant.tank.camera import Box, Camera
-from study_app.gui.participant.tank.frame import BallPlace, BallPlacer
+from study_app.gui.participant.tank.frame import BallPlace, BallPlacer, Box, Camera
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, TANK, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.background import Background
-from study_app.viewmodels.lab import LabView, Point
+from study_app.gui.widgets.boxes import add_parts, hbox
+from study_app.gui.widgets.cards import Card, Icon
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Ink, label
+from study_app.lab.wake_tail import Tail
+from study_app.viewmodels.lab import Floats, LabView, Point
 from study_app.viewmodels.number_words import grouped
+
+SHADES = 14  # steps of age that are distinguished
+THICKEST_PX, THINNEST_PX = 5.0, 1.6
+RING_PX = 4.6
+HEAD_PX = 11.0
+STEP_PX = 2.5
+LEAST_FOR_HEAD_PX = 46.0  # of a segment's length on the screen
+
+
+@dataclass(frozen=True, slots=True)
+class TailPlaces:
+    """Runs of one shade from the oldest to the newest, where segments begin, and an arrow head (place, turn) on each.
+
+    ``floor`` is the tail's shadow.
+    """
+
+    runs: tuple[tuple[int, QPolygonF], ...]
+    breaks: tuple[QPointF, ...]
+    heads: tuple[tuple[QPointF, float, int], ...]
+    floor: tuple[QPolygonF, ...]
+
+
+def tail_places(tail: Tail, camera: Camera, box: Box) -> TailPlaces:
+    """Return where a tail goes on the screen of ``camera``."""
+    count = len(tail.positions_m)
+    x, y, z = (np.clip(tail.positions_m[:, k], *span) for k, span in enumerate(_inside(box)))
+    pixels = _pixels(camera, x, y, z)
+    floor = _pixels(camera, x, np.full(count, box.floor), z)
+    shades = np.minimum((tail.ages * SHADES).astype(int), SHADES - 1)
+    bounds = [0, *(int(start) for start in np.flatnonzero(tail.breaks) if start), count]
+    runs: list[tuple[int, QPolygonF]] = []
+    shadows: list[QPolygonF] = []
+    heads: list[tuple[QPointF, float, int]] = []
+    for first, behind in itertools.pairwise(bounds if count else ()):
+        rows = np.arange(max(0, first - 1), behind)  # a segment begins where the one before ended
+        rows = rows[_kept(pixels[rows])]
+        runs += _runs(_points(pixels[rows]), shades[rows])
+        shadows.append(QPolygonF(_points(floor[rows])))
+        head = _head(pixels[rows])
+        if head is not None:
+            place, turn, row = head
+            heads.append((place, turn, int(shades[rows[row]])))
+    begins = [0, *(bound - 1 for bound in bounds[1:-1])] if count else []
+    return TailPlaces(tuple(runs), tuple(_points(pixels[begins])), tuple(heads), tuple(shadows))
+
+
+def paint_floor(painter: QPainter, places: TailPlaces) -> None:
+    """Paint the tail's shadow on the floor."""
+    ink = QColor(TANK.shadow)
+    ink.setAlphaF(0.44)
+    painter.setPen(QPen(ink, 3.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.BevelJoin))
+    for points in places.floor:
+        painter.drawPolyline(points)
+
+
+def paint_tail(painter: QPainter, places: TailPlaces) -> None:
+    """Paint the segments from the oldest to the newest, a head on each that is long enough, then the breaks."""
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    for shade, points in places.runs:
+        ink, width = shade_style(shade)
+        painter.setPen(QPen(ink, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin))
+        painter.drawPolyline(points)
+    for place, turn, shade in places.heads:
+        ink, width = shade_style(shade)
+        draw_head(painter, place, turn, ink.lighter(112), HEAD_PX + width)
+    for place in places.breaks:
+        draw_ring(painter, place)
+
+
+def draw_ring(painter: QPainter, place: QPointF) -> None:
+    """Paint the mark of a break."""
+    painter.setPen(QPen(QColor(TANK.proxy_light), 2.0))
+    painter.setBrush(QColor(TANK.shadow))
+    painter.drawEllipse(place, RING_PX, RING_PX)
+
+
+def draw_head(painter: QPainter, tip: QPointF, turn: float, ink: QColor, size: float) -> None:
+    """Paint an arrow head whose middle is at ``tip``, pointing ``turn`` [rad] from the right, downwards."""
+    corners = [(0.55, 0.0), (-0.45, 0.46), (-0.45, -0.46)]
+    cos, sin = math.cos(turn), math.sin(turn)
+    shape = QPolygonF([tip + QPointF(cos * u - sin * v, sin * u + cos * v) * size for u, v in corners])
+    edge = QColor(TANK.shadow)
+    edge.setAlphaF(0.55)
+    painter.setPen(QPen(edge, 1.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin))
+    painter.setBrush(ink)
+    painter.drawPolygon(shape)
+
+
+@lru_cache(maxsize=SHADES)
+def shade_style(shade: int) -> tuple[QColor, float]:
+    """Return colour and width of a step of age, 0 the newest."""
+    newness = 1.0 - shade / (SHADES - 1)
+    old, new, mix = QColor(TANK.tail_old), QColor(TANK.tail), newness**1.6
+    red, green, blue = (
+        a + (b - a) * mix
+        for a, b in ((old.redF(), new.redF()), (old.greenF(), new.greenF()), (old.blueF(), new.blueF()))
+    )
+    ink = QColor.fromRgbF(red, green, blue, 0.55 + 0.45 * newness)
+    return ink, THINNEST_PX + (THICKEST_PX - THINNEST_PX) * newness
+
+
+def _runs(points: list[QPointF], shades: NDArray[np.int_]) -> list[tuple[int, QPolygonF]]:
+    """Return the stretches of one shade, each beginning where the one before ends."""
+    cuts = [0, *(int(cut) for cut in np.flatnonzero(np.diff(shades)) + 1), len(points) - 1]
+    return [
+        (int(shades[start]), QPolygonF(points[start : end + 1]))
+        for start, end in itertools.pairwise(cuts)
+        if end > start
+    ]
+
+
+def _head(pixels: Floats) -> tuple[QPointF, float, int] | None:
+    """Return the middle of a segment's length, its direction there, and the row; None where it is too short."""
+    steps = np.hypot(*np.diff(pixels, axis=0).T)
+    length = float(steps.sum())
+    if length < LEAST_FOR_HEAD_PX:
+        return None
+    row = int(np.searchsorted(np.cumsum(steps), 0.55 * length))
+    right, down = pixels[min(len(pixels) - 1, row + 1)] - pixels[max(0, row - 1)]
+    return QPointF(*pixels[row].tolist()), math.atan2(down, right), row
+
+
+def _kept(pixels: Floats) -> NDArray[np.int_]:
+    """Return the rows that are drawn: both ends, and one in every few px between."""
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
+    kept = np.flatnonzero(np.diff(np.floor(arc / STEP_PX), prepend=-1.0))
+    return np.unique(np.append(kept, len(pixels) - 1))
+
+
+def _pixels(camera: Camera, x: Floats, y: Floats, z: Floats) -> Floats:
+    """Return where points, a column each, fall on the screen: (n, 2) px."""
+    place: Any = camera.point((x, y, z))  # type: ignore[arg-type]  # arithmetic alone: whole columns at once
+    return np.column_stack(place)
+
+
+def _points(pixels: Floats) -> list[QPointF]:
+    return [QPointF(across, down) for across, down in pixels.tolist()]
+
+
+def _inside(box: Box) -> tuple[tuple[float, float], ...]:
+    return (-box.x, box.x), (box.floor, box.water), (-box.z, box.z)
+
 
 WORKSPACE_M: Point = (0.1, 0.06, 0.06)
 BALL_M = 0.0034  # radius that the glass is made for: it stays where it is while the ball's own is changed
@@ -337,3 +487,105 @@ def plate(words: Words, ratio: float) -> QImage:
     painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, text)
     painter.end()
     return image
+
+
+SHOWN_AFTER_MS = 300
+WIDTH, WIDEST, HIGH = 380, 640, 110
+EDGE, FOOT = 16, 56
+
+
+class TankNote(Card):
+    """One sentence and one button; nothing while all is well. Waiting is shown only after 300 ms."""
+
+    cancel_asked = Signal()
+    fade_in_asked = Signal()
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(padding=12, gap=8)
+        self.setParent(parent)
+        self._view: LabView | None = None
+        self.sign = Icon("clock", "text2", 18)
+        self.words = label("", "strong", wraps=True)
+        self.cancel = ActionButton("", "Cancel", height=36)
+        self.fade_in = ActionButton("", "Fade in again", role="primary", height=36)
+        self.dismiss = ActionButton("", "Close", height=36)
+        self._dismissed = ""
+        self.bar = QProgressBar()
+        self.bar.setRange(0, 0)
+        self.bar.setTextVisible(False)
+        self.bar.setFixedHeight(6)
+        row = hbox(self.sign, (self.words, 1), self.cancel, self.fade_in, self.dismiss, spacing=10)
+        add_parts(self.column, row, self.bar)
+        self.cancel.clicked.connect(self.cancel_asked)
+        self.fade_in.clicked.connect(self.fade_in_asked)
+        self.dismiss.clicked.connect(self._put_away)
+        self._wait = QTimer(self)
+        self._wait.setSingleShot(True)
+        self._wait.setInterval(SHOWN_AFTER_MS)
+        self._wait.timeout.connect(self._appear)
+        parent.installEventFilter(self)
+        self.hide()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize:
+            self.place()
+        return super().eventFilter(watched, event)
+
+    def show_view(self, view: LabView) -> None:
+        before, self._view = self._view, view
+        if view.busy and not view.trouble:
+            if self.isHidden() and not self._wait.isActive():
+                self._wait.start()
+            if not self.isHidden():
+                self._appear()
+            return
+        self._wait.stop()
+        self._dismissed = self._dismissed if view.trouble == self._dismissed else ""
+        if view.force_on and view.trouble == self._dismissed:
+            self.hide()
+        elif self.isHidden() or before is None or _said(before) != _said(view):
+            self._appear()
+
+    def place(self) -> None:
+        """Stand in the middle of the tank's lower edge; what takes many words is wider, and never above the tank."""
+        parent = self.parentWidget()
+        if parent is not None and not self.isHidden():
+            room = parent.width() - 2 * EDGE
+            width = min(WIDTH, room)
+            if self.heightForWidth(width) > HIGH:
+                width = min(WIDEST, room)
+            self.resize(width, max(self.minimumSizeHint().height(), self.heightForWidth(width)))
+            below = min(FOOT, parent.height() - self.height() - EDGE)
+            self.move((parent.width() - width) // 2, max(0, parent.height() - self.height() - below))
+
+    def _put_away(self) -> None:
+        """Say this trouble no more; the force is on all the while."""
+        if self._view is not None:
+            self._dismissed = self._view.trouble
+        self.hide()
+
+    def _appear(self) -> None:
+        view = self._view
+        if view is None:
+            return
+        icon, ink, words = _said(view)
+        self.sign.show_icon(icon, ink)
+        self.words.setText(words)
+        self.setAccessibleName(words)
+        waiting = bool(view.busy) and not view.trouble
+        self.bar.setVisible(waiting)
+        self.cancel.setVisible(waiting)
+        self.fade_in.setVisible(not waiting and not view.force_on and view.may_fade_in)
+        self.fade_in.show_action("", "Try again" if view.trouble else "Fade in again")
+        self.dismiss.setVisible(bool(view.trouble) and view.force_on)
+        self.show()
+        self.raise_()
+        self.place()
+
+
+def _said(view: LabView) -> tuple[str, Ink, str]:
+    if view.trouble:
+        return "warning", "bad", view.trouble
+    if view.busy:
+        return "clock", "text2", f"{view.busy}\u00a0…"
+    return "stop", "warn", "Force is off"

@@ -9,23 +9,18 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGridLayout
 
-from study_app.gui.lab.estimate_card import EstimateCard
-from study_app.gui.lab.flow_curve_cards import FlowCurveRow
-from study_app.gui.lab.lab_header import LabHeader
+from study_app.gui.lab.cards import CostCard, ErrorCard, EstimateCard, FlowCurveRow, LimiterCard
+from study_app.gui.lab.header import KEY, LabHeader
 from study_app.gui.lab.lab_plots import ForceCard, SpeedCard
-from study_app.gui.lab.lab_tank import LabTank
-from study_app.gui.lab.measurement_cards import CostCard, ErrorCard, LimiterCard
-from study_app.gui.lab.parameter_form import FormPanel
-from study_app.gui.lab.side_switch import KEY
-from study_app.gui.lab.tank_note import TankNote
+from study_app.gui.lab.lab_tank import LabTank, TankNote
+from study_app.gui.lab.parameters import FormPanel
 from study_app.gui.theme.theme import SPACE
 from study_app.gui.widgets.boxes import add_layout, vbox
 from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.escape_key import EscapeAnywhere
 from study_app.gui.widgets.main_view import Place
 from study_app.lab.ab_comparison import Setting
-from study_app.viewmodels.estimation import FILE
-from study_app.viewmodels.lab import LabView
+from study_app.viewmodels.lab import FILE, LabView
 from study_app.workspace import workspace
 
 FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 388, 300

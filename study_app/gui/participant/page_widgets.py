@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from PySide6.QtGui import QPixmap
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QPixmap, QResizeEvent
+from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.participant.forms.question_form import FormWidget
-from study_app.gui.participant.intervals.choice_page import ChoiceWidget
-from study_app.gui.participant.intervals.feedback_page import FeedbackWidget
-from study_app.gui.participant.intervals.number_page import NumberWidget
-from study_app.gui.participant.pages.notices import NoticeWidget, PauseWidget
+from study_app.gui.participant.forms.questions_page import FormWidget
+from study_app.gui.participant.intervals.answer_page import ChoiceWidget, FeedbackWidget, NumberWidget
 from study_app.gui.participant.pages.page_widget import PageWidget
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.participant.pages.text_page import TextWidget
+from study_app.gui.participant.pages.text_page import NoticeWidget, PauseWidget, TextWidget
 from study_app.session.pages import (
     ChoicePage,
     EndPage,
@@ -69,3 +68,17 @@ def _picture(widget: QWidget) -> QPixmap | None:
     if isinstance(widget, PauseWidget):
         return widget.under
     return widget.grab() if widget.width() > 0 else None
+
+
+SMALL_SCREEN: Final = (1366, 768)
+
+
+def parts_of(page: QuestionnairePage, words: Words, size_px: tuple[int, int] = SMALL_SCREEN) -> int:
+    """Return on how many parts a page of questions stands in a window of a size."""
+    kind = QuestionnaireWidget if page.labels else FormWidget
+    made = kind(page, words, time.monotonic)
+    made.resize(*size_px)
+    QApplication.sendEvent(made, QResizeEvent(QSize(*size_px), QSize()))  # it is never shown
+    found = len(made.parts)
+    made.deleteLater()
+    return found

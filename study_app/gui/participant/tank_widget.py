@@ -15,29 +15,29 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QRegion, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 
-from study_app.gui.participant.intervals.setting_controls import SettingControls
+from study_app.gui.participant.intervals.answer_page import SettingControls
 from study_app.gui.participant.pages.page_widget import page_painter
-from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.participant.tank import sprites
 from study_app.gui.participant.tank.backdrop import Backdrop, backdrop
-from study_app.gui.participant.tank.camera import Box, Camera, Point
 from study_app.gui.participant.tank.captions import Captions
 from study_app.gui.participant.tank.frame import (
     DEPTH_STEPS,
     BallPlace,
     BallPlacer,
+    Box,
+    Camera,
     Placed,
+    Point,
     TargetPlace,
     TaskShown,
     ball_things,
     changes,
+    paint_marks,
     target_place,
 )
-from study_app.gui.participant.tank.onset_patch import OnsetPatch
-from study_app.gui.participant.tank.photodiode_patch import paint_patch, patch_place
-from study_app.gui.participant.tank.target_marks import paint_marks
-from study_app.gui.participant.tank.video_layer import VideoLayer, video_place
+from study_app.gui.participant.tank.layers import OnsetPatch, VideoLayer, paint_patch, patch_place, video_place
 from study_app.gui.theme.theme import TANK
+from study_app.gui.widgets.accessible import say
 from study_app.protocol.model import Explore, Follow, Reach
 from study_app.session.pages import TaskPage
 from study_app.session.tasks import track
@@ -221,7 +221,7 @@ class TankWidget(QWidget):
 
     def _made_pane(self) -> QWidget:
         """Return a surface of the graphics card that fills the widget."""
-        from study_app.gui.participant.tank.opengl_pane import Pane  # noqa: PLC0415 - OpenGL: only where it is drawn with
+        from study_app.gui.participant.tank.layers import Pane  # noqa: PLC0415 - OpenGL: only where it is drawn with
 
         pane = Pane(self, self._paint)
         pane.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)

@@ -23,10 +23,10 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.display.screens import place
-from study_app.gui.participant.intervals.setting_controls import SettingControls
+from study_app.gui.participant.intervals.answer_page import SettingControls
 from study_app.gui.participant.page_widgets import page_widget
 from study_app.gui.participant.pages.page_widget import PageWidget
-from study_app.gui.participant.pages.reading_page import ReadingPage
+from study_app.gui.participant.pages.text_page import ReadingPage
 from study_app.gui.participant.pointer_capture import BUTTONS, PointerCapture
 from study_app.gui.participant.tank_widget import TankWidget, paint_ahead
 from study_app.gui.theme.theme import PARTICIPANT, font, load_fonts, stylesheet

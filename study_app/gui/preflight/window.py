@@ -1,20 +1,85 @@
 """Whether to begin: every check with its value, what will run, and one button that says what is accepted by it."""
 
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QAccessible, QCloseEvent, QKeyEvent
-from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QLabel, QWidget
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QAccessible, QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QLabel, QProgressBar, QScrollArea, QWidget
 
-from study_app.gui.preflight.check_rows import CheckRow
+from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import LIGHT, Theme, font
-from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import describe_plot, give_role
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Card, Chip, Rule, scrolled
+from study_app.gui.widgets.cards import Bar, Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, Number
-from study_app.gui.widgets.labels import figures, label
+from study_app.gui.widgets.dialogs import Question
+from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.gui.widgets.live_plots import LatenessPlot
-from study_app.session.preflight import LOUDEST_DB, MEANS, QUIETEST_DB, USUAL_DB, Masking
+from study_app.session.preflight import LOUDEST_DB, MEANS, QUIETEST_DB, USUAL_DB, Check, Masking
 from study_app.viewmodels.preflight import WAITING, PreflightView, histogram
+
+ROW_HEIGHT = 42
+DOT = 13.0
+LEFT = 70
+NAME, BAR = 148, 160
+LEAST_WORDS = 160  # narrower, wrapped words would ask for room that they do not need
+LOOKS: dict[str, tuple[str, Ink, str]] = {
+    "ok": ("check", "ok", "passed"),
+    "warning": ("warning", "warn", "warning"),
+    "failure": ("cross", "bad", "cannot start"),
+}
+
+
+class CheckRow(Themed, QWidget):
+    """A check; one that needs a decision is tinted and says below what to do."""
+
+    def __init__(self, check: Check, *, last: bool) -> None:
+        super().__init__()
+        self.check, self._last = check, last
+        _, ink, word = LOOKS[check.verdict]
+        name = label(check.name, "body")
+        name.setFont(font("body", weight=600, scale=0.97))
+        name.setFixedWidth(NAME)
+        about = label(check.about, "label", "text2", wraps=True)
+        about.setFont(font("label", weight=400, tabular=True))
+        about.setMinimumWidth(LEAST_WORDS)
+        value = figures(check.value, "body", "text" if check.verdict == "ok" else ink)
+        value.setFont(font("body", weight=600, tabular=True, scale=0.97))
+        value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        said = vbox(STRETCH, about, spacing=6)
+        if check.share is not None:
+            share = Bar(height=6)
+            share.setFixedWidth(BAR)
+            share.show_share(min(1.0, check.share))
+            said.addWidget(share, 0, Qt.AlignmentFlag.AlignLeft)
+        said.addStretch()
+        self._head = holder = QWidget()
+        holder.setMinimumHeight(ROW_HEIGHT)
+        hbox(name, (said, 1), value, spacing=14, margins=(0, 4, 0, 4), parent=holder)
+        column = vbox(holder, spacing=0, margins=(LEFT, 0, 24, 0 if check.verdict == "ok" else 14), parent=self)
+        if check.advice:
+            advice = label(check.advice, "label", "text", wraps=True)
+            advice.setFont(font("label", weight=500))
+            column.addWidget(advice)
+        self.setAccessibleName(f"{check.name}, {word}, {check.said}")
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        t = self.theme
+        icon, ink, _ = LOOKS[self.check.verdict]
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        tint = QColor(getattr(t, f"{ink}_bg"))
+        if self.check.verdict != "ok":
+            painter.fillRect(self.rect().adjusted(4, 0, -4, 0), tint)
+        middle = QPointF(40, self._head.geometry().center().y() + 0.5)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(tint if self.check.verdict == "ok" else QColor(t.surface))
+        painter.drawEllipse(middle, DOT, DOT)
+        draw_icon(painter, icon, QRectF(middle.x() - 8, middle.y() - 8, 16, 16), getattr(t, ink), 2.4)
+        if self._last:
+            return
+        painter.setPen(QPen(QColor(t.grid), 1))
+        painter.drawLine(24, self.height() - 1, self.width() - 24, self.height() - 1)
+
 
 FULL, LEAST = QSize(1200, 800), QSize(1024, 640)
 ASIDE = 352
@@ -198,3 +263,63 @@ class MaskingQuestion(QWidget):
     def answer(self) -> Masking:
         """Return what was chosen."""
         return Masking(self.means.currentData(), self.noise_db.value() if self._is_noise else None)
+
+
+SIZE = (860, 620)
+ABOUT = (
+    "Measured for two seconds with the simulated hand. A session measures again, with its own device and limits. "
+    "This page is also available under This machine."
+)
+MEASURING = "Measuring … The first time the force model is compiled, which may take a minute."
+
+
+class ComputerWindow(Question):
+    """The checks; ``asked`` when they are to be made again. It is closed by hand."""
+
+    asked = Signal()
+
+    def __init__(self, parent: QWidget, theme: Theme) -> None:
+        super().__init__(parent, theme, "Check of this computer", ABOUT)
+        self.setModal(True)
+        self.rows: list[CheckRow] = []
+        self.state = label(MEASURING, "body", "text2", wraps=True)
+        self.bar = QProgressBar()
+        self.bar.setTextVisible(False)
+        self.bar.setFixedHeight(8)
+        inside = QWidget()
+        self._rows = vbox(STRETCH, spacing=0, margins=0, parent=inside)
+        area = QScrollArea()
+        area.setWidgetResizable(True)
+        area.setWidget(inside)
+        add_parts(self.column, self.state, self.bar, (area, 1))
+        again = ActionButton("", "Close", role="primary")
+        self.add_buttons("Check again", again)
+        self.back.clicked.disconnect(self.reject)
+        self.back.clicked.connect(self.asked)
+        self.resize(*SIZE)
+
+    def show_measuring(self) -> None:
+        self.state.setText(MEASURING)
+        self.back.setEnabled(False)
+        self.bar.setRange(0, 0)
+        self.bar.show()
+
+    def show_compiled(self, share: float) -> None:
+        self.bar.setRange(0, 100)
+        self.bar.setValue(round(100 * share))
+
+    def show_checks(self, checks: tuple[Check, ...]) -> None:
+        for row in self.rows:
+            row.hide()
+            row.deleteLater()
+        self.rows = [CheckRow(check, last=check is checks[-1]) for check in checks]
+        for place, row in enumerate(self.rows):
+            self._rows.insertWidget(place, row)
+            apply_theme_within(row, self._theme)
+        passed = sum(check.verdict == "ok" for check in checks)
+        self.show_sentence(f"{passed} of {len(checks)} passed.")
+
+    def show_sentence(self, sentence: str) -> None:
+        self.state.setText(sentence)
+        self.back.setEnabled(True)
+        self.bar.hide()

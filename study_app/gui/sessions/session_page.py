@@ -1,28 +1,270 @@
 """A session's page: trials, limits and which were broken, notes, motion, files, exclusions and taking them back."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
-from PySide6.QtWidgets import QDialog, QScrollArea, QWidget
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QDialog, QGridLayout, QLineEdit, QScrollArea, QSizePolicy, QWidget
 
 from study_app.errors import StoreError
-from study_app.gui.sessions.decision_dialogs import LeaveOutDialog, TakeBackDialog
-from study_app.gui.sessions.motion_plots import MotionPlot
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within, remove_widget
+from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Card, Chip
-from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, insert_layout, vbox
+from study_app.gui.widgets.cards import Card, Chip, Icon
+from study_app.gui.widgets.controls import ActionButton, Choice
+from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.row_table import CHIP_ROLE, Index, Table
 from study_app.store.exclusions import Exclusion, exclude, include
-from study_app.viewmodels.session.columns import VALIDITY, status_chip, validity_chip
-from study_app.viewmodels.session.record import NO_MOTION, SessionRecord, TrialRecord, motion, read_record
+from study_app.viewmodels.session import (
+    NO_MOTION,
+    VALIDITY,
+    SessionRecord,
+    TrialRecord,
+    motion,
+    read_record,
+    status_chip,
+    validity_chip,
+)
 from study_app.viewmodels.sessions import SessionFacts
+
+WIDTH = 560
+
+
+class Decision(Question):
+    """A question that wants a name and a reason before it goes on."""
+
+    def __init__(self, parent: QWidget, theme: Theme, title: str, explanation: str) -> None:
+        super().__init__(parent, theme, title, explanation)
+        self.setModal(True)
+        self.setMinimumWidth(WIDTH)
+        self.form = QGridLayout()
+        self.form.setHorizontalSpacing(16)
+        self.form.setVerticalSpacing(10)
+        self.form.setColumnStretch(1, 1)
+        add_layout(self.column, self.form)
+        self.by = _line("Your name or initials, such as AK")
+        self.reason = _line("")
+        self.missing = label("", "label", "bad", wraps=True)
+        self.missing.hide()
+
+    def add_field(self, name: str, field: QWidget) -> None:
+        """Put a field under those before, with its name at its left."""
+        said = label(name, "label", "text2")
+        field.setAccessibleName(name)
+        field.setFont(font("body"))
+        row = self.form.rowCount()
+        self.form.addWidget(said, row, 0, Qt.AlignmentFlag.AlignVCenter)
+        self.form.addWidget(field, row, 1)
+
+    def finish(self, by: str, reason: str, go_on: ActionButton) -> None:
+        """Put name, reason and the buttons below everything else."""
+        self.add_field(by, self.by)
+        self.add_field(reason, self.reason)
+        self.column.addWidget(self.missing)
+        self.add_buttons("Cancel", go_on)
+
+    def accept(self) -> None:
+        """Go on, or say what is missing and lead there."""
+        for field, what in ((self.by, "a name"), (self.reason, "a reason")):
+            if not field.text().strip():
+                self.missing.setText(f"Please enter {what}; it is recorded.")
+                self.missing.show()
+                field.setFocus()
+                return
+        super().accept()
+
+
+class UnblindDialog(Decision):
+    """Asks who opens the key and why, and says what it means."""
+
+    def __init__(self, parent: QWidget, theme: Theme, study: str, *, running: int) -> None:
+        super().__init__(
+            parent,
+            theme,
+            f"Unblind {study}?",
+            "Everyone who opens this study will see which setting was which, here and in every table, figure and "
+            "report. This cannot be undone. Your name, the reason and the time are stored with the data.",
+        )
+        if running:
+            many = "1 session is" if running == 1 else f"{running} sessions are"
+            row = hbox((Icon("warning", "warn", 20), 0, Qt.AlignmentFlag.AlignTop), spacing=10)
+            warns = label(
+                f"{many} not complete. Operators of the remaining sessions will no longer be blind.",
+                "label",
+                "warn",
+                wraps=True,
+            )
+            row.addWidget(warns, 1)
+            insert_layout(self.column, 2, row)
+        self.reason.setPlaceholderText("For example: collection closed")
+        self.finish("Name", "Reason", ActionButton("eye", "Unblind", role="danger"))
+        self.by.setFocus()
+
+
+class LeaveOutDialog(Decision):
+    """Asks which session, or which trial of it, by whom and why.
+
+    Parameters
+    ----------
+    sessions
+        Those that are not left out yet.
+    trials
+        Of each session (participant, number) the main trials and the words for them.
+    chosen
+        The session to begin with.
+    """
+
+    def __init__(
+        self,
+        parent: QWidget,
+        theme: Theme,
+        sessions: Sequence[SessionFacts],
+        trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]],
+        chosen: SessionFacts | None,
+    ) -> None:
+        super().__init__(
+            parent,
+            theme,
+            "Exclude from the analysis",
+            "It no longer counts in measures, figures and tests. Nothing is deleted: exclusions.csv and every "
+            "report state what was excluded, by whom and why.",
+        )
+        self._trials = trials
+        self.session = Choice()
+        self.trial = Choice()
+        for facts in sessions:
+            self.session.addItem(facts.name, (facts.participant, facts.session))
+            if chosen is not None and facts.folder == chosen.folder:
+                self.session.setCurrentIndex(self.session.count() - 1)
+        self.session.currentIndexChanged.connect(self._show_trials)
+        self.add_field("Session", self.session)
+        self.add_field("Scope", self.trial)
+        self.by.setPlaceholderText("Your initials, or the rule's name")
+        self.reason.setPlaceholderText("For example: fell asleep")
+        self._show_trials()
+        self.finish("By", "Reason", ActionButton("minus", "Exclude", role="primary"))
+        set_ink(self.missing, "bad")
+        self.session.setFocus()
+
+    @property
+    def chosen(self) -> tuple[str, int, int | None]:
+        """Participant, session and trial; None for the whole session."""
+        participant, session = self.session.currentData()
+        return participant, session, self.trial.currentData()
+
+    def _show_trials(self) -> None:
+        self.trial.clear()
+        self.trial.addItem("Whole session", None)
+        for number, words in self._trials.get(tuple(self.session.currentData() or ("", 0)), ()):
+            self.trial.addItem(f"Trial {number}: {words}", number)
+
+
+class TakeBackDialog(Decision):
+    """Asks who takes an exclusion back and why."""
+
+    def __init__(self, parent: QWidget, theme: Theme, what: str, reason: str) -> None:
+        super().__init__(
+            parent,
+            theme,
+            f"Include again: {what}",
+            f"It was excluded for this reason: “{reason}”. It will count again in measures, figures and tests. Your "
+            "name, the reason and the time are stored in exclusions_reversed.jsonl.",
+        )
+        self.reason.setPlaceholderText("For example: wrong participant")
+        self.finish("By", "Reason", ActionButton("undo", "Include again", role="primary"))
+        self.by.setFocus()
+
+
+def _line(placeholder: str) -> QLineEdit:
+    made = QLineEdit()
+    made.setPlaceholderText(placeholder)
+    return made
+
+
+HEIGHT = 150
+LEFT, RIGHT, TOP, BOTTOM = 52.0, 52.0, 8.0, 22.0
+NAMES = ("x right", "y up", "z near")
+LEAST_MM = 5.0
+
+
+class MotionPlot(Themed, QWidget):
+    """Three curves [mm] over the trial's time [s], or a sentence in their place."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setFixedHeight(HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        describe_plot(self, "Motion of the hand", "")
+        self._times_s = np.empty(0)
+        self._mm = np.empty((0, 3))
+        self._sentence = ""
+
+    @property
+    def points(self) -> int:
+        """How many points each curve has."""
+        return len(self._times_s)
+
+    def show_motion(self, times_s: NDArray[np.float64], positions_m: NDArray[np.float64]) -> None:
+        """Draw positions (n, 3) [m] over times (n,) [s]."""
+        self._times_s, self._mm, self._sentence = times_s, positions_m * 1e3, ""
+        if len(times_s):
+            low, high = np.nanmin(self._mm, axis=0), np.nanmax(self._mm, axis=0)
+            ranges = ", ".join(f"{n} {a:.0f} to {b:.0f}" for n, a, b in zip(NAMES, low, high, strict=True))
+            self.setAccessibleDescription(f"Position of the hand over {times_s[-1]:.0f} s in mm: {ranges}.")
+        self.update()
+
+    def show_sentence(self, sentence: str) -> None:
+        self._times_s, self._mm, self._sentence = np.empty(0), np.empty((0, 3)), sentence
+        self.setAccessibleDescription(sentence)
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme = self.theme
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setFont(font("small", tabular=True))
+        if not len(self._times_s):
+            painter.setPen(QColor(theme.text2))
+            words = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+            painter.drawText(QRectF(self.rect()), words, self._sentence)
+            return
+        room = QRectF(LEFT, TOP, self.width() - LEFT - RIGHT, HEIGHT - TOP - BOTTOM)
+        reach = max(LEAST_MM, float(np.nanmax(np.abs(self._mm))))
+        for value in (reach, 0.0, -reach):
+            y = room.center().y() - value / reach * room.height() / 2
+            painter.setPen(QPen(QColor(theme.grid), 1))
+            painter.drawLine(QPointF(room.left(), y), QPointF(room.right(), y))
+            painter.setPen(QColor(theme.text3))
+            number = f"{value:.0f} mm".replace("-", "\u2212")
+            painter.drawText(QRectF(0, y - 8, LEFT - 6, 16), Qt.AlignmentFlag.AlignRight, number)
+        lasts_s = max(1e-9, float(self._times_s[-1]))
+        for share, side in ((0.0, Qt.AlignmentFlag.AlignLeft), (1.0, Qt.AlignmentFlag.AlignRight)):
+            under = QRectF(room.left(), room.bottom() + 4, room.width(), 16)
+            painter.drawText(under, side, f"{share * lasts_s:.0f} s")
+        names_y = []
+        traces = (theme.trace_x, theme.trace_y, theme.trace_z)
+        styles = (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine, Qt.PenStyle.DotLine)
+        for axis, (ink, style) in enumerate(zip(traces, styles, strict=True)):
+            x_px = room.left() + self._times_s / lasts_s * room.width()
+            y_px = room.center().y() - self._mm[:, axis] / reach * room.height() / 2
+            here = np.isfinite(y_px)
+            painter.setPen(QPen(QColor(ink), 1.6, style))
+            painter.drawPolyline(QPolygonF([QPointF(a, b) for a, b in zip(x_px[here], y_px[here], strict=True)]))
+            names_y.append((float(y_px[here][-1]) if here.any() else room.center().y(), axis, ink))
+        below = -1e9
+        for end_px, axis, ink in sorted(names_y):
+            below = max(min(max(end_px, room.top() + 7), room.bottom() - 7 - 28), below + 14)
+            painter.setPen(QColor(ink))
+            painter.drawText(QRectF(room.right() + 6, below - 8, RIGHT, 16), Qt.AlignmentFlag.AlignLeft, NAMES[axis])
+
 
 HEADINGS = ("Trial", "Presented", "Ended", "Limits", "Answers", "Notes")
 WIDTHS = ((20, 56), (120, 130), (60, 90), (60, 134), (30, 70), (160, 120))

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QSizePolicy, QWid
 
 from study_app.gui.display.frame_clock import Frames
 from study_app.gui.kit.fields import LEAST_WORDS
-from study_app.gui.participant.tank.photodiode_patch import paint_patch, patch_place
+from study_app.gui.participant.tank.layers import paint_patch, patch_place
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
@@ -22,7 +22,7 @@ from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import figures, label
 from study_app.gui.widgets.number_field import NumberField, read_number, write_number
 from study_app.store.workstation import OFFSET_MS, SPREAD_MS, DisplayOffset
-from study_app.viewmodels.frame_times import LEAST_S, FrameFigures, FrameTimes
+from study_app.viewmodels.servo_health import LEAST_S, FrameFigures, FrameTimes
 
 REPORT_MS = 500
 INTERVAL_MS = (50.0, 5000.0)

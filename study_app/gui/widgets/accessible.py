@@ -1,7 +1,7 @@
 """What screen readers receive beyond Qt's own roles: headings, plots, the participant's window."""
 
 import shiboken6
-from PySide6.QtGui import QAccessible
+from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent
 from PySide6.QtWidgets import QAccessibleWidget, QLabel, QWidget
 
 _given: list[QAccessibleWidget] = []
@@ -39,3 +39,9 @@ class HeadingLabel(QLabel):
     def setText(self, text: str) -> None:
         super().setText(text)
         self.setAccessibleName(text)
+
+
+def say(widget: QWidget, words: str) -> None:
+    """Have ``words`` said of a widget, where anybody listens."""
+    if QAccessible.isActive():
+        QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, words))

@@ -16,7 +16,7 @@ from study_app.analysis.figures.page_layout import Look, Sheet
 from study_app.analysis.figures.question_figures import QuestionFigure, rows
 from study_app.analysis.levels.results import QuestionFound
 from study_app.analysis.report.write_report import report
-from study_app.gui.participant.forms import fields
+from study_app.gui.participant import questions as fields
 from study_app.gui.participant.forms.question_field import QuestionField
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol import questions

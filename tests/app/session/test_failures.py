@@ -68,8 +68,8 @@ def tap(bridge):
 
 
 def write_note(bridge):
-    bridge.operator.notes.field.setPlainText("left-handed")
-    bridge.operator.notes.field.entered.emit()
+    bridge.operator.controls.field.setPlainText("left-handed")
+    bridge.operator.controls.field.entered.emit()
 
 
 @pytest.mark.parametrize(
@@ -111,12 +111,12 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
 @pytest.mark.parametrize(
     ("owner", "method", "do", "name"),
     [
-        ("operator.notes.NotesCard", "show_view", lambda bridge: bridge.operator.mark_set.emit(), "Notes"),
-        ("operator.notes.NoteField", "toPlainText", write_note, "Notes"),
-        ("operator.plot_cards.PositionCard", "show_health", lambda bridge: bridge.show_traces(), "Position"),
+        ("operator.controls.NotesCard", "show_view", lambda bridge: bridge.operator.mark_set.emit(), "Notes"),
+        ("operator.controls.NoteField", "toPlainText", write_note, "Notes"),
+        ("operator.plots.PositionCard", "show_health", lambda bridge: bridge.show_traces(), "Position"),
         ("widgets.live_plots.Plot", "paintEvent", lambda it: it.operator.position.plot.viewport().update(), "Position"),
-        ("operator.steps_card.Rail", "paintEvent", lambda bridge: bridge.operator.rail.update(), "Session"),
-        ("operator.current_step.Tally", "show_view", lambda bridge: bridge.operator.mark_set.emit(), "Counts"),
+        ("operator.steps.Rail", "paintEvent", lambda bridge: bridge.operator.rail.update(), "Session"),
+        ("operator.steps.Tally", "show_view", lambda bridge: bridge.operator.mark_set.emit(), "Counts"),
     ],
 )
 def test_a_panel_that_fails_is_replaced_by_a_line_and_the_session_goes_on(

@@ -10,10 +10,16 @@ from typing import Any
 
 import pytest
 
-from study_app.app.session import garbage_collection, thread_priority
-from study_app.app.session.frame_budget import MOST_PERIODS, MOST_SHARE, FrameBudget
-from study_app.app.session.garbage_collection import collecting_here, freeze_garbage, unfreeze_garbage
-from study_app.app.session.thread_priority import ThreadPriority
+from study_app.app.session import timing
+from study_app.app.session.timing import (
+    MOST_PERIODS,
+    MOST_SHARE,
+    FrameBudget,
+    ThreadPriority,
+    collecting_here,
+    freeze_garbage,
+    unfreeze_garbage,
+)
 
 MS = 1_000_000
 
@@ -86,7 +92,7 @@ def automatic_collection(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     What those left goes first: while another thread frees it, nobody else can collect. However much it is, it is less
     than the bound. What is left of other tests is looked at once only, not in each collection.
     """
-    monkeypatch.setattr(garbage_collection, "MOST_FROZEN", 10**9)
+    monkeypatch.setattr(timing, "MOST_FROZEN", 10**9)
     gc.collect()
     gc.freeze()
     gc.enable()
@@ -173,13 +179,13 @@ def test_the_windows_thread_goes_before_other_programs_where_that_is_granted(
     if granted_by == "the system":
         if not made.raise_priority():
             pytest.skip("this user may not")
-        assert level() == thread_priority.NICE
+        assert level() == timing.NICE
     else:
         monkeypatch.setattr(os, "setpriority", refuse)
         grant = refuse if granted_by == "nobody" else lambda *given: asked.append(given)
-        monkeypatch.setattr(thread_priority, "make_high_priority", grant)
+        monkeypatch.setattr(timing, "make_high_priority", grant)
         assert made.raise_priority() == (granted_by != "nobody")
-        assert asked == ([] if granted_by == "nobody" else [(threading.get_native_id(), thread_priority.NICE)])
+        assert asked == ([] if granted_by == "nobody" else [(threading.get_native_id(), timing.NICE)])
         monkeypatch.undo()
     for _ in range(2):
         made.restore()

@@ -28,7 +28,7 @@ from PySide6.QtCore import QEventLoop, QTimer
 from study_app.app.session.live_session import LiveSession
 from study_app.gui.application import application_here
 from study_app.session.start import NewSession
-from study_app.app.session.garbage_collection import collecting_here
+from study_app.app.session.timing import collecting_here
 from study_app.gui.theme.theme import LIGHT
 
 application_here()

@@ -2,8 +2,8 @@
 
 from PySide6.QtCore import Qt
 
+from study_app.gui.home.cards import StudyCard
 from study_app.gui.home.main_window import MainWindow
-from study_app.gui.home.study_cards import StudyCard
 from study_app.gui.home.view import HomePlace
 from study_app.gui.widgets.main_view import Place
 from study_app.protocol.load import load, source_bytes

@@ -4,8 +4,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton, QVBoxLayout
 
-from study_app.gui.home.main_window import MainWindow
-from study_app.gui.home.navigation import DESTINATIONS
+from study_app.gui.home.main_window import DESTINATIONS, MainWindow
 from study_app.gui.widgets.main_view import Place
 
 

@@ -8,8 +8,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.display.screens import ScreenShown
-from study_app.gui.home import new_session_dialog
-from study_app.gui.home.new_session_dialog import NewSessionDialog
+from study_app.gui.home import dialogs
+from study_app.gui.home.dialogs import NewSessionDialog
 from study_app.gui.widgets.background import Background
 from study_app.protocol.load import source_bytes
 from study_app.session.start import MAX_SEED
@@ -170,7 +170,7 @@ def test_enter_begins_only_what_can_begin(dialog, qtbot):
 
 def test_a_session_begins_with_what_is_set_for_this_machine_unless_its_firmware_is_gone(tmp_path, monkeypatch, opened):
     screens = tuple(ScreenShown(n, name, 1920, 1080, 60.0, 1.0, 0, 0) for n, name in ((1, "A"), (2, "B"), (3, "C")))
-    monkeypatch.setattr(new_session_dialog, "screens_shown", lambda: screens)
+    monkeypatch.setattr(dialogs, "screens_shown", lambda: screens)
     firmware = tmp_path / "firmware.bin"
     firmware.write_bytes(b"x")
     set_here = {"device": "falcon", "screen": "B", "screen_number": 2, "firmware": str(firmware), "operator": "AK"}

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 
-from study_app.gui.home import rehearsal_dialog
-from study_app.gui.home.rehearsal_dialog import RehearsalDialog
+from study_app.gui.home import dialogs
+from study_app.gui.home.dialogs import RehearsalDialog
 from study_app.viewmodels.home import study_facts
 
 pytestmark = pytest.mark.slow
@@ -23,7 +23,7 @@ def opened(qtbot: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> Callab
     def open_(task: str = "endless") -> RehearsalDialog:
         dialog = RehearsalDialog(study_facts("demo"), tmp_path)
         qtbot.addWidget(dialog)
-        monkeypatch.setattr(rehearsal_dialog, "TASK", f"tests.gui.home.rehearsal_tasks:{task}")
+        monkeypatch.setattr(dialogs, "TASK", f"tests.gui.home.rehearsal_tasks:{task}")
         dialog.open()
         qtbot.waitUntil(dialog.isActiveWindow)
         return dialog
@@ -46,7 +46,7 @@ def test_a_failed_rehearsal_says_why_and_stays(
         raise OSError("no more processes")
 
     if not task:
-        monkeypatch.setattr(rehearsal_dialog, "WorkerClient", none)
+        monkeypatch.setattr(dialogs, "WorkerClient", none)
     dialog = opened(task)
     qtbot.mouseClick(dialog.start, LEFT)
     qtbot.waitUntil(lambda: dialog.cancel.text() == "Close", timeout=20_000)

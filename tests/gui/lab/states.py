@@ -17,8 +17,7 @@ from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.presets import spoken
 from study_app.lab.shadow import Trace
 from study_app.protocol.load import load_scene
-from study_app.viewmodels.estimation import LSL, SOURCES, EstimateRow, EstimateShown
-from study_app.viewmodels.lab import Now
+from study_app.viewmodels.lab import LSL, SOURCES, EstimateRow, EstimateShown, Now
 from tests.gui.lab.sample import blind, still_view, workbench
 from tests.gui.transcript import Actions, clicked, in_turn
 

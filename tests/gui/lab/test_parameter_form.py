@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
-from study_app.gui.lab.parameter_rows import NumberRow
+from study_app.gui.lab.parameters import NumberRow
 from study_app.gui.widgets.escape_key import HOLD_MS, EscapeAnywhere
 from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import blind, heard

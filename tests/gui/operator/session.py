@@ -13,7 +13,7 @@ from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
 from study_app.store.progress import Progress
 from study_app.viewmodels.operator import OperatorView, Session, operator_view
 from study_app.viewmodels.servo_health import ServoHealth
-from study_app.viewmodels.session.stages import stages
+from study_app.viewmodels.session import stages
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.gui.display.opengl import IN_SOFTWARE, has_card, renderer
+from study_app.gui.display.screens import IN_SOFTWARE, has_card, renderer
 from tests.end_to_end.real_windows import needs_display
 from tests.gui.participant.driver import on_a_display
 
@@ -17,7 +17,7 @@ import numpy as np
 from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 from study_app.gui.display.frame_clock import Frames
-from study_app.gui.display.opengl import has_card, renderer
+from study_app.gui.display.screens import has_card, renderer
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.protocol.wording.languages import words
 from tests.gui.small import task_page, view

@@ -11,7 +11,7 @@ from PySide6.QtGui import QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, QPlainTextEdit, QSlider, QWidget
 
-from study_app.gui.participant.forms.fields import FIELDS
+from study_app.gui.participant.questions import FIELDS
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, SliderView

@@ -12,8 +12,7 @@ from PySide6.QtGui import QColor, QRegion
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.participant.tank.frame import changes
-from study_app.gui.participant.tank.onset_patch import OnsetPatch
-from study_app.gui.participant.tank.photodiode_patch import PATCH
+from study_app.gui.participant.tank.layers import PATCH, OnsetPatch
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.session.pages import Interval
 from tests.gui.drawn import shown

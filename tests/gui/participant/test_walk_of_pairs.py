@@ -18,10 +18,9 @@ pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missi
 from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QWidget
 
-from study_app.gui.operator.strip import Strip
-from study_app.gui.participant.forms.question_form import FormWidget
-from study_app.gui.participant.intervals.choice_page import ChoiceWidget
-from study_app.gui.participant.intervals.number_page import NumberWidget
+from study_app.gui.operator.header import Strip
+from study_app.gui.participant.forms.questions_page import FormWidget
+from study_app.gui.participant.intervals.answer_page import ChoiceWidget, NumberWidget
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import build_schedule

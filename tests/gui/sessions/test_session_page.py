@@ -17,7 +17,7 @@ from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
 from study_app.store.sessions.begin import SessionStart, begin
-from study_app.viewmodels.session.record import MOTION_HIDDEN, read_record
+from study_app.viewmodels.session import MOTION_HIDDEN, read_record
 from study_app.viewmodels.sessions import sessions
 from tests.journal_lines import event_of
 

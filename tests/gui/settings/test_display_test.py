@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QColor
 
-from study_app.gui.participant.tank.photodiode_patch import PATCH
+from study_app.gui.participant.tank.layers import PATCH
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.gui.settings.display_test import FIRST_MS, GREYS, GreyRamp, LineField, lines
 from study_app.protocol.wording.languages import words

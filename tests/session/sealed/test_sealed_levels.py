@@ -25,7 +25,7 @@ from study_app.store.progress import Progress
 from study_app.store.tables.columns import SEALED
 from study_app.viewmodels.operator import Session, operator_view
 from study_app.viewmodels.servo_health import Vitals
-from study_app.viewmodels.session.stages import stages
+from study_app.viewmodels.session import stages
 from tests.compiled import needs_servo
 from tests.outlets.collector import collecting
 from tests.protocol import edited_studies

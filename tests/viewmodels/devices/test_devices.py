@@ -8,8 +8,7 @@ import pytest
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
 from study_app.devices.registry import backends, list_devices
 from study_app.store.workstation import DEFAULTS, DeviceBench
-from study_app.viewmodels.devices.bench import benches_shown
-from study_app.viewmodels.devices.list_view import device_named, devices_shown, looking
+from study_app.viewmodels.devices import benches_shown, device_named, devices_shown, looking
 
 MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
 SOCKET = Backend("falcon-socket:PATH", "a Unix socket", READY, "by command")

@@ -4,7 +4,7 @@ from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.delivered import within_limits
 from study_app.store.progress import Progress
-from study_app.viewmodels.session.stages import stages
+from study_app.viewmodels.session import stages
 
 
 def test_trials_are_done_interrupted_judged_and_repeated(told):

@@ -7,7 +7,7 @@ import pytest
 from study_app.protocol.model import Limits, Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.progress import Progress
-from study_app.viewmodels.session.track_health import UNDELIVERED, track_words, unanswered_words
+from study_app.viewmodels.session import UNDELIVERED, track_words, unanswered_words
 from tests.protocol.trials.level_studies import study
 
 CHOICES = {"first": "First", "second": "Second"}

@@ -6,7 +6,7 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from study_app.gui.participant.page_parts import parts_of
+from study_app.gui.participant.page_widgets import parts_of
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import words

@@ -16,9 +16,9 @@ from study_app.app.designer.editing import Editing
 from study_app.app.designer.participant.shown_step import StepPosition
 from study_app.app.designer.play.playable import NotPlayableError, Playable, playable
 from study_app.app.designer.play.played_session import PlayedSession
-from study_app.app.lab_rows import device_choices
+from study_app.app.failures import Patience
+from study_app.app.lab.view_values import device_choices
 from study_app.app.session.live_session import BUG
-from study_app.app.session.termination import Patience
 from study_app.app.workstation_settings import settings_here
 from study_app.authoring.versions.contents import keep_content
 from study_app.devices.registry import descriptor_of, title_of

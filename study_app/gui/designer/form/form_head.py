@@ -6,10 +6,10 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 
 from study_app.gui.designer.form.typed_fields import TypedLine
 from study_app.gui.designer.repair_button import NameRefusal
-from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_layout, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX
 from study_app.gui.widgets.controls import ActionButton, IconButton

@@ -6,9 +6,9 @@ from PySide6.QtWidgets import QLineEdit, QMenu
 
 from study_app.gui.designer.outline.rows import ROW_ROLE, Index
 from study_app.gui.designer.outline.tree import Tree
-from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
+from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton

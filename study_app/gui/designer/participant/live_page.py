@@ -33,10 +33,10 @@ from PySide6.QtWidgets import (
 from shiboken6 import isValid
 
 from study_app.gui.participant.forms.questions_page import QuestionsPage
-from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX
 from study_app.session.pages import Page, QuestionnairePage, TaskPage
 from study_app.session.trial import TankView

@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.gui.designer.participant.live_page import LivePage
 from study_app.gui.designer.segments import Segments
-from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.theme import font
+from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
 from study_app.gui.widgets.controls import Cap, Choice, IconButton

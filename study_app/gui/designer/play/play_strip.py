@@ -4,8 +4,8 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QWidget
 
-from study_app.gui.participant.pages.screen_reader import say
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton

@@ -2,21 +2,163 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, TypeAlias
 
-from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QAccessible, QColor, QFocusEvent, QFont, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QGridLayout, QWidget
+from PySide6.QtCore import QEvent, QPoint, QRect, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QAccessible,
+    QColor,
+    QEnterEvent,
+    QFocusEvent,
+    QFont,
+    QFontMetrics,
+    QFontMetricsF,
+    QImage,
+    QInputDevice,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+)
+from PySide6.QtWidgets import QButtonGroup, QCheckBox, QGridLayout, QRadioButton, QSizePolicy, QStyle, QWidget
 
-from study_app.gui.participant.forms.question_words import QuestionWords
-from study_app.gui.participant.pages.page_widget import page_painter
-from study_app.gui.participant.pages.screen_reader import say
-from study_app.gui.theme.theme import PARTICIPANT, font
-from study_app.gui.widgets.accessible import give_role
+from study_app.gui.participant.pages.page_widget import Button, beginning, page_painter, point_at
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
+from study_app.gui.widgets.accessible import give_role, say
 from study_app.protocol.questions import ItemView, Value
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words
+
+    Widget = QWidget
+else:
+    Widget = object
+
+HIGHEST = 2000  # of wrapped words [px]
+
+
+class QuestionWords(QWidget):
+    """One widget instead of four with a layout of their own: a page has nine and more of them.
+
+    The number stands in a column of its own, so that the texts of all questions begin at one line. What is missing has
+    a sign before the note.
+    """
+
+    def __init__(self, number: int, text: str, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.text, self.note, self.missing = text, "", False
+        self._number = str(number)
+        self._number_width = 0
+        self._faces = (QFont(), QFont(), QFont())
+        self._sign, self._sign_gap = 0.0, 0.0
+        self._known: dict[int, tuple[int, int]] = {}  # heights by width
+        policy = QSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
+
+    def fill_row(self) -> None:
+        """Take the room that a row of a given height leaves, and ask for none."""
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
+
+    def show_note(self, note: str, *, missing: bool) -> None:
+        """Show the small line, or none; with the sign and the colour of what is missing."""
+        if (note, missing) != (self.note, self.missing):
+            self.note, self.missing = note, missing
+            self._changed()
+
+    def set_fonts(self, text: QFont, note: QFont, number: QFont, sign_gap: float) -> None:
+        """Write in these fonts, with a gap [px] after the sign."""
+        if (text, note, number) == self._faces:
+            return
+        self._faces, self._sign_gap = (text, note, number), sign_gap
+        self._sign = QFontMetricsF(note).height() - 1
+        self._changed()
+
+    def set_number_width(self, width: int) -> None:
+        """Give the number its column [px]."""
+        if width != self._number_width:
+            self._number_width = width
+            self._changed()
+
+    def sizeHint(self) -> QSize:
+        """Return the least size: the width is a share of the row, the height follows from it."""
+        return self.minimumSizeHint()
+
+    def minimumSizeHint(self) -> QSize:
+        if not self.sizePolicy().hasHeightForWidth():
+            return QSize(0, 0)
+        text, note, _ = self._faces
+        longest = self._note_left + self._bounds(note, self.note, 0).width()
+        return QSize(self._number_width + max(longest, self._bounds(text, self.text, 0).width()), 0)
+
+    def heightForWidth(self, width: int) -> int:
+        return sum(self._heights(width))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        width, left = self.width(), self._number_width
+        high, note_high = self._heights(width)
+        top = (self.height() - high - note_high + 1) // 2
+        painter = page_painter(self)
+        painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # words are in their own language's
+        ink = PARTICIPANT.warn if self.missing else PARTICIPANT.text3
+        note_top, note_left = top + high, left + self._note_left
+        text_face, note_face, number_face = self._faces
+        for face, colour, place, words in (
+            (number_face, ink, QRect(0, top, left, high), self._number),
+            (text_face, PARTICIPANT.text, QRect(left, top, width - left, high), self.text),
+            (note_face, ink, QRect(note_left, note_top, width - note_left, note_high), self.note),
+        ):
+            painter.setFont(face)
+            painter.setPen(QColor(colour))
+            painter.drawText(self._placed(place), self._flags, words)
+        if self.missing:
+            room = self._placed(
+                QRect(left, note_top + (note_high - round(self._sign)) // 2, self._note_left, note_high)
+            )
+            mirrored = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+            x = room.right() - self._sign if mirrored else room.left()
+            draw_icon(painter, "warning", QRectF(x, room.top(), self._sign, self._sign), PARTICIPANT.warn)
+        painter.end()
+
+    @property
+    def _flags(self) -> int:
+        return int(beginning(self) | Qt.AlignmentFlag.AlignTop) | int(Qt.TextFlag.TextWordWrap)
+
+    @property
+    def _note_left(self) -> int:
+        """Where the note begins after the number's column [px]."""
+        return round(self._sign + self._sign_gap) if self.missing else 0
+
+    def _placed(self, place: QRect) -> QRectF:
+        return QRectF(QStyle.visualRect(self.layoutDirection(), self.rect(), place))
+
+    def _bounds(self, face: QFont, words: str, width: int) -> QRect:
+        return QFontMetrics(face).boundingRect(0, 0, width, HIGHEST, self._flags, words)
+
+    def _heights(self, width: int) -> tuple[int, int]:
+        """Return the heights [px] of number and text, and of the note."""
+        if width not in self._known:
+            self._known[width] = self._measured(width)
+        return self._known[width]
+
+    def _measured(self, width: int) -> tuple[int, int]:
+        text, note, number = self._faces
+        room = width - self._number_width
+        high = max(self._bounds(text, self.text, room).height(), QFontMetrics(number).height())
+        if not self.note:
+            return high, 0
+        note_high = self._bounds(note, self.note, room - self._note_left).height()
+        return high, max(note_high, round(self._sign)) if self.missing else note_high
+
+    def _changed(self) -> None:
+        self._known.clear()
+        self.updateGeometry()
+        self.update()
+
 
 LEAST_TARGET = 44.0  # of what is hit with mouse or finger [logical px]
 
@@ -229,3 +371,426 @@ def question_of(part: QWidget) -> QuestionField | None:
     while above is not None and not isinstance(above, QuestionField):
         above = above.parentWidget()
     return above
+
+
+CENTRE = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)
+MARK = 19.0
+ROOM = 14.0  # between edge and words
+TAKEN = MARK + 6 + ROOM  # of the width, by mark and room
+NO_WORDS = "–"
+GROWS = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
+Look: TypeAlias = Literal["words", "point", "off scale"]
+"""Words that can be chosen, a point of a scale, or an answer off it, with an edge of dashes."""
+
+
+@lru_cache(maxsize=1024)
+def widest_word(words: str, scale: float) -> float:
+    """Return the width of the widest word of an answer [px]; the points of all rows of a page are alike."""
+    metrics = QFontMetricsF(font("chosen", scale=scale))
+    return max((metrics.horizontalAdvance(word) for word in words.split()), default=0.0)
+
+
+@lru_cache(maxsize=1024)
+def size_of(words: str, scale: float) -> QSize:
+    """Return a size that can be hit, as wide as the longest word [px]."""
+    least = target_px(scale)
+    return QSize(round(max(least, widest_word(words, scale) + TAKEN * scale)), round(least))
+
+
+@lru_cache(maxsize=1024)
+def height_of(words: str, scale: float, width_px: float) -> float:
+    """Return the height of an answer that is wrapped at a width [px]."""
+    room = QRectF(0, 0, width_px, 1e4)
+    return QFontMetricsF(font("chosen", scale=scale)).boundingRect(room, CENTRE, words).height()
+
+
+class OpenLook(NamedTuple):
+    """How an answer looks that is not chosen: in a size [px], perhaps pointed at, or with strong words."""
+
+    words: str
+    look: Look
+    scale: float
+    width: int
+    height: int
+    pointed: bool
+    strong: bool
+
+    def paint(self, painter: QPainter) -> None:
+        """Draw it."""
+        theme, scale, pointed = PARTICIPANT, self.scale, self.pointed
+        inset = 0.75 if pointed else 0.5
+        body = QRectF(0, 0, self.width, self.height).adjusted(inset, inset, -inset, -inset)
+        edge = QPen(QColor(theme.text if pointed else theme.ctl), 1.5 if pointed else 1.0)
+        open_ = self.look == "off scale" and not pointed
+        if open_:
+            edge.setDashPattern([3, 3])
+        painter.setPen(edge)
+        painter.setBrush(Qt.BrushStyle.NoBrush if open_ else QColor(theme.hover if pointed else theme.surface))
+        painter.drawRoundedRect(body, RADIUS_CONTROL * scale, RADIUS_CONTROL * scale)
+        painter.setFont(font("cell", scale=scale))
+        painter.setPen(QColor(theme.text if self.strong else theme.text2))
+        painter.drawText(body.adjusted(4, 0, -4, 0), CENTRE, self.words)
+
+
+@lru_cache(maxsize=256)
+def picture_of(look: OpenLook, ground: str) -> QImage:
+    """Return the picture of an answer on a ground of one colour."""
+    made = QImage(look.width, look.height, QImage.Format.Format_RGB32)
+    made.fill(QColor(ground))
+    painter = QPainter(made)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    look.paint(painter)
+    painter.end()
+    return made
+
+
+class OptionLook(Button):
+    """How an answer looks: the whole rectangle is clickable; shape, fill and a check mark show that it is chosen.
+
+    ``place`` is its number among the answers of its question, which is notified when the pointer enters and leaves.
+    """
+
+    place = -1
+
+    def prepare(self, text: str, name: str, description: str, look: Look = "words") -> None:
+        """Show ``text``; a screen reader says ``name`` and ``description``."""
+        self._words = text
+        self._look = look
+        self._scale = 1.0
+        self.pointed = False
+        self.setAccessibleName(name)
+        self.setAccessibleDescription(description)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the question holds the keyboard
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setSizePolicy(GROWS)
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        self._scale = scale
+        self.updateGeometry()
+        self.update()
+
+    def point(self, pointed: bool) -> None:
+        """Show that the pointer, or the keyboard's own pointer, is here."""
+        if pointed != self.pointed:
+            self.pointed = pointed
+            self.update()
+
+    def hitButton(self, position: QPoint) -> bool:
+        return self.rect().contains(position)
+
+    def sizeHint(self) -> QSize:
+        return size_of(self._words, self._scale)
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def hasHeightForWidth(self) -> bool:
+        """Return that words wrap; points are short."""
+        return self._look != "point"
+
+    def heightForWidth(self, width: int) -> int:
+        needed = height_of(self._words, self._scale, max(1.0, width - TAKEN * self._scale))
+        return round(max(target_px(self._scale), needed + 12 * self._scale))
+
+    def enterEvent(self, event: QEnterEvent) -> None:
+        super().enterEvent(event)
+        self._tell_pointed(self.place)
+
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        self._tell_pointed(-1)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        super().mouseReleaseEvent(event)
+        if event.device().type() == QInputDevice.DeviceType.TouchScreen:
+            self._tell_pointed(-1)
+
+    def _tell_pointed(self, place: int) -> None:
+        if (question := question_of(self)) is not None:
+            question.point(place)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        """Draw the answer; a point looks like those of other questions and is drawn once for all of them."""
+        painter = page_painter(self)
+        in_focus = self._in_focus()
+        strong = self._look == "words" or self.pointed or in_focus
+        look = OpenLook(self._words, self._look, self._scale, self.width(), self.height(), self.pointed, strong)
+        if self.isChecked():
+            self._paint_chosen(painter)
+        elif self._look == "point" and self.devicePixelRatioF() == 1 and self.window().graphicsProxyWidget() is None:
+            question = question_of(self)
+            lit = in_focus or (question is not None and question.missing)
+            painter.drawImage(0, 0, picture_of(look, PARTICIPANT.selected if lit else PARTICIPANT.window))
+        else:
+            look.paint(painter)
+        painter.end()
+
+    def _in_focus(self) -> bool:
+        focused = self.window().focusWidget()
+        return focused is not None and focused.isAncestorOf(self)
+
+    def _paint_chosen(self, painter: QPainter) -> None:
+        theme, scale = PARTICIPANT, self._scale
+        text = "" if self._words == NO_WORDS else self._words
+        body = QRectF(self.rect())
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(theme.accent))
+        radius = body.height() / 2 if self._look != "words" else min(body.height() / 2, target_px(scale) / 2)
+        painter.drawRoundedRect(body, radius, radius)
+        face = font("chosen", scale=scale)
+        mark = min(MARK * scale, body.width() * 0.34)
+        gap = min(6 * scale, body.width() * 0.06) if text else 0.0
+        room = QRectF(0, 0, max(1.0, body.width() - mark - gap - ROOM * scale), body.height())
+        words = QFontMetricsF(face).boundingRect(room, CENTRE, text).width()
+        left = body.center().x() - (mark + gap + words) / 2
+        flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+        x_mark, x_words = (left + words + gap, left) if flip else (left, left + mark + gap)
+        draw_icon(painter, "check", QRectF(x_mark, body.center().y() - mark / 2, mark, mark), theme.on_accent, 2.4)
+        painter.setFont(face)
+        painter.setPen(QColor(theme.on_accent))
+        painter.drawText(QRectF(x_words - 1, 0, words + 2, body.height()), CENTRE, text)
+
+
+class RadioOption(OptionLook, QRadioButton):
+    """One of several answers."""
+
+    def __init__(
+        self, text: str, name: str, description: str, parent: QWidget | None = None, *, look: Look = "words"
+    ) -> None:
+        super().__init__(parent)
+        self.prepare(text, name, description, look)
+
+
+class CheckOption(OptionLook, QCheckBox):
+    """One of several answers that can be given together."""
+
+    def __init__(
+        self, text: str, name: str, description: str, parent: QWidget | None = None, *, look: Look = "words"
+    ) -> None:
+        super().__init__(parent)
+        self.prepare(text, name, description, look)
+
+
+MOST_DIGITS = 9
+
+
+class OptionsField(QuestionField):
+    """Digits choose, the arrows move a pointer of the keyboard's own, Space chooses there; mouse and touch choose.
+
+    ``pointed_at(place)`` comes with the option that mouse or keyboard point at, -1 for none.
+    """
+
+    several = False
+    options: Sequence[OptionLook] = ()
+    pointed = -1
+
+    pointed_at = Signal(int)
+
+    def hold(self, options: Sequence[OptionLook]) -> None:
+        """Take the options, in the order of their digits."""
+        self.options = options
+        self._group = QButtonGroup(self)
+        self._group.setExclusive(not self.several)
+        # Not the methods themselves: Qt would forget the role of this widget (`give_role`).
+        self._group.idClicked.connect(lambda place: self._click(place))  # noqa: PLW0108
+        self._group.idToggled.connect(lambda place, on: self._toggle(place, on))  # noqa: PLW0108
+        for place, option in enumerate(options):
+            self._group.addButton(option, place)
+            option.place = place
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+
+    @property
+    def digits(self) -> int:
+        """How many options digits choose."""
+        return min(MOST_DIGITS, len(self.options))
+
+    @property
+    def forward(self) -> int:
+        """Which way the key → goes: 1 to the next option, -1 to the one before."""
+        return 1
+
+    @property
+    def chosen(self) -> tuple[int, ...]:
+        """The places of the options that are chosen."""
+        raise NotImplementedError
+
+    def value_at(self, place: int) -> Value:
+        """Return the answer that an option alone is."""
+        raise NotImplementedError
+
+    def show_answer(self, value: Value) -> None:
+        self.kept(value)
+        self._check()
+
+    def clear(self) -> None:
+        """Show no option as chosen."""
+        self._group.setExclusive(False)
+        self._check()
+        self._group.setExclusive(not self.several)
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        super().set_scale(scale)
+        for option in self.options:
+            option.set_scale(scale)
+
+    def point(self, place: int) -> None:
+        """Point at an option, at none with -1."""
+        if place == self.pointed:
+            return
+        self.pointed = place
+        for number, option in enumerate(self.options):
+            option.point(number == place)
+        self.pointed_at.emit(place)
+
+    def choose(self, place: int, *, by_key: bool) -> None:
+        """Answer with an option; a key that answers leads to the next question."""
+        self.give(self.value_at(place))
+        self._check()
+        point_at(self.options[place])
+        if by_key:
+            self.left.emit()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Choose with digits and Space, point with left and right; the rest is the page's."""
+        number = event.key() - Qt.Key.Key_0
+        plain = not event.modifiers() & Qt.KeyboardModifier.ControlModifier
+        if 1 <= number <= self.digits and plain:
+            if not event.isAutoRepeat():
+                self.choose(number - 1, by_key=True)
+        elif event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
+            self._step(self.forward if event.key() == Qt.Key.Key_Right else -self.forward)
+        elif event.key() == Qt.Key.Key_Space:
+            if self.pointed >= 0 and not event.isAutoRepeat():
+                self.choose(self.pointed, by_key=True)
+        else:
+            super().keyPressEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self.point(-1)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self.setFocus(Qt.FocusReason.MouseFocusReason)
+        event.accept()
+
+    def _check(self) -> None:
+        self._group.blockSignals(True)
+        for place, option in enumerate(self.options):
+            option.setChecked(place in self.chosen)
+        self._group.blockSignals(False)
+
+    def _click(self, place: int) -> None:
+        self.setFocus(Qt.FocusReason.MouseFocusReason)
+        if not self.several:
+            self.choose(place, by_key=False)
+
+    def _toggle(self, place: int, on: bool) -> None:
+        """Hear what is checked, by a click or by a screen reader, which does it without one."""
+        if on != (place in self.chosen) and (on or self.several):
+            self.choose(place, by_key=False)
+
+    def _step(self, by: int) -> None:
+        start = self.pointed
+        if start < 0:
+            start = self.chosen[0] if self.chosen else (-1 if by > 0 else len(self.options))
+        self.point(min(max(start + by, 0), len(self.options) - 1))
+        say(self.options[self.pointed], self.options[self.pointed].accessibleName())
+
+
+class ScaleField(OptionsField):
+    """A row of points; "cannot judge" stands apart from them, where lines end."""
+
+    labels: tuple[str, ...] = ()
+
+    def build(self, labels: tuple[str, ...], judge_name: str | None, judge_text: str | None) -> None:
+        """Make the options: the points of the scale, and where there is one the answer off it."""
+        self.labels = labels
+        names = [f"{point} {label}" for point, label in enumerate(labels, start=1)]
+        text = self.view.text
+        self.points = [RadioOption(str(n), name, text, self, look="point") for n, name in enumerate(names, start=1)]
+        self.judge = None
+        if judge_name is not None:
+            self.judge = RadioOption(judge_text or "", judge_name, text, self, look="off scale")
+        self.hold([*self.points, *([] if self.judge is None else [self.judge])])
+
+    @property
+    def digits(self) -> int:
+        """How many points digits choose: the answer off the scale has none."""
+        return min(MOST_DIGITS, len(self.labels))
+
+    @property
+    def answer_keys(self) -> str:
+        """The digits of its points; beyond 9 the arrows reach them."""
+        return f"1–{self.digits}"
+
+    @property
+    def chosen(self) -> tuple[int, ...]:
+        """The place of the answer in the row."""
+        if not self.is_answered:
+            return ()
+        return (self.value - 1 if isinstance(self.value, int) else len(self.points),)
+
+    def value_at(self, place: int) -> Value:
+        """Return the point, None off the scale."""
+        return place + 1 if place < len(self.points) else None
+
+    def spoken(self) -> str:
+        """Return the point and its name."""
+        return self.options[self.chosen[0]].accessibleName()
+
+
+ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+VERTICAL = (Qt.Key.Key_Up, Qt.Key.Key_Down)
+
+
+class EntryKeys(Widget):
+    """A widget to type into that leaves Esc to the window and other keys to the page, and shows its question's ring."""
+
+    def leaves_to_page(self, event: QKeyEvent) -> bool:
+        """Return whether a key is the page's: it means nothing while one types."""
+        return event.key() in (*ENTER, *VERTICAL)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        escape = event.key() == Qt.Key.Key_Escape
+        if escape and (question := question_of(self)) is not None:
+            question.finish()  # before the page gives way to a pause
+        if escape or self.leaves_to_page(event):
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        if (question := question_of(self)) is not None:
+            question.update()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if (question := question_of(self)) is not None:
+            question.finish()
+            question.update()
+
+
+class TypedField(QuestionField):
+    """What is typed is taken when typing pauses, and at the latest when the question is left."""
+
+    def type_into(self, entry: QWidget, wait_ms: int, take: Callable[[], object]) -> None:
+        """Give the keyboard to ``entry``; call ``take`` this time after the last key."""
+        self.setFocusProxy(entry)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(wait_ms)
+        self._timer.timeout.connect(take)
+
+    def typed(self) -> str:
+        """Return what was typed."""
+        raise NotImplementedError
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in ENTER and self.typed():
+            if not event.isAutoRepeat() and self.finish():
+                self.left.emit()
+        else:
+            super().keyPressEvent(event)

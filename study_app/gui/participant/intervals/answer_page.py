@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QFont, QShowEvent
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtCore import QEvent, QObject, QRectF, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QPainter, QPen, QShowEvent, QWheelEvent
+from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton, QWidget
 
-from study_app.gui.participant.pages.page_widget import PageWidget
-from study_app.gui.participant.pages.progress_line import ProgressLine
-from study_app.gui.theme.theme import font
-from study_app.gui.widgets.boxes import STRETCH, vbox
-from study_app.protocol.questions import Value
-from study_app.session.pages import DesignPage
-from study_app.session.transitions.events import Chosen, ItemShown, Submitted
+from study_app.gui.participant.pages.page_widget import DigitPad, GoButton, KeyCap, PageWidget, ProgressLine
+from study_app.gui.participant.pages.text_page import Badge
+from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.widgets.accessible import HeadingLabel, say
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.number_field import read_number
+from study_app.protocol.questions import Value, plain_number
+from study_app.protocol.wording.languages import Words
+from study_app.session.device_buttons import STEP_S
+from study_app.session.pages import ChoicePage, DesignPage, FeedbackPage, Interval, NumberPage, TaskPage
+from study_app.session.transitions.events import Chosen, ItemShown, Stepped, Submitted
 
 if TYPE_CHECKING:
+    from study_app.gui.participant.tank.captions import Captions
     from study_app.protocol.wording.languages import Words
 
 QUESTION_PX = 26
@@ -71,3 +76,345 @@ def sized(pixels: float) -> QFont:
     made = font("body")
     made.setPixelSize(round(pixels))
     return made
+
+
+CHOICE_BUTTON_PX = (160, 96)
+CHOICE_GAP_PX = 24
+CHOICE_TEXT_PX = 22
+ARROWS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+
+
+class ChoiceWidget(AnswerPage):
+    """The answers in temporal order; digits choose by number, the arrows by position on the screen.
+
+    Nothing is preselected. Of two answers ← is the left one and → the right; of more the arrows go to a button, which
+    Enter presses.
+    """
+
+    def __init__(
+        self,
+        page: ChoicePage,
+        words: Words,
+        clock: Callable[[], float],
+        parent: QWidget | None = None,
+        *,
+        text_scale: float = 1.0,
+    ) -> None:
+        super().__init__(page, words, clock, parent, text_scale=text_scale)
+        self.buttons: list[QPushButton] = []
+        self._values = [value for value, _ in page.item.options]
+        for value, text in page.item.options:
+            button = QPushButton(text, self)
+            button.setAccessibleName(text)
+            button.setAccessibleDescription(page.item.text)
+            button.setAutoDefault(False)
+            button.pressed.connect(lambda value=value: self.answer(value))
+            button.installEventFilter(self)
+            self.buttons.append(button)
+        self._cap, self._hint = KeyCap(self), QLabel(words.key_answer, self)
+        self._hint.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
+        row = hbox(STRETCH, *self.buttons, STRETCH, spacing=CHOICE_GAP_PX)
+        add_parts(self._column, row, 28, hbox(STRETCH, self._cap, self._hint, STRETCH), (STRETCH, 3))
+
+    def lay_out(self, scale: float) -> None:
+        """Make the buttons as large as they must be at least."""
+        super().lay_out(scale)
+        for button in self.buttons:
+            button.setMinimumSize(*(round(side * scale) for side in CHOICE_BUTTON_PX))
+            button.setFont(sized(CHOICE_TEXT_PX * self.words_scale))
+        self._cap.show_key(self.page.item.keys, self.words_scale)
+        self._hint.setFont(font("body", scale=self.words_scale))
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress and self._take(event):
+            return True
+        return super().eventFilter(watched, event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not self._take(event):
+            super().keyPressEvent(event)
+
+    def _take(self, event: QKeyEvent) -> bool:
+        """Take a key of the page; a key that is held is pressed once."""
+        number = event.key() - Qt.Key.Key_1
+        away = ARROWS.get(Qt.Key(event.key()))
+        if event.isAutoRepeat():
+            return True
+        if 0 <= number < len(self.buttons):
+            self.answer(self._values[number])
+        elif away is not None:
+            self._go(-away if self.mirrored else away)
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            focused = [one for one in self.buttons if one.hasFocus()]
+            if focused:
+                focused[0].pressed.emit()
+        else:
+            return False
+        return True
+
+    def _go(self, step: int) -> None:
+        """Choose the first or the last of two answers; of more go to the next button."""
+        if len(self.buttons) == 2:
+            self.answer(self._values[0 if step < 0 else 1])
+            return
+        at = next((place for place, one in enumerate(self.buttons) if one.hasFocus()), -1 if step > 0 else 0)
+        self.buttons[(at + step) % len(self.buttons)].setFocus()
+
+
+BADGE_SCALE = 1.6
+CENTRED = Qt.AlignmentFlag.AlignHCenter
+
+
+class FeedbackWidget(PageWidget):
+    """A check mark and "Right", or a dash and "Not right"."""
+
+    def __init__(
+        self,
+        page: FeedbackPage,
+        words: Words,
+        clock: Callable[[], float],
+        parent: QWidget | None = None,
+        *,
+        text_scale: float = 1.0,
+    ) -> None:
+        super().__init__(words, clock, parent, text_scale=text_scale)
+        self._text = words.right if page.right else words.not_right
+        self.setAccessibleName(self._text)
+        sign, colour = ("check", PARTICIPANT.ok) if page.right else ("minus", PARTICIPANT.text2)
+        self._badge, self._word = Badge(sign, colour, self), HeadingLabel(self._text)
+        self._word.setStyleSheet(f"color: {PARTICIPANT.text}; background: transparent;")
+        badge, word = (self._badge, 0, CENTRED), (self._word, 0, CENTRED)
+        self._column = vbox((STRETCH, 2), badge, word, (STRETCH, 3), parent=self)
+
+    def lay_out(self, _scale: float) -> None:
+        """Grow with the page."""
+        self._badge.set_scale(BADGE_SCALE * self.words_scale)
+        self._word.setFont(font("display", scale=self.words_scale))
+        self._column.setSpacing(round(14 * self.words_scale))
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        say(self, self._text)
+
+
+SQUARE = 16.0
+GAP = 10.0
+
+
+def interval_width(interval: Interval, words: Words, scale: float) -> float:
+    """Return the width that words and squares take [px]."""
+    return _words_width(interval, words, scale) + GAP * scale + interval.of * (SQUARE + GAP) * scale
+
+
+def _words_width(interval: Interval, words: Words, scale: float) -> float:
+    text = words.reached.format(reached=interval.number, of=interval.of)
+    return QFontMetricsF(font("statement", scale=scale, weight=600)).horizontalAdvance(text) + 4
+
+
+def draw_interval(
+    painter: QPainter, width: float, middle: float, interval: Interval, words: Words, scale: float
+) -> None:
+    """Draw words and squares, centred in a page of ``width`` around the height ``middle`` [px].
+
+    In a rest no square is filled; in a language that is read from right to left the first is on the right.
+    """
+    text = words.reached.format(reached=interval.number, of=interval.of)
+    side, gap = SQUARE * scale, GAP * scale
+    painter.save()
+    painter.setFont(font("statement", scale=scale, weight=600))
+    wide = _words_width(interval, words, scale)
+    x = (width - interval_width(interval, words, scale)) / 2
+    painter.setPen(QColor(PARTICIPANT.text))
+    words_at = QRectF(x, middle - 20 * scale, wide, 40 * scale)
+    if words.right_to_left:
+        words_at.moveRight(width - x)
+    painter.drawText(words_at, int(Qt.AlignmentFlag.AlignCenter), text)
+    painter.setPen(QPen(QColor(PARTICIPANT.text), 2 * scale))
+    for number in range(1, interval.of + 1):
+        place = QRectF(x + wide + gap + (number - 1) * (side + gap), middle - side / 2, side, side)
+        if words.right_to_left:
+            place.moveRight(width - place.left())
+        filled = number == interval.number and not interval.resting
+        painter.setBrush(QColor(PARTICIPANT.text) if filled else Qt.BrushStyle.NoBrush)
+        painter.drawRect(place)
+    painter.restore()
+
+
+FIELD_PX = (400, 96)
+KEY_PX = (60, 52)
+KEY_GAP_PX = 8
+ACROSS = 6
+NUMBER_TEXT_PX = 40
+LONGEST = 12
+
+
+class NumberWidget(AnswerPage):
+    """A field for a number, with point or comma; anything but a number above 0 is reported and not accepted."""
+
+    def __init__(
+        self,
+        page: NumberPage,
+        words: Words,
+        clock: Callable[[], float],
+        parent: QWidget | None = None,
+        *,
+        text_scale: float = 1.0,
+    ) -> None:
+        super().__init__(page, words, clock, parent, text_scale=text_scale)
+        self._permits = page.item.permits
+        self.field = QLineEdit(self)
+        self.field.setMaxLength(LONGEST)
+        self.field.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.field.setAccessibleName(page.item.text)
+        self.field.setAccessibleDescription(words.number_wanted)
+        self.wrong = QLabel("", self)
+        self.wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
+        self.field.textChanged.connect(lambda _text: self.wrong.clear())
+        self._pad = DigitPad(self.field, (".",), ACROSS, words.delete_digit, self)
+        self.keys = self._pad.keys
+        self.button = GoButton(words.continue_, words.enter_key, self)
+        self.button.clicked.connect(self._confirm)
+        above = ((widget, 0, CENTRED) for widget in (self.field, self.wrong, self._pad))
+        add_parts(self._column, *above, 24, (self.button, 0, CENTRED), (STRETCH, 3))
+
+    def lay_out(self, scale: float) -> None:
+        """Make field and keys as large as they must be at least."""
+        super().lay_out(scale)
+        words = self.words_scale
+        self.field.setFixedSize(*(round(side * scale) for side in FIELD_PX))
+        self.field.setFont(sized(NUMBER_TEXT_PX * scale))
+        self.wrong.setFont(sized(18 * words))
+        self.button.set_scale(words)
+        width, height = (round(side * scale) for side in KEY_PX)
+        self._pad.set_size(width, height, round(KEY_GAP_PX * scale), sized(20 * scale))
+
+    def focus_first(self) -> None:
+        """Put the keyboard into the field."""
+        self.field.setFocus()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            if not event.isAutoRepeat():
+                self._confirm()
+        else:
+            super().keyPressEvent(event)
+
+    def _confirm(self) -> None:
+        """Answer with the number in the field, or report what is wrong with it."""
+        number = read_number(self.field.text())
+        if number is not None and self._permits(number):
+            self.answer(plain_number(number))
+            return
+        self.wrong.setText(self._words.number_wanted)
+        say(self.field, self._words.number_wanted)
+        self.field.setFocus()
+        self.field.selectAll()
+
+
+STEP_MS: Final = round(1000 * STEP_S)
+NOTCH: Final = 120  # of a wheel [eighths of a degree]
+BUTTON_PX: Final = (120, 48)
+GAP_PX: Final = 16
+LEAST_PX: Final = 44
+TEXT_PX: Final = 18
+KEYS: Final = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+
+
+class SettingControls(QWidget):
+    """Says which way the participant moves the level, and that it is set; shown only while it can be set.
+
+    The left key and button are less in every language. What is held makes a step every `STEP_MS`. ``event_made``
+    carries the session's events. Without ``buttons``, where no pointer is shown, keys and wheel alone are heard.
+    """
+
+    event_made = Signal(object)
+
+    def __init__(
+        self, page: TaskPage, words: Words, clock: Callable[[], float], parent: QWidget, *, buttons: bool
+    ) -> None:
+        super().__init__(parent)
+        self._room = parent
+        self._clock = clock
+        self._adjusts = page.adjusts
+        self._buttons = buttons
+        self._held = 0
+        self._turned = 0
+        self._timer = QTimer(self)
+        self._timer.setInterval(STEP_MS)
+        self._timer.timeout.connect(lambda: self._step(self._held))
+        self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
+        self.setCursor(Qt.CursorShape.ArrowCursor)
+        self.less, self.more = (QPushButton(text, self) for text in (f"← {words.less}", f"{words.more} →"))
+        self.done = GoButton(words.done, words.enter_key, self)
+        hbox(self.less, self.more, self.done, spacing=GAP_PX, margins=0, parent=self)
+        for button, name, way in ((self.less, words.less, -1), (self.more, words.more, 1)):
+            button.setAccessibleName(name)
+            button.setAccessibleDescription(page.question)
+            button.setAutoRepeat(True)
+            button.setAutoRepeatDelay(STEP_MS)
+            button.setAutoRepeatInterval(STEP_MS)
+            button.clicked.connect(lambda _=False, way=way: self._step(way))
+        self.done.clicked.connect(self._confirm)
+        for one in (self.less, self.more, self.done):
+            one.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setVisible(self._adjusts and buttons)
+
+    def turn_to(self, page: TaskPage) -> None:
+        """Appear where the level of an interval is set, and go with it."""
+        self._adjusts = page.adjusts
+        self._let_go()
+        self.setVisible(self._adjusts and self._buttons)
+
+    def place(self, captions: Captions) -> None:
+        """Lie at the foot of the tank among its words, above the way to pause where both have no room side by side."""
+        scale = captions.small_scale
+        width, height = (round(side * scale) for side in BUTTON_PX)
+        for button in (self.less, self.more):
+            button.setFont(sized(TEXT_PX * scale))
+            button.setStyleSheet("padding: 0 12px; min-height: 0;")
+            button.setFixedHeight(max(height, LEAST_PX))
+            button.setMinimumWidth(width)
+        self.done.set_scale(scale)
+        self.adjustSize()
+        x, y = (self._room.width() - self.width()) / 2, captions.controls_middle - self.height() / 2
+        self.move(round(x), round(min(y, self._room.height() - self.height() - 4)))
+        self.raise_()
+
+    def press(self, event: QKeyEvent) -> bool:
+        """Take a key that went down; say whether it was one of these."""
+        way = KEYS.get(Qt.Key(event.key()), 0)
+        if not self._adjusts or (not way and event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter)):
+            return False
+        if not event.isAutoRepeat():
+            if way:
+                self._held = way
+                self._step(way)
+                self._timer.start()
+            else:
+                self._confirm()
+        return True
+
+    def release(self, event: QKeyEvent) -> None:
+        """Let go of a key."""
+        if not event.isAutoRepeat() and KEYS.get(Qt.Key(event.key()), 0) == self._held:
+            self._let_go()
+
+    def turn_wheel(self, event: QWheelEvent) -> None:
+        """Step with each notch of the wheel: forwards is more."""
+        self._turned += event.angleDelta().y()
+        steps = int(self._turned / NOTCH)
+        self._turned -= steps * NOTCH
+        self._step(steps)
+
+    def _let_go(self) -> None:
+        self._held = self._turned = 0
+        self._timer.stop()
+
+    def _step(self, steps: int) -> None:
+        if self._adjusts and steps:
+            self.event_made.emit(Stepped(self._clock(), steps))
+
+    def _confirm(self) -> None:
+        self._let_go()
+        if self._adjusts:
+            self.event_made.emit(Submitted(self._clock()))

@@ -5,14 +5,43 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QAccessible,
+    QAccessibleEvent,
+    QColor,
+    QEnterEvent,
+    QFocusEvent,
+    QFont,
+    QFontMetricsF,
+    QKeyEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QResizeEvent,
+)
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QGridLayout,
+    QGroupBox,
+    QLineEdit,
+    QPushButton,
+    QRadioButton,
+    QSizePolicy,
+    QWidget,
+)
 
-from study_app.gui.theme.theme import PARTICIPANT
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
+from study_app.protocol.wording.languages import Words, words
+from study_app.session.pages import Progress
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words
+
+    Button = QAbstractButton
+else:
+    Button = object  # Qt permits one class of its own in a class
 
 DESIGNED_FOR = (1366.0, 768.0)
 MOST_SCALE = 2.4
@@ -101,3 +130,381 @@ class PageWidget(QWidget):
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(PARTICIPANT.window))
         painter.end()
+
+
+BEGINNING = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)  # Qt mirrors it with the painter
+BAR = (40.0, 6.0, 8.0)  # width, height, gap [logical px at scale 1]
+
+
+def progress_words(progress: Progress, words: Words) -> tuple[str, str]:
+    """Return "Part 2 of 2" and "Delay setting 3 of 7"; what is the only one of its kind is not counted."""
+    counted = progress.part is not None and progress.parts > 1
+    part = words.part.format(part=progress.part, parts=progress.parts) if counted else ""
+    named = progress.label and progress.of > 1
+    template = words.setting_at_most if progress.at_most else words.setting
+    setting = template.format(label=progress.label, of=progress.of) if named else progress.label
+    return part, setting
+
+
+def draw_progress(
+    painter: QPainter, room: QRectF, progress: Progress, words: Words, *, scale: float = 1.0, share: float = 0.5
+) -> float:
+    """Draw words and bars from the beginning of a line in ``room``; return the width [px].
+
+    ``share`` is how much of the present bar is full: the task is its first half, the questionnaire its second. Bars
+    that find no room are left out; the words say the same.
+    """
+    flip = words.right_to_left
+    part, setting = progress_words(progress, words)
+    x = 0.0
+    painter.save()
+    painter.setLayoutDirection(Qt.LayoutDirection.RightToLeft if flip else Qt.LayoutDirection.LeftToRight)
+    for text, weight, colour in ((part, 600, PARTICIPANT.text), (setting, 400, PARTICIPANT.text2)):
+        if not text:
+            continue
+        painter.setFont(font("statement", scale=scale, weight=weight))
+        painter.setPen(QColor(colour))
+        wide = QFontMetricsF(painter.font()).horizontalAdvance(text)
+        painter.drawText(_from(room, x, wide + 2, room.height(), flip=flip), BEGINNING, text)
+        x += wide + 14 * scale
+    x += 10 * scale
+    if progress.of > 1 and x + _bars_width(progress.of, scale) <= room.width():
+        x = _draw_bars(painter, room, x, progress, scale=scale, share=share, flip=flip)
+    painter.restore()
+    return x
+
+
+def _draw_bars(
+    painter: QPainter, room: QRectF, x: float, progress: Progress, *, scale: float, share: float, flip: bool
+) -> float:
+    """Draw one bar a setting from ``x`` on; return where they end [px from the beginning]."""
+    width, height, gap = (size * scale for size in BAR)
+    painter.setPen(Qt.PenStyle.NoPen)
+    for index in range(1, progress.of + 1):
+        bar = _from(room, x, width, height, flip=flip)
+        painter.setBrush(QColor(PARTICIPANT.text if index < progress.index else PARTICIPANT.sunk))
+        painter.drawRoundedRect(bar, height / 2, height / 2)
+        if index == progress.index and share > 0:
+            painter.setBrush(QColor(PARTICIPANT.accent))
+            full = _from(room, x, max(height, width * share), height, flip=flip)
+            painter.drawRoundedRect(full, height / 2, height / 2)
+        x += width + gap
+    return x - gap
+
+
+def _bars_width(count: int, scale: float) -> float:
+    width, _, gap = (size * scale for size in BAR)
+    return count * (width + gap) - gap
+
+
+def _from(room: QRectF, x: float, width: float, height: float, *, flip: bool) -> QRectF:
+    """Return a place ``x`` from where the line begins, in the middle of its height."""
+    left = room.right() - x - width if flip else room.left() + x
+    return QRectF(left, room.center().y() - height / 2, width, height)
+
+
+class ProgressLine(QWidget):
+    """The progress at the head of a page; empty, but as high, where a page has none."""
+
+    def __init__(self, progress: Progress | None, words: Words, share: float, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._progress = progress
+        self._words = words
+        self._share = share
+        self._scale = 1.0
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        if progress is not None:
+            self.setAccessibleName(" · ".join(filter(None, progress_words(progress, words))))
+        self.set_scale(1.0)
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        self._scale = scale
+        self.setFixedHeight(round(QFontMetricsF(font("statement", scale=scale)).height()))
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        if self._progress is None:
+            return
+        painter = page_painter(self)
+        draw_progress(painter, QRectF(self.rect()), self._progress, self._words, scale=self._scale, share=self._share)
+        painter.end()
+
+
+CENTRE = int(Qt.AlignmentFlag.AlignCenter)
+ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right)
+RING = 4  # room around a button for its focus ring [logical px]
+KEYBOARD = (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason, Qt.FocusReason.ShortcutFocusReason)
+
+
+def key_size(text: str, scale: float = 1.0) -> tuple[float, float]:
+    """Return width and height [px] of a key cap."""
+    metrics = QFontMetricsF(font("key", scale=scale))
+    height = round(metrics.height() + 5 * scale)
+    return max(height, round(metrics.horizontalAdvance(text) + 12 * scale)), height
+
+
+def draw_key(
+    painter: QPainter,
+    left: float,
+    middle: float,
+    text: str,
+    scale: float = 1.0,
+    *,
+    ink: str = PARTICIPANT.text2,
+    edge: str = PARTICIPANT.ctl,
+    strength: float = 1.0,
+) -> float:
+    """Draw a key cap from ``left`` around the line ``middle``, its edge at ``strength``; return its width [px]."""
+    width, height = key_size(text, scale)
+    cap = QRectF(round(left) + 0.5, round(middle - height / 2) + 0.5, width - 1, height - 1)
+    line = QColor(edge)
+    line.setAlphaF(strength)
+    painter.setPen(QPen(line, 1))
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.drawRoundedRect(cap, 4 * scale, 4 * scale)
+    painter.setFont(font("key", scale=scale))
+    painter.setPen(QColor(ink))
+    way = painter.layoutDirection()
+    painter.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # "1–7" is so on every keyboard
+    painter.drawText(cap, CENTRE, text)
+    painter.setLayoutDirection(way)
+    return width
+
+
+class KeyCap(QWidget):
+    """A key cap as a widget, in a language's direction."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._text = ""
+        self._scale = 1.0
+
+    def show_key(self, text: str, scale: float) -> None:
+        self._text, self._scale = text, scale
+        width, height = key_size(text, scale)
+        self.setFixedSize(round(width) + 2, round(height) + 2)
+        self.setVisible(bool(text))
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = page_painter(self)
+        draw_key(painter, 1, self.height() / 2, self._text, self._scale)
+        painter.end()
+
+
+class LitButton(Button):
+    """A button that lights up under the pointer, and has a ring where the keyboard led to it."""
+
+    ringed = False
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        """Show the ring where the keyboard led here; a page that begins here has its key cap to say so."""
+        self.ringed = event.reason() in KEYBOARD
+        super().focusInEvent(event)
+
+    def enterEvent(self, event: QEnterEvent) -> None:
+        super().enterEvent(event)
+        self.update()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        self.update()
+
+
+class GoButton(LitButton, QPushButton):
+    """The filled button of a participant's page, with the key that presses it; never disabled."""
+
+    def __init__(self, text: str, key: str, parent: QWidget | None = None) -> None:
+        super().__init__(text, parent)
+        self._key = key
+        self._scale = 1.0
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setAutoDefault(False)
+        self.set_scale(1.0)
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        self._scale = scale
+        self.setFont(font("card", scale=scale * 1.0625, weight=500))
+        self.setFixedSize(self.sizeHint())
+        self.update()
+
+    def sizeHint(self) -> QSize:
+        scale = self._scale
+        label = QFontMetricsF(self.font()).horizontalAdvance(self.text())
+        cap, _ = key_size(self._key, scale)
+        width = max(150 * scale, label + cap + (36 + 12 + 28) * scale)
+        return QSize(round(width + 2 * RING), round(48 * scale + 2 * RING))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = page_painter(self)
+        scale, theme = self._scale, PARTICIPANT
+        body = QRectF(self.rect()).adjusted(RING, RING, -RING, -RING)
+        flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+        radius = RADIUS_CONTROL * scale
+        lit = self.underMouse() and not self.isDown()
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(theme.accent_hover if lit else theme.accent))
+        painter.drawRoundedRect(body, radius, radius)
+        if self.hasFocus() and self.ringed:
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setPen(QPen(QColor(theme.text), 2))
+            painter.drawRoundedRect(body.adjusted(-3, -3, 3, 3), radius + 3, radius + 3)
+        label = QFontMetricsF(self.font()).horizontalAdvance(self.text())
+        cap, _ = key_size(self._key, scale)
+        start = body.center().x() - (label + 12 * scale + cap) / 2
+        words_at, cap_at = (start + cap + 12 * scale, start) if flip else (start, start + label + 12 * scale)
+        painter.setFont(self.font())
+        painter.setPen(QColor(theme.on_accent))
+        painter.drawText(QRectF(words_at - 1, body.top(), label + 2, body.height()), CENTRE, self.text())
+        ink = theme.on_accent
+        draw_key(painter, cap_at, body.center().y(), self._key, scale, ink=ink, edge=ink, strength=0.5)
+        painter.end()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Leave arrows to the page: they scroll or move there, and must not lead the keyboard away."""
+        if event.key() in ARROWS:
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
+
+
+LEAST_HEIGHT = 44
+
+
+class LanguageButton(LitButton, QRadioButton):
+    """One language: an outline, and a check mark where it is the page's. Enter and Space choose it."""
+
+    def __init__(self, language: str, parent: QWidget) -> None:
+        super().__init__(words(language).name, parent)
+        self.language = language
+        self._scale = 1.0
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setLayoutDirection(
+            Qt.LayoutDirection.RightToLeft if words(language).right_to_left else Qt.LayoutDirection.LeftToRight
+        )
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        self._scale = scale
+        self.setFont(font("body", scale=scale, weight=600 if self.isChecked() else 500))
+        self.setFixedSize(self.sizeHint())
+
+    def sizeHint(self) -> QSize:
+        wide = QFontMetricsF(self.font()).horizontalAdvance(self.text()) + (30 + 24 * self.isChecked()) * self._scale
+        return QSize(round(wide) + 2 * RING, round(LEAST_HEIGHT * self._scale) + 2 * RING)
+
+    def hitButton(self, _place: object) -> bool:
+        return True
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            if not event.isAutoRepeat():
+                self.click()
+        else:
+            super().keyPressEvent(event)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = page_painter(self)
+        theme, scale, radius = PARTICIPANT, self._scale, RADIUS_CONTROL * self._scale
+        body = QRectF(self.rect()).adjusted(RING + 0.5, RING + 0.5, -RING - 0.5, -RING - 0.5)
+        painter.setPen(QPen(QColor(theme.text if self.isChecked() else theme.ctl), 1))
+        painter.setBrush(QColor(theme.hover if self.underMouse() else theme.surface))
+        painter.drawRoundedRect(body, radius, radius)
+        if self.hasFocus() and self.ringed:
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setPen(QPen(QColor(theme.accent), 2))
+            painter.drawRoundedRect(body.adjusted(-3, -3, 3, 3), radius + 3, radius + 3)
+        name = QRectF(body)
+        if self.isChecked():
+            side = 18 * scale
+            mark = QRectF(body.left() + 14 * scale, body.center().y() - side / 2, side, side)
+            name.setLeft(mark.right())
+            if self.layoutDirection() == Qt.LayoutDirection.RightToLeft:
+                mark.moveRight(body.right() - 14 * scale)
+                name = QRectF(body.left(), body.top(), mark.left() - body.left(), body.height())
+            draw_icon(painter, "check", mark, theme.accent, 2.4)
+        painter.setFont(self.font())
+        painter.setPen(QColor(theme.text if self.isChecked() else theme.text2))
+        painter.drawText(name, CENTRE, self.text())
+        painter.end()
+
+
+class LanguageSwitch(QGroupBox):
+    """The languages in one line: Tab comes to the page's own, arrows choose its neighbour.
+
+    ``chosen`` comes with the code of another than the page's.
+    """
+
+    chosen = Signal(str)
+
+    def __init__(self, languages: tuple[str, ...], present: str, name: str, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setAccessibleName(name)
+        self.buttons = tuple(LanguageButton(language, self) for language in languages)
+        for button in self.buttons:
+            button.setChecked(button.language == present)
+            policy = Qt.FocusPolicy.StrongFocus if button.isChecked() else Qt.FocusPolicy.ClickFocus
+            button.setFocusPolicy(policy)  # Qt does so itself, but not for a button that is checked this early
+            button.clicked.connect(lambda _=False, code=button.language: self._choose(code, present))
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        x = 0
+        flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+        for button in reversed(self.buttons) if flip else self.buttons:
+            button.set_scale(scale)
+            button.move(x, 0)
+            x += button.width() + round(4 * scale)
+        self.resize(x - round(4 * scale), self.buttons[0].height())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        """Draw nothing: the buttons are all."""
+
+    def _choose(self, code: str, present: str) -> None:
+        if code != present:
+            self.chosen.emit(code)
+
+
+DIGITS = ("1", "2", "3", "4", "5", "6", "7", "8", "9", "0")
+DELETE = "⌫"
+
+
+class DigitPad(QWidget):
+    """Keys in rows of ``across``, in the same order in every language; ``more`` come after the digits."""
+
+    def __init__(self, field: QLineEdit, more: tuple[str, ...], across: int, delete_name: str, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._field = field
+        self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self.keys = [QPushButton(text, self) for text in (*DIGITS, *more, DELETE)]
+        for place, key in enumerate(self.keys):
+            key.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            key.setAccessibleName(delete_name if key.text() == DELETE else key.text())
+            key.clicked.connect(lambda _=False, key=key: self._press(key.text()))
+            self._grid.addWidget(key, place // across, place % across)
+
+    def set_size(self, width: int, height: int, gap: int, face: QFont) -> None:
+        """Give every key its size [px]."""
+        self._grid.setSpacing(gap)
+        for key in self.keys:
+            key.setFont(face)
+            key.setStyleSheet(f"padding: 0; min-height: {height - 2}px;")
+            key.setFixedSize(width, height)
+
+    def _press(self, text: str) -> None:
+        self._field.setFocus(Qt.FocusReason.MouseFocusReason)
+        if text == DELETE:
+            self._field.backspace()
+        else:
+            self._field.insert(text)
+
+
+def point_at(widget: QWidget) -> None:
+    """Lead a screen reader to ``widget``, which does not have the keyboard: it says its name and whether checked."""
+    if QAccessible.isActive():
+        QAccessible.updateAccessibility(QAccessibleEvent(widget, QAccessible.Event.Focus))

@@ -2,23 +2,356 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, TypeAlias
 
-from PySide6.QtGui import QFontMetricsF
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFocusEvent, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from study_app.gui.participant.forms.question_field import QuestionField
+from study_app.gui.participant.forms.question_field import NO_WORDS, QuestionField, ScaleField
 from study_app.gui.participant.forms.questions_page import QuestionsPage
-from study_app.gui.participant.pages.column_labels import Heading, label_height, widest_word
-from study_app.gui.participant.pages.questionnaire_grid import Asked, Grid, grid, parts
-from study_app.gui.participant.pages.statement_field import StatementField
-from study_app.gui.theme.theme import font
+from study_app.gui.participant.pages.page_widget import page_painter, page_scale, words_scale
+from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.widgets.boxes import add_layout
 from study_app.protocol.questions import ItemView
 from study_app.session.pages import QuestionnairePage
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words
+
+LEAST_CELL = 44.0
+NARROW = 900.0
+FEW = 5  # statements a page at most where a window is too small for all of them
+NUMBER = 32.0
+AFTER_STATEMENT = 16.0
+CELL_GAP = 6.0
+POINTS = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What is asked, measured at scale 1 [px].
+
+    ``statement`` is the width of the longest statement on one line, ``judge`` that of the longest word over the column
+    "cannot judge", 0 where there is none, and ``word`` that of the labels over the scale.
+    """
+
+    statement: float
+    judge: float = 0.0
+    word: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """The sizes of a row, from its number to "cannot judge" [logical px].
+
+    ``scale`` is of spaces, ``text`` of words; ``judge_gap`` lies between the scale and "cannot judge", whose width is 0
+    where there is none; ``pitch`` is a row's height, 0 until it is known.
+    """
+
+    scale: float
+    text: float
+    tight: bool
+    number_width: float
+    statement_width: float
+    cell_pitch: float
+    judge_gap: float
+    judge_width: float
+    pitch: float = 0.0
+
+    @property
+    def cell_width(self) -> float:
+        """The width of a cell of the scale."""
+        return self.cell_pitch - CELL_GAP * self.scale
+
+    @property
+    def cell_height(self) -> float:
+        """The height of every cell."""
+        return min(self.pitch - (4 if self.tight else 7) * self.scale, 50 * max(self.scale, 0.8 * self.text))
+
+    @property
+    def holds(self) -> bool:
+        """Whether the cells are large enough to be hit."""
+        return min(self.cell_height, self.cell_width) >= LEAST_CELL * self.scale - 0.01
+
+    def with_rows(self, room: float, per_page: int) -> Grid:
+        """Return the sizes where ``room`` [px] is divided among so many rows."""
+        return replace(self, pitch=math.floor(min(room / per_page, 68 * self.text)))
+
+
+def parts(items: int, width: float) -> Iterator[int]:
+    """Yield how many statements a page could show, most first: all of them, else as even parts as there can be."""
+    if width >= NARROW:
+        yield items
+    for most in range(min(FEW, items), 0, -1):
+        yield math.ceil(items / math.ceil(items / most))
+
+
+def grid(width: float, height: float, asked: Asked, margin: float, *, text_scale: float = 1.0) -> Grid:
+    """Return the widths of a row in a window, ``margin`` from its edges to the words [logical px].
+
+    Words are drawn ``text_scale`` times as large as designed at least. Rows may turn out too low for their words or
+    their cells: see `Grid.holds`.
+    """
+    scale = page_scale(width, height)
+    text = words_scale(width, height, text_scale)
+    content = width - 2 * margin
+    roomy = content >= 1100
+    judge = max((112 if roomy else 92) * scale, asked.judge * text + 8 * scale) if asked.judge else 0.0
+    gap = (42 if roomy else 24) * scale if asked.judge else 0.0
+    number, after = NUMBER * text, AFTER_STATEMENT * scale
+    wide = content - number - after - judge - gap
+    statements = 400 * scale if text <= scale else 480 * text  # as much as these need, cells give way to them
+    narrowest = max(52 * scale, asked.word * text / 2 + 2)  # a label may be twice as wide as its column
+    fewest = min(max((wide - statements) / POINTS, narrowest), max(98 * scale, narrowest))
+    pitch = min(max((wide - asked.statement * text - 8) / POINTS, fewest), 120 * max(scale, 0.8 * text))
+    return Grid(
+        scale=scale,
+        text=text,
+        tight=height < 740 * text,
+        number_width=number,
+        statement_width=wide - POINTS * pitch + CELL_GAP * scale,
+        cell_pitch=pitch,
+        judge_gap=gap,
+        judge_width=judge,
+    )
+
+
+SHRINKING = (1.0, 0.94, 0.88, 0.82, 0.76)  # of words that are larger than they must be, in a window that is too small
+WRAP_LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
+
+Fitted: TypeAlias = tuple[QFont, QFont, float, float]
+
+
+@lru_cache(maxsize=256)
+def statement_height(text: str, scale: float, weight: int, width_px: int) -> float:
+    """Return the height of a statement that is wrapped at a width [px]; a page of statements often comes again."""
+    room = QRectF(0, 0, width_px, 1e4)
+    return QFontMetricsF(font("statement", scale=scale, weight=weight)).boundingRect(room, WRAP_LEFT, text).height()
+
+
+class StatementField(ScaleField):
+    """A statement with its cells; their names stand over the columns, once for all statements."""
+
+    def __init__(
+        self, view: ItemView, labels: tuple[str, ...], judge: str | None, words: Words, parent: QWidget
+    ) -> None:
+        self.sizes: Grid | None = None
+        super().__init__(view, words, parent)
+        self.build(labels, judge, NO_WORDS)
+        self.statement.fill_row()
+        self.cells, self.row = QHBoxLayout(), QHBoxLayout()
+        mirrored = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+        for point in reversed(self.points) if mirrored else self.points:  # a scale has the same order in every language
+            self.cells.addWidget(point)
+            if mirrored:
+                point.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
+        add_layout(self.row, self.cells)
+        if self.judge is not None:
+            self.row.addWidget(self.judge)
+        add_layout(self.grid, self.row, 0, self.ANSWER, Qt.AlignmentFlag.AlignVCenter)
+        self.grid.setColumnStretch(self.ANSWER, 0)
+
+    @property
+    def note(self) -> str:
+        """The small line under the statement says which keys answer, where the keyboard is."""
+        if self.missing and self.hasFocus():
+            return f"{self._words.please_answer} · {self._words.press_keys}"
+        return super().note
+
+    @property
+    def columns(self) -> list[tuple[float, float]]:
+        """Left end and width of every cell in the row [px]."""
+        return [(cell.x(), cell.width()) for cell in self.options]
+
+    @property
+    def rule(self) -> float | None:
+        """Where the rule between the scale and "cannot judge" is [px]; None without that."""
+        if self.judge is None:
+            return None
+        (first, _), (last, width), (left, wide) = (self.columns[place] for place in (0, -2, -1))
+        return (left + wide + first) / 2 if left < first else (last + width + left) / 2
+
+    def set_sizes(self, sizes: Grid) -> None:
+        """Take the columns' widths and the row's height."""
+        self.sizes, self.scale = sizes, sizes.scale
+        margin = self.horizontal_margin
+        self.grid.setContentsMargins(margin, 0, margin, 0)
+        self.set_words_columns(sizes.number_width, AFTER_STATEMENT * sizes.scale)
+        width, height = math.floor(sizes.cell_width), math.floor(sizes.cell_height + 0.01)
+        self.cells.setSpacing(round(CELL_GAP * sizes.scale))
+        for point in self.points:
+            point.set_scale(sizes.text)
+            point.setFixedSize(width, height)
+        if self.judge is not None:
+            self.judge.set_scale(sizes.text)
+            self.judge.setFixedSize(math.floor(sizes.judge_width), height)
+        self.row.setSpacing(round(sizes.judge_gap))
+        self.setFixedHeight(math.floor(sizes.pitch))
+        self._tell()
+
+    def fits(self, sizes: Grid, note: str) -> bool:
+        """Return whether statement and ``note`` can be read in a row of these sizes, no smaller than they must."""
+        return self.fitted(sizes, note) is not None
+
+    def fitted(self, sizes: Grid, note: str) -> Fitted | None:
+        """Return the largest fonts with which statement and note fit the row, and their heights [px]; None if none do.
+
+        Words that must be so large (``sizes.text`` beyond ``sizes.scale``) are not made smaller; a note may be.
+        """
+        must = sizes.text > sizes.scale
+        shrunk = ((1.0, 1.0), (1.0, sizes.scale / sizes.text)) if must else ((s, max(s, 0.88)) for s in SHRINKING)
+        for shrink, note_shrink in shrunk:
+            fitted = self._measured(sizes, note, shrink, note_shrink)
+            if fitted[2] + fitted[3] <= sizes.pitch - 3 * sizes.scale:
+                return fitted
+        return None
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self._tell()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self._tell()
+
+    def _smallest(self, sizes: Grid, note: str) -> Fitted:
+        """Return fonts for a row that is alone on its page and still too low."""
+        for percent in range(95, 30, -5):
+            fitted = self._measured(sizes, note, percent / 100, percent / 100)
+            if fitted[2] + fitted[3] <= sizes.pitch - 3 * sizes.scale:
+                break
+        return fitted
+
+    def _measured(self, sizes: Grid, note: str, shrink: float, note_shrink: float) -> Fitted:
+        weight = 500 if self.missing or self.hasFocus() else 400
+        face = font("statement", scale=sizes.text * shrink, weight=weight)
+        note_face = font("label", scale=sizes.text * note_shrink, weight=600)
+        height = statement_height(self.view.text, sizes.text * shrink, weight, math.floor(sizes.statement_width))
+        return face, note_face, height, QFontMetricsF(note_face).height() if note else 0.0
+
+    def _tell(self) -> None:
+        """Write the words as large as the row can hold them."""
+        super()._tell()
+        if self.sizes is not None:
+            face, note_face, *_ = self.fitted(self.sizes, self.note) or self._smallest(self.sizes, self.note)
+            self.set_fonts(face, note_face, self.sizes.text)
+
+    def _paint_ground(self, painter: QPainter) -> None:
+        super()._paint_ground(painter)
+        if self.rule is None or self.judge is None:
+            return
+        painter.setPen(QPen(QColor(PARTICIPANT.border), 1))
+        x, half, middle = round(self.rule) + 0.5, self.judge.height() * 0.4, self.height() / 2
+        painter.drawLine(QPointF(x, middle - half), QPointF(x, middle + half))
+
+
+LABEL_WIDTH = 98.0  # in which a label over a column wraps, where there is room
+SHARES = (1.0, 1.2, 1.4, 1.6, 1.8)
+
+
+def label_height(labels: tuple[str, ...], widest: float) -> float:
+    """Return the height [px] of labels at scale 1 that may be ``widest`` px wide, where they wrap as they are drawn."""
+    metrics = QFontMetricsF(font("label", weight=600))
+    room = QRectF(0, 0, min(LABEL_WIDTH, 0.95 * widest), 1e3)  # letters of other sizes are not quite in proportion
+    return max((metrics.boundingRect(room, WRAP_LEFT, text).height() for text in labels), default=0.0)
+
+
+def widest_word(metrics: QFontMetricsF, text: str) -> float:
+    """Return the width [px] of the widest word of a text, 0 without any."""
+    return max((metrics.horizontalAdvance(word) for word in text.split()), default=0.0)
+
+
+class Heading(QWidget):
+    """The labels over the columns: both ends and the middle, and the one that is pointed at.
+
+    ``row`` returns a row of the part that is shown: its cells say where the columns are.
+    """
+
+    def __init__(
+        self, labels: tuple[str, ...], judge: str | None, row: Callable[[], StatementField], parent: QWidget
+    ) -> None:
+        super().__init__(parent)
+        self._labels = (*labels, judge) if judge is not None else labels
+        self._fixed = {0, len(labels) // 2, len(labels) - 1, *({len(labels)} if judge is not None else ())}
+        self._pointed = -1
+        self._row = row
+        self._sizes: Grid | None = None
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """The labels that can be read now, from left to right."""
+        return tuple(self._labels[column] for column in sorted(self.columns()))
+
+    def set_sizes(self, sizes: Grid) -> None:
+        """Take the sizes of the columns."""
+        self._sizes = sizes
+        self.update()
+
+    def point(self, column: int) -> None:
+        """Show the label of ``column`` as well, -1 for none."""
+        if column != self._pointed:
+            self._pointed = column
+            self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        if self._sizes is None:
+            return
+        painter = page_painter(self)
+        painter.setFont(font("label", scale=self._sizes.text, weight=600))
+        flags = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom | Qt.TextFlag.TextWordWrap)
+        for column in self.columns():
+            if column == self._pointed:
+                ink = PARTICIPANT.accent
+            else:
+                ink = PARTICIPANT.text2 if column == POINTS else PARTICIPANT.text
+            painter.setPen(QColor(ink))
+            painter.drawText(self.column_area(column), flags, self._labels[column])
+        painter.end()
+
+    def columns(self) -> set[int]:
+        """Return the columns whose label is drawn: one that leaves the pointed one too little room gives way to it."""
+        if self._pointed < 0:
+            return self._fixed
+        neighbours = {
+            column
+            for column in self._fixed
+            if abs(column - self._pointed) == 1 and POINTS not in (column, self._pointed)
+        }
+        if neighbours and self._sizes is not None:
+            room = self._sizes.cell_pitch
+            if not all(self._fits(column, room) for column in (*neighbours, self._pointed)):
+                return (self._fixed - neighbours) | {self._pointed}
+        return self._fixed | {self._pointed}
+
+    def _fits(self, column: int, width: float) -> bool:
+        """Return whether a label can be read in ``width`` [px] and the height of the heading."""
+        assert self._sizes is not None  # noqa: S101  # asked only when laid out
+        metrics = QFontMetricsF(font("label", scale=self._sizes.text, weight=600))
+        bounds = metrics.boundingRect(QRectF(0, 0, width, 1e4), WRAP_LEFT, self._labels[column])
+        return bounds.width() <= width and bounds.height() <= self.height() + 1
+
+    def _bounds(self, column: int) -> tuple[float, float]:
+        """Return between which places [px] a label stands: those of the scale do not cross the rule at its end."""
+        row = self._row()
+        if row.rule is None or column == POINTS:
+            return 0.0, self.width()
+        return (row.rule, self.width()) if row.columns[POINTS] < row.columns[0] else (0.0, row.rule)
+
+    def column_area(self, column: int) -> QRectF:
+        """Return the room of a label: its column, and on either side as much as it needs, within the row."""
+        assert self._sizes is not None  # noqa: S101  # painted only when laid out
+        left, width = self._row().columns[column]
+        pitch = min(self._sizes.cell_pitch, LABEL_WIDTH * self._sizes.text) if column < POINTS else width
+        wide = next((pitch * share for share in SHARES if self._fits(column, pitch * share)), 2 * pitch)
+        low, high = self._bounds(column)
+        middle = max(min(left + width / 2, high - wide / 2), low + wide / 2)
+        return QRectF(middle - wide / 2, 0, wide, self.height())
 
 
 class QuestionnaireWidget(QuestionsPage):

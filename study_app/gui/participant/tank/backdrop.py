@@ -14,7 +14,7 @@ from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QImage, QLinearGradient, QPainter, QPolygonF, QRadialGradient
 
 from study_app.gui.participant.tank import glass
-from study_app.gui.participant.tank.camera import Box, Camera
+from study_app.gui.participant.tank.frame import Box, Camera
 from study_app.gui.theme.theme import PARTICIPANT
 
 ROOM = ("#0E141A", "#16222C", "#0A1015")

@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QRegion
 
-from study_app.gui.participant.intervals.interval_marks import draw_interval, interval_width
-from study_app.gui.participant.pages.key_caps import draw_key, key_size
-from study_app.gui.participant.pages.page_widget import mirrored, words_scale
-from study_app.gui.participant.pages.progress_line import BEGINNING, draw_progress
+from study_app.gui.participant.intervals.answer_page import draw_interval, interval_width
+from study_app.gui.participant.pages.page_widget import (
+    BEGINNING,
+    draw_key,
+    draw_progress,
+    key_size,
+    mirrored,
+    words_scale,
+)
 from study_app.gui.participant.tank.frame import Placed, TaskShown
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.protocol.model import Explore, Follow, Reach

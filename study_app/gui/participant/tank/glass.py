@@ -19,7 +19,7 @@ from PySide6.QtGui import (
 )
 
 from study_app.gui.participant.tank import caustics
-from study_app.gui.participant.tank.camera import Box, Camera, Point
+from study_app.gui.participant.tank.frame import Box, Camera, Point
 from study_app.gui.theme.theme import TANK
 
 FLOOR_LINES = 10

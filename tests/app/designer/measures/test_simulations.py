@@ -26,7 +26,7 @@ from study_app.authoring.edited_study import read
 from study_app.authoring.measures.planned import ENOUGH
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
-from study_app.gui.participant.page_parts import parts_of
+from study_app.gui.participant.page_widgets import parts_of
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.protocol.checks.expected_precision import imprecise, threshold_plan
 from study_app.protocol.load import load

@@ -15,8 +15,8 @@ from PySide6.QtWidgets import QAbstractButton
 
 from study_app.app.designer.participant.shown_step import StepPosition
 from study_app.app.designer.play import playing
+from study_app.app.failures import Patience
 from study_app.app.session.bridge import SessionBridge
-from study_app.app.session.termination import Patience
 from study_app.authoring.new_study import template
 from study_app.errors import DeviceLost
 from study_app.gui.operator.window import OperatorWindow

@@ -23,8 +23,8 @@ from study_app.gui.designer.form.element_form import FormCard
 from study_app.gui.designer.outline.card import OutlineCard
 from study_app.gui.designer.outline.rows import ROW_ROLE
 from study_app.gui.designer.segments import Segments
-from study_app.gui.participant.intervals.choice_page import ChoiceWidget
-from study_app.gui.participant.pages.key_caps import GoButton
+from study_app.gui.participant.intervals.answer_page import ChoiceWidget
+from study_app.gui.participant.pages.page_widget import GoButton
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.window import ParticipantWindow
 from tests.app.designer.support.inputs import Hand, name_of, wait_until, window_in_front

@@ -15,7 +15,8 @@ from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 
 from study_app import app
-from study_app.app.session import live_session, termination
+from study_app.app import failures
+from study_app.app.session import live_session
 from study_app.authoring.versions.contents import kept_content
 from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError, StudyError
 from study_app.gui.home.startup_window import OpeningWindow
@@ -82,7 +83,7 @@ def test_a_signal_or_a_log_off_leaves_the_session_unfinished_and_resumable(short
         asked = Signal(object)
 
     source, manager = Application(), Manager()
-    monkeypatch.setattr(termination, "log_off_signal", lambda: source.asked)
+    monkeypatch.setattr(failures, "log_off_signal", lambda: source.asked)
     before = signal.getsignal(number or signal.SIGHUP)
 
     def suspend_and_end(_participant):

@@ -1,0 +1,215 @@
+"""How the program ends when something fails: exceptions in slots and threads, signals, crashes."""
+
+import contextlib
+import faulthandler
+import logging
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+from io import FileIO
+from pathlib import Path
+from types import TracebackType
+from typing import Concatenate, ParamSpec, Protocol, TypeVar
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal, SignalInstance
+from PySide6.QtGui import QGuiApplication, QSessionManager
+
+from study_app.errors import SessionError
+from study_app.haptics.runtime.suspension import allow_suspension, refuse_suspension
+
+log = logging.getLogger(__name__)
+
+
+class UncaughtExceptions:
+    """Replaces ``sys.excepthook`` while installed.
+
+    Parameters
+    ----------
+    handle : is called with each exception; if it returns False, the ``previous`` hook is called too
+    """
+
+    def __init__(self, handle: Callable[[BaseException], bool]) -> None:
+        self._handle = handle
+        self.previous = sys.excepthook
+
+    def install(self) -> None:
+        """Replace the hook."""
+        self.previous, sys.excepthook = sys.excepthook, self.hook
+
+    def remove(self) -> None:
+        """Restore the previous hook."""
+        sys.excepthook = self.previous
+
+    def __enter__(self) -> None:
+        """Install."""
+        self.install()
+
+    def __exit__(self, *_: object) -> None:
+        """Remove."""
+        self.remove()
+
+    def hook(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        """Handle an exception; its signature is that of ``sys.excepthook``."""
+        if not self._handle(error):
+            self.previous(kind, error, trace)
+
+
+class ThreadExceptions(QObject):
+    """Replaces ``threading.excepthook`` while installed; ``ended`` says in this object's thread what ended a thread."""
+
+    ended = Signal(str)
+    _ended = Signal(str)
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self._previous = threading.excepthook
+        self._ended.connect(self.ended, Qt.ConnectionType.QueuedConnection)
+
+    def install(self) -> None:
+        """Replace the hook."""
+        self._previous, threading.excepthook = threading.excepthook, self._hook
+
+    def remove(self) -> None:
+        """Restore the previous hook."""
+        threading.excepthook = self._previous
+
+    def _hook(self, what: threading.ExceptHookArgs) -> None:
+        """Log the exception, in the thread that it ended."""
+        name = what.thread.name if what.thread is not None else "unknown"
+        log.error("the thread %r ended: %s", name, what.exc_value, exc_info=what.exc_value)
+        self._ended.emit(f"{name}: {what.exc_type.__name__}: {what.exc_value}")
+
+
+class Failing(Protocol):
+    """An object that handles a failure and ends in zero force."""
+
+    def fail(self, error: BaseException) -> None: ...
+
+
+F = TypeVar("F", bound=Failing)
+P = ParamSpec("P")
+
+
+def guarded(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, P], None]:
+    """Let no exception leave a slot: whatever it is ends in zero force."""
+
+    @wraps(slot)
+    def run(self: F, /, *arguments: P.args, **named: P.kwargs) -> None:
+        try:
+            slot(self, *arguments, **named)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the hand comes first
+            self.fail(error)
+
+    return run
+
+
+def guarded_session_slot(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, P], None]:
+    """As `guarded`, but drop an event that came too late (`SessionError`): it is no failure."""
+
+    @wraps(slot)
+    def run(self: F, /, *arguments: P.args, **named: P.kwargs) -> None:
+        try:
+            slot(self, *arguments, **named)
+        except SessionError as error:
+            log.info("dropped: %s", error)
+
+    return guarded(run)
+
+
+class CrashTrace:
+    """Let `faulthandler` write to ``path`` until `close`; a file that stayed empty is removed then.
+
+    The trace holds names of source files and functions and line numbers, no values. A session runs without it where
+    the file cannot be opened. A resumed session adds to the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._enabled_before = faulthandler.is_enabled()
+        self._file: FileIO | None = None
+        with contextlib.suppress(OSError):
+            self._file = path.open("ab", buffering=0)
+            faulthandler.enable(self._file)
+
+    def close(self) -> None:
+        """Write to the terminal again, if that was so before; it can be called again."""
+        file, self._file = self._file, None
+        if file is None:
+            return
+        faulthandler.disable()
+        if self._enabled_before and sys.__stderr__ is not None:
+            faulthandler.enable(sys.__stderr__)
+        file.close()
+        with contextlib.suppress(OSError):
+            if self._path.stat().st_size == 0:
+                self._path.unlink()
+
+
+HEARTBEAT_MS = 100  # how long a signal may wait to be heard
+BY_SIGNAL_S = 2.0  # how long a program that is ended from outside waits for threads; the force is zero before
+HANG_UP = 1  # the number of SIGHUP, which a log-off counts as everywhere
+
+
+class Patience:
+    """How long several waits may take together [s]."""
+
+    def __init__(self, seconds: float) -> None:
+        self._until_s = time.monotonic() + seconds
+
+    @property
+    def left_s(self) -> float:
+        """What is left of it [s]; never negative."""
+        return max(self._until_s - time.monotonic(), 0.0)
+
+
+def log_off_signal() -> SignalInstance:
+    """Return the signal by which the system asks to keep what is to be kept, before it ends the program."""
+    application = QGuiApplication.instance()
+    assert isinstance(application, QGuiApplication)  # noqa: S101 - whoever shows windows has made it
+    return application.commitDataRequest
+
+
+@contextmanager
+def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
+    """Let Ctrl+C, requests to terminate and a log-off call ``end`` with a signal's number, once.
+
+    Signals are heard from the event loop. A log-off waits for ``end``, and for nothing else. Ctrl-Z does nothing: what
+    pushes would push on.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard: list[int] = []
+
+    def hear(number: int, _frame: object) -> None:
+        if not heard:
+            heard.append(number)
+            QTimer.singleShot(0, lambda: end(number))
+
+    def log_off(manager: QSessionManager) -> None:
+        manager.setRestartHint(QSessionManager.RestartHint.RestartNever)
+        if not heard:
+            heard.append(HANG_UP)
+            end(HANG_UP)
+
+    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    before = {number: signal.signal(number, hear) for number in numbers}
+    logging_off = log_off_signal()
+    refuse_suspension(heard)
+    logging_off.connect(log_off, Qt.ConnectionType.DirectConnection)
+    heart = QTimer()
+    heart.timeout.connect(lambda: None)  # Python hears signals only while it runs; Qt waits outside it
+    heart.start(HEARTBEAT_MS)
+    try:
+        yield
+    finally:
+        heart.stop()
+        allow_suspension(heard)
+        logging_off.disconnect(log_off)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,305 @@
+"""The operator's side of a session: what is shown, what is asked for, and the device connected again."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import QObject, Qt, Signal
+
+from study_app.app.failures import guarded_session_slot
+from study_app.errors import StudyError
+from study_app.gui.operator.header import Strip
+from study_app.gui.operator.plots import ForceCard
+from study_app.gui.operator.watch import WatchedJournal
+from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.session.pages import Page
+from study_app.session.resume import FIRST, Start
+from study_app.session.runner import Runner
+from study_app.session.transitions.events import EndAsked, ForceStopped, Note, PauseAsked, RepeatAsked, ResumeAsked
+from study_app.video.sources import Videos
+from study_app.viewmodels.operator import OperatorView, Session, operator_view
+from study_app.viewmodels.servo_health import Forces, ServoHealth
+
+if TYPE_CHECKING:
+    from study_app.haptics.runtime.servo import Servo
+    from study_app.outlets.session_outlets import Outlets
+    from study_app.session.simulated.observers import Hand
+    from study_app.store.recorder import Recorder
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """The parts of a session, except its windows.
+
+    ``session`` is what the operator sees of it throughout; ``key`` is block → code → condition or track
+    and ``secret`` the sealed key's nonce, never shown; ``start``
+    is where a resumed session goes on. ``exclude`` leaves a trial, or with None the session, out of the analysis for a
+    reason. ``aim_m`` gives where hand or pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse
+    on, None where the device is not the mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
+    ``outlets`` send its events to other programs; ``videos`` are those of the study, None where it shows none.
+    ``reconnect`` opens a device or video that failed again, with the servo at zero force; it may take minutes.
+    """
+
+    session: Session
+    key: Mapping[str, Mapping[str, str]] = field(repr=False)
+    language: str
+    servo: Servo
+    journal: WatchedJournal
+    clock: Callable[[], float]
+    aim_m: Callable[[], tuple[float, float, float]]
+    recorder: Recorder | None = None
+    outlets: Outlets | None = None
+    start: Start = FIRST
+    secret: bytes = field(default=b"", repr=False)
+    exclude: Callable[[int | None, str], None] | None = None
+    point_to: Callable[[float, float, float], None] | None = None
+    press: Callable[[int], None] | None = None
+    hand_for: Callable[[Page], Hand | None] | None = None
+    reconnect: Callable[[], dict[str, Any]] | None = None
+    videos: Videos | None = None
+
+
+class OperatorMonitor:
+    """Looks at servo and hand once a frame; ``forces`` is None, and no force is looked at, in a double-blind study.
+
+    Parameters
+    ----------
+    refresh_hz
+        Frames a second of the participant's screen.
+    """
+
+    def __init__(self, parts: Parts, refresh_hz: float) -> None:
+        self._parts = parts
+        self._reader = parts.servo.telemetry.reader()
+        self._faulty = False
+        self._faults = 0
+        self.health = ServoHealth(parts.servo.rate_hz, refresh_hz)
+        study = parts.session.protocol
+        self.forces = Forces(study.device.force_limit_n) if study.study.blinding == "single" else None
+
+    def look(self) -> None:
+        """Take what the servo did since the last look, and where the hand is."""
+        self._count_faults()
+        samples = self._reader.read()
+        self.health.take(samples)
+        if self.forces is not None:
+            self.forces.take(samples)
+        self.health.hand(self._parts.clock(), self._parts.aim_m())
+
+    def show_traces(self, operator: OperatorWindow) -> None:
+        """Draw the hand's place, at once."""
+
+        def draw() -> None:
+            operator.show_traces(self.health, self._parts.clock())
+            operator.position.plot.paint_now()
+
+        operator.panels.draw(operator.position, draw)
+
+    def show_forces(self, operator: OperatorWindow) -> None:
+        """Draw the force and the wake where they are seen, at once."""
+        forces, card = self.forces, operator.force
+        if forces is None or not isinstance(card, ForceCard):
+            return
+
+        def draw() -> None:
+            operator.show_forces(forces, self._parts.servo.now_ns())
+            for plot in (card.plot, card.wake):
+                plot.paint_now()
+
+        operator.panels.draw(card, draw)
+
+    def show_lateness(self, operator: OperatorWindow) -> None:
+        """Draw how late ticks were, at once."""
+        self.health.overruns = self._parts.servo.overruns
+
+        def draw() -> None:
+            operator.show_lateness(self.health)
+            operator.lateness.plot.paint_now()
+
+        operator.panels.draw(operator.lateness, draw)
+
+    def view(self, trouble: str, stalled: str | None) -> OperatorView:
+        """Return what the operator is to see now; ``stalled`` is why the disk takes nothing, None while it does."""
+        parts = self._parts
+        self._count_faults()
+        return operator_view(
+            parts.session,
+            parts.journal.progress,
+            self.health.vitals(),
+            now_s=parts.clock(),
+            force_on=parts.servo.force_is_on,
+            trouble=trouble or parts.servo.fault or stalled or "",
+            waits=stalled is not None and not trouble,
+            device_ready=not self._faulty,
+            faults=self._faults,
+            rate_hz=parts.servo.rate_hz,
+            forces=None if self.forces is None else self.forces.figures(),
+            lost={one.trial: one.reason for one in parts.recorder.lost} if parts.recorder is not None else {},
+            dropped=parts.recorder.dropped if parts.recorder is not None else 0,
+            outlets_lost=None if parts.outlets is None else parts.outlets.lost,
+        )
+
+    def _count_faults(self) -> None:
+        """Count the servo going from well to faulty."""
+        faulty = self._parts.servo.fault is not None
+        self._faults += faulty and not self._faulty
+        self._faulty = faulty
+
+
+class OperatorRequests(QObject):
+    """Connects the operator's window, and the strip if there is one, to the runner.
+
+    Parameters
+    ----------
+    strip : the state in the participant's window, if both windows share one screen
+    fail : is called with every exception of a request; ends in zero force
+    """
+
+    def __init__(
+        self,
+        parts: Parts,
+        runner: Runner,
+        participant: ParticipantWindow,
+        operator: OperatorWindow,
+        *,
+        strip: Strip | None,
+        fail: Callable[[BaseException], None],
+        parent: QObject,
+    ) -> None:
+        super().__init__(parent)
+        self._parts = parts
+        self._runner = runner
+        self._participant = participant
+        self._operator = operator
+        self._strip = strip
+        self._fail = fail
+        operator.stop_asked.connect(self._stop_force)
+        operator.fade_in_asked.connect(self._resume)
+        operator.resume_asked.connect(self._resume)
+        operator.pause_asked.connect(self._pause)
+        operator.repeat_asked.connect(self._repeat)
+        operator.end_asked.connect(self._end)
+        operator.note_written.connect(self._note)
+        operator.mark_set.connect(self._mark)
+        operator.exclude_asked.connect(self._exclude)
+        if strip is not None:
+            strip.stop_asked.connect(self._stop_force)
+
+    def fail(self, error: BaseException) -> None:
+        """Pass on an exception of a request."""
+        self._fail(error)
+
+    def record_note(self, text: str) -> None:
+        """Write a note to the journal while the session runs; after its end do nothing."""
+        if not self._runner.finished:
+            self._runner.post(Note(self._parts.clock(), "note", text))
+
+    @guarded_session_slot
+    def _stop_force(self) -> None:
+        self._parts.servo.stop_force()  # before anything that could fail or wait for the disk
+        self._runner.post(ForceStopped(self._parts.clock(), "operator"))
+
+    @guarded_session_slot
+    def _resume(self) -> None:
+        self._runner.post(ResumeAsked(self._parts.clock(), "operator"))
+        if self._strip is not None:
+            self._participant.come_forward()
+
+    @guarded_session_slot
+    def _pause(self) -> None:
+        self._runner.post(PauseAsked(self._parts.clock(), "operator"))
+
+    @guarded_session_slot
+    def _repeat(self, reason: str) -> None:
+        self._runner.post(RepeatAsked(self._parts.clock(), reason))
+
+    @guarded_session_slot
+    def _note(self, text: str) -> None:
+        self._runner.post(Note(self._parts.clock(), "note", text))
+
+    @guarded_session_slot
+    def _mark(self) -> None:
+        self._runner.post(Note(self._parts.clock(), "mark", ""))
+
+    @guarded_session_slot
+    def _exclude(self, trial: object, reason: str) -> None:
+        """Exclude a trial or the session; if that fails, the session continues, and a message appears."""
+        if self._parts.exclude is None:
+            return
+        try:
+            self._parts.exclude(trial if isinstance(trial, int) else None, reason)
+        except StudyError as error:
+            self._operator.show_message("It was not excluded", f"{error}.")
+        else:
+            what = f"trial {trial}" if isinstance(trial, int) else "the session"
+            self.record_note(f"excluded from the analysis: {what}: {reason}")
+
+    @guarded_session_slot
+    def _end(self, status: str, reason: str) -> None:
+        self._runner.post(EndAsked(self._parts.clock(), "withdrawn" if status == "withdrawn" else "aborted", reason))
+
+
+PATIENCE_S = 20.0
+
+
+class Reconnection(QObject):
+    """Runs ``reconnect`` in a thread, once at a time.
+
+    ``connected(described)`` or ``failed(error)`` comes in the thread of this object; ``line`` is what to show: what is
+    being done, or why it failed.
+
+    Parameters
+    ----------
+    reconnect
+        Opens and homes the device and starts its servo at zero force; returns what describes it.
+    """
+
+    connected = Signal(object)
+    failed = Signal(object)
+    _over = Signal(object)
+
+    def __init__(self, reconnect: Callable[[], dict[str, Any]]) -> None:
+        super().__init__()
+        self._reconnect = reconnect
+        self._thread: threading.Thread | None = None
+        self.line = ""
+        self._over.connect(self._end, Qt.ConnectionType.QueuedConnection)
+
+    @property
+    def under_way(self) -> bool:
+        """Whether the device is being connected."""
+        return self._thread is not None
+
+    def begin(self) -> None:
+        """Begin, unless it is under way."""
+        if self._thread is None:
+            self.line = "Connecting the device …"
+            self._thread = threading.Thread(target=self._run, name="reconnecting", daemon=True)
+            self._thread.start()
+
+    def wait(self, patience_s: float = PATIENCE_S) -> bool:
+        """Wait until the device is left alone, for whoever closes it must be its only user; return whether it is."""
+        if self._thread is None:
+            return True
+        self._thread.join(patience_s)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        try:
+            made: object = self._reconnect()
+        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
+            made = error
+        self._over.emit(made)
+
+    def _end(self, made: object) -> None:
+        self._thread, self.line = None, ""
+        if not isinstance(made, Exception):
+            self.connected.emit(made)
+            return
+        why = str(made) if isinstance(made, StudyError) else f"{type(made).__name__}: {made}"
+        self.line = f"Not connected: {why}."
+        self.failed.emit(made)

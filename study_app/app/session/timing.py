@@ -1,0 +1,177 @@
+"""What keeps frames on time: the rest of a frame for drawing, collection in one thread, the thread's priority."""
+
+import ctypes
+import gc
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Final
+
+from PySide6.QtCore import QTimer
+
+from study_app.haptics.runtime.clocks.rtkit import make_high_priority
+
+MOST_PERIODS: Final = 4  # so long a work waits for room; then it is done without
+MOST_SHARE: Final = 0.15  # of the time that a work may take: what takes longer is done less often
+FORGETS: Final = 0.9  # what a work took at worst is forgotten by so much each time
+
+
+@dataclass(slots=True)
+class DeferredTask:
+    """A recurring task; ``took_ns`` is its longest recent duration."""
+
+    do: Callable[[], object]
+    period_ns: int
+    done_ns: int | None = None
+    took_ns: int = 0
+
+    def waits_ns(self, now_ns: int) -> int:
+        """Return how long it is overdue; negative where it is not due."""
+        if self.done_ns is None:
+            return self.period_ns
+        return now_ns - self.done_ns - max(self.period_ns, round(self.took_ns / MOST_SHARE))
+
+
+class FrameBudget:
+    """Does works when they are due and there is room for them.
+
+    Parameters
+    ----------
+    works : what is to be done and how often [s], the most urgent first
+    """
+
+    def __init__(
+        self, works: Sequence[tuple[Callable[[], object], float]], now_ns: Callable[[], int] = time.perf_counter_ns
+    ) -> None:
+        self.tasks = [DeferredTask(do, round(period_s * 1e9)) for do, period_s in works]
+        self._now_ns = now_ns
+
+    def use(self, until_ns: int) -> None:
+        """Do what is due and will be done by ``until_ns``; of what has waited too long for that, one thing."""
+        hurried = False
+        for work in self.tasks:
+            now_ns = self._now_ns()
+            waited_ns = work.waits_ns(now_ns)
+            if waited_ns < 0:
+                continue
+            if now_ns + work.took_ns > until_ns:
+                if hurried or waited_ns < MOST_PERIODS * work.period_ns:
+                    continue
+                hurried = True
+            self._do(work, now_ns)
+
+    def _do(self, work: DeferredTask, began_ns: int) -> None:
+        work.done_ns = began_ns
+        work.do()
+        work.took_ns = max(self._now_ns() - began_ns, round(FORGETS * work.took_ns))
+
+
+PERIOD_MS = 200
+YOUNG, OLDEST = 1, 2  # generations; collecting up to the first takes no time
+LONG_S = 0.02
+MOST_FROZEN = 500_000  # objects; the modules of home, designer, lab and session have 170 000
+_session_runs = threading.Event()
+
+
+def collect_if_due() -> int | None:
+    """Collect the oldest generation that is due by the interpreter's own thresholds; return it, or None."""
+    due = [count > limit > 0 for count, limit in zip(gc.get_count(), gc.get_threshold(), strict=True)]
+    if not any(due):
+        return None
+    oldest = max(generation for generation, is_due in enumerate(due) if is_due)
+    gc.collect(oldest)
+    return oldest
+
+
+def _collect() -> None:
+    """Collect what is due; pass over all there is once that took long, up to a bound between sessions."""
+    began_s = time.thread_time()
+    if collect_if_due() == OLDEST and time.thread_time() - began_s > LONG_S:
+        gc.freeze()
+        if not _session_runs.is_set() and gc.get_freeze_count() > MOST_FROZEN:
+            gc.unfreeze()
+
+
+def freeze_garbage() -> None:
+    """Skip all present objects until `unfreeze_garbage`, after collecting the youngest garbage.
+
+    A collection of all objects of a session takes as long as several frames; one of later objects hardly any time.
+    """
+    _session_runs.set()
+    gc.collect(YOUNG)
+    gc.freeze()
+
+
+def unfreeze_garbage() -> None:
+    """Look at everything again when a collection is due."""
+    _session_runs.clear()
+    gc.unfreeze()
+
+
+@contextmanager
+def collecting_here() -> Iterator[None]:
+    """Collect in this thread, which runs Qt's event loop, and in no other."""
+    before = gc.isenabled()
+    gc.disable()
+    timer = QTimer()
+    timer.timeout.connect(_collect)
+    timer.start(PERIOD_MS)
+    try:
+        yield
+    finally:
+        timer.stop()
+        unfreeze_garbage()
+        if before:
+            gc.collect()
+            gc.enable()
+
+
+NICE: Final = -10
+ABOVE_NORMAL, NORMAL = 1, 0  # of Windows' threads
+
+
+class ThreadPriority:
+    """Puts the thread that calls it before others, and back."""
+
+    def __init__(self) -> None:
+        self._before: int | None = None
+
+    def raise_priority(self) -> bool:
+        """Let this thread go before those of other programs; return whether the system let it."""
+        if sys.platform == "win32":
+            return _prefer(ABOVE_NORMAL)
+        if sys.platform == "darwin":
+            return True  # the thread of windows is interactive there as it is
+        thread = threading.get_native_id()
+        before = os.getpriority(os.PRIO_PROCESS, thread)
+        try:
+            os.setpriority(os.PRIO_PROCESS, thread, NICE)
+        except PermissionError:
+            try:
+                make_high_priority(thread, NICE)
+            except OSError:
+                return False
+        self._before = before
+        return True
+
+    def restore(self) -> None:
+        """Let this thread be one among others again."""
+        if sys.platform == "win32":
+            _prefer(NORMAL)
+        elif sys.platform != "darwin" and self._before is not None:
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), self._before)
+            self._before = None
+
+
+def _prefer(level: int) -> bool:
+    """Set the priority of this thread on Windows."""
+    windows = getattr(ctypes, "windll", None)
+    if windows is None:
+        return False
+    kernel = windows.kernel32
+    kernel.GetCurrentThread.restype = ctypes.c_void_p
+    return bool(kernel.SetThreadPriority(ctypes.c_void_p(kernel.GetCurrentThread()), level))

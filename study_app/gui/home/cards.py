@@ -1,0 +1,415 @@
+"""The cards of the home page: studies, sessions, the interrupted session, device and lab."""
+
+import math
+from collections.abc import Sequence
+from datetime import datetime
+from itertools import pairwise
+from pathlib import Path
+from typing import TypeAlias
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPaintEvent, QPen, QRadialGradient
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QSpacerItem, QWidget
+
+from study_app.gui.sessions.sessions_table import SessionsTable
+from study_app.gui.theme.theme import RADIUS_CARD, TANK, font
+from study_app.gui.theme.themed import Themed, remove_widget
+from study_app.gui.widgets.boxes import add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon
+from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
+from study_app.gui.widgets.labels import Clamped, Elided, label, set_ink
+from study_app.number_text import counted
+from study_app.viewmodels.devices import DeviceShown
+from study_app.viewmodels.home import BrokenFacts, DraftFacts, Interrupted, StudyFacts
+from study_app.viewmodels.session import Column
+from study_app.viewmodels.sessions import KINDS, SessionFacts
+
+PICTURE, INSET = 56, 8
+WAKE_POINTS = 48
+
+
+class DeviceCard(Card):
+    """What sessions begin with, whether it can be felt with now, and the screens."""
+
+    devices_asked = Signal()
+    display_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=20, gap=8)
+        self.icon = Icon("device", "text2", 22)
+        self.name = label("", "card")
+        self.state = Chip(small=True)
+        add_layout(self.column, hbox(self.icon, (self.name, 1), self.state, spacing=10))
+        self.about, self.why, self.screens = (label("", "label", "text2", wraps=True) for _ in range(3))
+        for line in (self.about, self.why, self.screens):
+            line.setFont(font("label", weight=400, tabular=True))
+            self.column.addWidget(line)
+        self.devices = ActionButton("", "Devices", height=38)
+        self.display = ActionButton("", "Display test", height=38)
+        self.devices.clicked.connect(self.devices_asked)
+        self.display.clicked.connect(self.display_asked)
+        add_parts(self.column, 4, hbox((self.devices, 1), (self.display, 1), spacing=12))
+
+    def show_device(self, shown: DeviceShown) -> None:
+        self.icon.show_icon(shown.icon, "text2")
+        self.name.setText(shown.title)
+        self.state.show_state(shown.tone, shown.sign, shown.word)
+        for line, words in ((self.about, shown.can), (self.why, shown.why)):
+            line.setText(words)
+            line.setVisible(bool(words))
+        set_ink(self.why, "warn" if shown.tone == "warn" else "bad" if shown.tone == "bad" else "text2")
+
+    def show_screens(self, lines: tuple[str, ...]) -> None:
+        self.screens.setText("\n".join(lines))
+
+
+class LabCard(Card):
+    """The way into the liquid lab, under a picture of a ball and its wake, which is lower in a low window."""
+
+    lab_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=20, gap=6)
+        self._picture = QSpacerItem(0, PICTURE - INSET, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Maximum)
+        self.column.addSpacerItem(self._picture)
+        about = label(
+            "Tune a liquid by feel and save it.", "label", "text2"
+        )  # a line that wraps keeps the picture high
+        about.setFont(font("label", weight=400))
+        self.open = ActionButton("", "Open", height=38)
+        self.open.setAccessibleName("Open the liquid lab")
+        self.open.clicked.connect(self.lab_asked)
+        add_layout(self.column, hbox((vbox(label("Liquid lab", "card"), about, spacing=4), 1), self.open))
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        body = QRectF(self.rect()).adjusted(SHADOW, SHADOW - 1, -SHADOW, -SHADOW - 1).adjusted(1, 1, -1, -1)
+        card = QPainterPath()
+        card.addRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
+        painter.setClipPath(card)
+        water = QRectF(body.left(), body.top(), body.width(), self._picture.geometry().height() + INSET)
+        depth = QLinearGradient(water.topLeft(), water.bottomLeft())
+        depth.setColorAt(0, QColor(TANK.water_light))
+        depth.setColorAt(1, QColor(TANK.water_light).darker(200))
+        painter.fillRect(water, depth)
+        _paint_wake(painter, water)
+
+
+def _paint_wake(painter: QPainter, water: QRectF) -> None:
+    """Paint a wake that thickens and brightens toward the ball at its newest end."""
+    points = [
+        QPointF(
+            water.left() + water.width() * (0.08 + 0.74 * share),
+            water.center().y() + 0.16 * water.height() * math.sin(5.6 * share + 0.4),
+        )
+        for share in (k / WAKE_POINTS for k in range(WAKE_POINTS + 1))
+    ]
+    ink = QColor(TANK.lit)
+    for k, (start, end) in enumerate(pairwise(points)):
+        share = k / WAKE_POINTS
+        ink.setAlphaF(0.15 + 0.8 * share)
+        painter.setPen(QPen(ink, 1.0 + 3.0 * share, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.drawLine(start, end)
+    middle, radius = points[-1], min(13.0, 0.4 * water.height())
+    light = QRadialGradient(middle - QPointF(4, 5), 1.6 * radius)
+    light.setColorAt(0, QColor(TANK.proxy_light))
+    light.setColorAt(0.5, QColor(TANK.proxy))
+    light.setColorAt(1, QColor(TANK.proxy).darker(190))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(light)
+    painter.drawEllipse(middle, radius, radius)
+
+
+class ResumeBanner(Themed, QWidget):
+    """A tinted strip; hidden while there is nothing to go on with. ``resume_asked`` carries the session."""
+
+    resume_asked = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._shown: Interrupted | None = None
+        self.heading = label("", "strong", "text", wraps=True)
+        self.line = label("", "label", "warn", wraps=True)
+        self.resume = ActionButton("play", "Resume", role="primary")
+        self.resume.clicked.connect(lambda: self.resume_asked.emit(self._shown))
+        words = vbox(self.heading, self.line, spacing=4)
+        margins = (SHADOW + 22, 14, SHADOW + 18, 14)
+        hbox(Icon("clock", "warn", 26), (words, 1), self.resume, spacing=18, margins=margins, parent=self)
+        self.hide()
+
+    def show_interrupted(self, session: Interrupted | None) -> None:
+        """Offer to go on with a session, or nothing."""
+        self._shown = session
+        self.setVisible(session is not None)
+        if session is None:
+            return
+        self.heading.setText(session.heading)
+        self.line.setText(session.line)
+        self.resume.show_action("play", f"Resume {session.participant}")
+        self.resume.setAccessibleName(f"Resume {session.participant}")
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(self.theme.warn_bg))
+        strip = QRectF(self.rect()).adjusted(SHADOW, 0, -SHADOW, 0)
+        painter.drawRoundedRect(strip, RADIUS_CARD, RADIUS_CARD)
+
+
+COLUMNS = (
+    Column("participant", "Participant", 110, 62),
+    Column("study", "Study", 130, 72),
+    Column("started", "Started", 140, 74),
+    Column("status", "Status", 140, 136),
+    Column("validity", "Validity", 130, 134),
+    Column("answers", "Answers", 80, 78),
+)
+EVERY = "every"
+NONE = {
+    "": "No sessions of participants yet. The first one appears here when it begins.",
+    "pilot": "No pilot sessions.",
+    "simulated": "No simulated sessions.",
+    "sample": "No sample sessions.",
+    EVERY: "No sessions yet. The first one appears here when it begins.",
+}
+
+
+class SessionsCard(Card):
+    """The table, newest first; a row that needs care stands above all.
+
+    ``all_asked`` is for all results, ``open_asked`` carries the `SessionFacts` of a session.
+    """
+
+    all_asked = Signal()
+    open_asked = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__(gap=8, padding=20)
+        self.column.setContentsMargins(14, self.column.contentsMargins().top(), 14, 14)
+        self._found: tuple[SessionFacts, ...] = ()
+        self._now = datetime.now().astimezone()
+        self.where = Elided("small", "text2")
+        self.kind = Choice()
+        self.kind.setAccessibleName("Sessions shown")
+        self.kind.setFont(font("label"))
+        self.kind.setProperty("dense", "true")
+        self.kind.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToContents)
+        self.details = ActionButton("file", "Details", role="plain", height=34)
+        self.all = ActionButton("chevron", "All results", role="plain", height=34)
+        self.all.clicked.connect(self.all_asked)
+        parts = (label("Sessions", "card"), self.kind, (self.where, 1), self.details, self.all)
+        self.rows = SessionsTable(COLUMNS, NONE[""])
+        add_parts(self.column, hbox(*parts, spacing=12, margins=(12, 0, 12, 0)), (self.rows, 1))
+        self.none = self.rows.none
+        self.kind.currentIndexChanged.connect(self._filter)
+        self.rows.opened.connect(self.open_asked)
+        self.rows.chosen_changed.connect(lambda: self.details.setEnabled(self.rows.chosen is not None))
+        self.details.clicked.connect(self.rows.open_chosen)
+        self.details.setEnabled(False)
+        self.details.setAccessibleName("Details of the selected session")
+        self._show_kinds()
+        self.setMinimumHeight(200)
+
+    @property
+    def shown(self) -> tuple[SessionFacts, ...]:
+        """The sessions whose rows stand there."""
+        return self.rows.shown
+
+    def show_sessions(self, found: Sequence[SessionFacts], where: str, now: datetime) -> None:
+        """Show these sessions in place of those before; ``where`` names the results folder."""
+        self._found, self._now = tuple(found), now
+        self.where.show_text(f"in {where}")
+        self._show_kinds()
+        self.rows.show_rows(self._found, now)
+        self._filter()
+
+    def show_kind(self, kind: str) -> None:
+        """Show the sessions of a kind: "" for participants', one of `KINDS`, or `EVERY`."""
+        self.kind.setCurrentIndex(self.kind.findData(kind))
+
+    def _show_kinds(self) -> None:
+        chosen = self.kind.currentData() or ""
+        with QSignalBlocker(self.kind):
+            self.kind.clear()
+            for kind, words in KINDS.items():
+                count = sum(one.kind == kind for one in self._found)
+                self.kind.addItem(f"{words} ({count})", kind)
+            self.kind.addItem(f"All ({len(self._found)})", EVERY)
+            self.kind.setCurrentIndex(self.kind.findData(chosen))
+
+    def _filter(self) -> None:
+        kind = str(self.kind.currentData() or "")
+        self.rows.show_matching(lambda one: kind in (one.kind, EVERY))
+        hidden = [
+            counted(count, f"{other or 'participant'} session")
+            for other in KINDS
+            if (count := sum(one.kind == other for one in self._found))
+        ]
+        self.none.setText(f"{NONE[kind]} Not shown: {', '.join(hidden)}." if hidden else NONE[kind])
+
+
+LEAST_WIDTH = 330
+GAP = 18
+TITLE_LINES, ABOUT_LINES = 2, 2
+Facts: TypeAlias = StudyFacts | BrokenFacts | DraftFacts
+
+
+class FileCard(Card):
+    """A study: its title, where it is from, and its draft where one was not saved; ``edit`` carries its facts.
+
+    Parameters
+    ----------
+    facts
+        What is said of it.
+    title
+        What it is called; of two lines at most.
+    copies
+        Whether it is not edited but copied.
+    first
+        Whether its draft is the one that was edited last.
+    sign
+        An icon before the title, "" for none.
+    """
+
+    edit = Signal(object)
+
+    def __init__(self, facts: Facts, title: str, *, copies: bool = False, first: bool = False, sign: str = "") -> None:
+        super().__init__(padding=20, gap=8)
+        self.facts = facts
+        self.title = Clamped(title, TITLE_LINES, "card", steady=False)
+        self.title.setFont(font("card", scale=1.12))
+        head = hbox(spacing=8)
+        if sign:
+            head.addWidget(Icon(sign, "warn", 20), 0, Qt.AlignmentFlag.AlignTop)
+        head.addWidget(self.title, 1)
+        self.origin = Elided("small", "text2")
+        self.origin.show_text(f"{facts.origin}  ·  {Path(facts.source).stem}.toml")
+        top = hbox((vbox(head, self.origin, spacing=2), 1))
+        add_layout(self.column, top)
+        self.draft = label("" if facts.draft is None else f"{facts.draft.words}.", "small", "warn", wraps=True)
+        self.pen: ActionButton | IconButton
+        if facts.draft is None:
+            word, name = ("Make a copy", f"Make a copy of {title}") if copies else ("Edit", f"Edit {title}")
+            self.pen = IconButton("copy" if copies else "pen", name, word, size=36, role="plain")
+            top.addWidget(self.pen, 0, Qt.AlignmentFlag.AlignTop)
+            self.draft.hide()
+        else:
+            self.pen = ActionButton("pen", "Continue", role="primary" if first else "", height=38)
+            self.pen.setAccessibleName(f"Continue {title}, {Path(facts.source).stem}")
+            row = hbox((self.draft, 1, Qt.AlignmentFlag.AlignTop), (self.pen, 0, Qt.AlignmentFlag.AlignTop), spacing=12)
+            add_layout(self.column, row)
+        self.pen.clicked.connect(lambda: self.edit.emit(facts))
+
+
+class StudyCard(FileCard):
+    """A study that can be run; ``new_session`` and ``rehearsal`` carry its facts.
+
+    ``shipped`` says that it ships with the program, ``first`` that it is what one most likely goes on with.
+    """
+
+    new_session = Signal(object)
+    rehearsal = Signal(object)
+
+    def __init__(self, facts: StudyFacts, *, first: bool, shipped: bool = False) -> None:
+        super().__init__(facts, facts.title, copies=shipped, first=first)
+        self.facts: StudyFacts = facts
+        if facts.draft is None:
+            self.column.addWidget(Clamped(facts.description or facts.title, ABOUT_LINES, "body", "text2"))
+        else:
+            self.draft.setText(f"{facts.draft.words}. Sessions use the saved file.")
+        self.column.addStretch()
+        time = f"{facts.duration}  ·  {facts.languages}"
+        for icon, words in (("layers", facts.extent), ("clock", time), ("device", facts.needs)):
+            add_layout(self.column, hbox(Icon(icon, "text2", 18), (label(words, "body"), 1), spacing=10))
+        self.held = label("", "label", "text2")
+        self.column.addWidget(self.held)
+        self.new = ActionButton("plus", "New session", role="primary" if first and facts.draft is None else "")
+        self.rehearse = ActionButton("fast_forward", "Rehearse")
+        self.new.setAccessibleName(f"New session of {facts.title}, {facts.file_name}")
+        self.rehearse.setAccessibleName(f"Rehearse {facts.title}, {facts.file_name}")
+        self.new.clicked.connect(lambda: self.new_session.emit(facts))
+        self.rehearse.clicked.connect(lambda: self.rehearsal.emit(facts))
+        add_layout(self.column, hbox((self.new, 1), (self.rehearse, 1), spacing=12))
+
+
+class BrokenCard(FileCard):
+    """A protocol file that cannot be used, and why, or a study without a file."""
+
+    def __init__(self, facts: BrokenFacts | DraftFacts, *, first: bool = False) -> None:
+        if isinstance(facts, DraftFacts):
+            super().__init__(facts, facts.title, first=first)
+            why = f"{Path(facts.source).name} is written when it is saved."
+        else:
+            super().__init__(facts, Path(facts.source).stem, first=first, sign="warning")
+            self.column.addWidget(label("This file cannot be used.", "strong", "warn"))
+            why = facts.problem
+        said = label(why, "label", "text2", wraps=True)
+        said.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.column.addWidget(said, 1)
+
+
+class CardGrid(QWidget):
+    """The cards side by side, as many in a row as there is room for; ``laid_out`` comes when heights may differ."""
+
+    laid_out = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.cards: list[QWidget] = []
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setSpacing(GAP)
+        self._across, self._least = 0, LEAST_WIDTH
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+
+    @property
+    def row_height(self) -> int:
+        """The height of the first row of cards at the width that they have."""
+        wide = (self.width() - self._grid.contentsMargins().right() + GAP) // max(1, self._across) - GAP
+        heights = (
+            card.heightForWidth(wide) if card.hasHeightForWidth() else card.sizeHint().height()
+            for card in self.cards[: self._across]
+        )
+        return max(heights, default=0)
+
+    @property
+    def whole_height(self) -> int:
+        """The height of all rows at the width that they have."""
+        grows = self._grid.hasHeightForWidth()
+        return self._grid.totalHeightForWidth(self.width()) if grows else self._grid.totalSizeHint().height()
+
+    def show_cards(self, cards: list[QWidget]) -> None:
+        for card in self.cards:
+            remove_widget(card)
+        self.cards = cards
+        self._across = 0
+        self._least = max([LEAST_WIDTH, *(card.minimumSizeHint().width() for card in cards)])
+        self.arrange(self.width())
+
+    def leave_room(self, width: int) -> None:
+        """Leave so much room free at the right."""
+        self._grid.setContentsMargins(0, 0, width, 0)
+
+    def event(self, event: QEvent) -> bool:
+        """Tell when cards came that are shown now."""
+        done = super().event(event)
+        if event.type() == QEvent.Type.LayoutRequest:
+            self.laid_out.emit()
+        return done
+
+    def arrange(self, width: int) -> None:
+        """Place the cards for a window that leaves them ``width``; a lone card does not stretch over it."""
+        across = max(1, (width + GAP) // (self._least + GAP))
+        if across == self._across:
+            return
+        for column in range(self._grid.columnCount()):
+            self._grid.setColumnStretch(column, 0)
+        self._across = across
+        for index, card in enumerate(self.cards):
+            self._grid.addWidget(card, index // across, index % across)
+        for column in range(min(across, max(2, len(self.cards)))):
+            self._grid.setColumnStretch(column, 1)
+        self._grid.activate()  # at once, or what is above keeps the room of the arrangement before

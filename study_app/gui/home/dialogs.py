@@ -1,0 +1,497 @@
+"""The dialogs of the home page: a new session, a rehearsal, the workspace. Nothing is created before one accepts."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QDialog, QFileDialog, QGridLayout, QLineEdit, QProgressBar, QWidget
+
+from study_app.devices.registry import descriptor_of, list_devices
+from study_app.errors import StoreError, StudyError
+from study_app.gui.display.screens import screens_shown
+from study_app.gui.kit.fields import Editor, Field, choice, seed
+from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.theme.themed import apply_theme
+from study_app.gui.widgets.background import Background
+from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
+from study_app.gui.widgets.cards import Icon, Rule, scrolled
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.dialogs import Question
+from study_app.gui.widgets.labels import label, set_ink
+from study_app.protocol.groups import refuse_beyond_last
+from study_app.protocol.model import Protocol
+from study_app.protocol.wording.languages import language_name
+from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
+from study_app.session.start import MAX_SEED, NewSession, check_row, draw_seed, study_results
+from study_app.store.blinded.blinding import check_conditions
+from study_app.store.folders import StudyFolder, rehearsal_folder
+from study_app.store.sessions.begin import MAX_SESSION, UsedIds, check_participant, used_ids
+from study_app.store.tables.study_files import check_study
+from study_app.store.workstation import DEFAULTS, MachineSettings
+from study_app.viewmodels.devices import device_label, device_or_default, window_options
+from study_app.viewmodels.home import StudyFacts
+from study_app.workers.client import WorkerClient
+from study_app.workspace import workspace
+
+MAX_PARTICIPANTS = 200
+LISTEN_MS = 40
+
+
+class RehearsalDialog(QDialog):
+    """How many simulated participants, then how far it is, then the way to their results; Cancel keeps whole sessions.
+
+    It is accepted when the results are to be shown.
+
+    Parameters
+    ----------
+    facts
+        The protocol.
+    results
+        Folder that holds the studies' folders; the rehearsal gets one of its own.
+    """
+
+    def __init__(
+        self, facts: StudyFacts, results: Path, *, theme: Theme = LIGHT, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Rehearse")
+        self.setModal(True)
+        self.setMinimumWidth(520)
+        self._facts = facts
+        self.folder = rehearsal_folder(results, facts.protocol.study.name)
+        self.participants = Editor(
+            Field("participants", "Simulated participants", "count", limits=(1, MAX_PARTICIPANTS))
+        )
+        self.seed = Editor(Field("seed", "Seed", "count", limits=(0, MAX_SEED)))
+        self.participants.show_value(5)
+        self.seed.show_value(1)
+        self.said = label(
+            "Whole sessions run faster than real time, with simulated participants. "
+            f"They are marked as simulated and stored separately, in {self.folder}.",
+            "body",
+            "text2",
+            wraps=True,
+        )
+        self.progress = QProgressBar()
+        self.progress.setRange(0, 0)
+        self.progress.setTextVisible(False)
+        self.progress.setFixedHeight(8)
+        self.progress.hide()
+        self.start = ActionButton("fast_forward", "Rehearse", role="primary")
+        self.cancel = ActionButton("", "Cancel")
+        self.start.setDefault(True)
+        self.worker: RehearsalClient | None = None
+        self._done: list[str] = []
+        self._stopping = False
+        self.over = False
+        row, foot = hbox((self.participants, 1), (self.seed, 1), spacing=16), hbox(self.cancel, STRETCH, self.start)
+        title = label(f"Rehearse {facts.title}", "title_dense")
+        vbox(title, self.said, row, self.progress, 6, foot, spacing=12, margins=(28, 24, 28, 24), parent=self)
+        apply_theme(self, theme)
+        self.start.clicked.connect(self._start)
+        self.cancel.clicked.connect(self.reject)
+        self._listening = QTimer(self)
+        self._listening.setInterval(LISTEN_MS)
+        self._listening.timeout.connect(self._listen)
+
+    def _start(self) -> None:
+        if self.over:
+            self.accept()
+            return
+        if self.worker is not None:
+            return
+        for field in (self.participants, self.seed, self.start):
+            field.setEnabled(False)
+        self.progress.setRange(0, self.participants.value)
+        self.progress.show()
+        self._show_done()
+        try:
+            self.worker = WorkerClient(TASK, name="rehearsal")
+        except OSError as error:
+            self._fail(str(error))
+            return
+        self.worker.order(RehearsalOrder(self._facts.source, self.participants.value, self.seed.value, self.folder))
+        self._listening.start()
+
+    def _listen(self) -> None:
+        """Take the answers since; where the rehearsal is to stop, close once its process has ended."""
+        assert self.worker is not None  # noqa: S101 - listening begins with it
+        if self._stopping:
+            if self.worker.ended:
+                self._listening.stop()
+                super().reject()
+            return
+        for _, answer in self.worker.answers():
+            if isinstance(answer, str):
+                self._done.append(answer)
+                self._show_done()
+            elif isinstance(answer, Path):
+                self._finish()
+            else:
+                self._fail(answer.sentence)
+
+    def _show_done(self) -> None:
+        """Show how many participants are done, and what was said of the last one."""
+        self.progress.setValue(len(self._done))
+        counted = f"{len(self._done)} of {self.participants.value}"
+        self.said.setText(f"{counted}: {self._done[-1]}" if self._done else f"{counted}: rehearsing …")
+
+    def _finish(self) -> None:
+        self._let_go()
+        self.over = True
+        self.said.setText(f"Done: {self.participants.value} simulated sessions, stored in {self.folder}.")
+        self.start.show_action("", "Open results")
+        self.start.setEnabled(True)
+        self.start.setFocus()
+        self.cancel.setText("Close")
+
+    def _fail(self, sentence: str) -> None:
+        self._let_go()
+        self.said.setText(sentence)
+        set_ink(self.said, "bad")
+        self.cancel.setText("Close")
+
+    def _let_go(self) -> None:
+        """Have the process end that has nothing to do any more."""
+        self._listening.stop()
+        self.progress.hide()
+        if self.worker is not None:
+            self.worker.close()
+
+    def reject(self) -> None:
+        """Have the rehearsal stop, if it runs, and close once it has."""
+        if self.worker is None or not self.worker.works:
+            super().reject()
+        elif not self._stopping:
+            self._stopping = True
+            self.cancel.setEnabled(False)
+            self.said.setText("Stopping …")
+            self.worker.close()
+
+    def end(self) -> None:
+        """Stop the rehearsal and wait for it: the windows are gone."""
+        if self.worker is not None:
+            self._stopping = True
+            self._listening.stop()
+            self.worker.close()
+            self.worker.wait_until_ended()
+
+
+FRAME = 60  # of a window, at most
+INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
+ROW_HINT = "the session takes that participant's row of the square; empty: its own row"
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFolderState:
+    """A study's folder when it was read: which ids are used, and why no session of the study can be put there."""
+
+    path: Path
+    used: UsedIds
+    fault: str
+
+
+def read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState:
+    """Read the folder of a study; a folder that cannot be used has a ``fault``."""
+    folder, fault = StudyFolder(path), ""
+    used = UsedIds(path, frozenset(), ())
+    try:
+        check_study(folder, protocol.study.name)
+        used = used_ids(folder)
+        check_conditions(path, protocol)
+    except StoreError as error:
+        fault = str(error)
+    return StudyFolderState(path, used, fault)
+
+
+class NewSessionDialog(QDialog):
+    """Asks who, with which seed, in which language, on which device and screen.
+
+    Parameters
+    ----------
+    facts
+        The protocol to run.
+    results
+        Folder that holds the studies' folders; the study's own is suggested.
+    machine
+        What is set for this machine: device, its options and screen to begin with.
+    """
+
+    def __init__(
+        self,
+        facts: StudyFacts,
+        results: Path,
+        *,
+        machine: MachineSettings = DEFAULTS,
+        theme: Theme = LIGHT,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.facts, self._all_results = facts, results
+        self._state: StudyFolderState | None = None
+        self._reader = Background(self)
+        self._reader.done.connect(self._take_state)
+        self.setWindowTitle("New session")
+        self.setModal(True)
+        self.setMinimumWidth(736)
+        self.verdict_icon, self.verdict = Icon("check", "ok", 18), label("", "label", "ok", wraps=True)
+        self._free = 1, ""
+        self._windowed_without_pilot = False
+        self.ways = another, new = ActionButton("", "", height=34), ActionButton("", "", height=34)
+        self.begin = ActionButton("play", "Begin", role="primary", height=46)
+        self.cancel = ActionButton("", "Cancel", height=46)
+        self._make_editors(machine)
+        self._lay_out()
+        apply_theme(self, theme)
+        for name, editor in self.editors.items():
+            editor.edited.connect({"device": self._choose_device, "pilot": self._choose_pilot}.get(name, self._check))
+        another.clicked.connect(lambda: self.editors["session"].show_value(self._free[0]))
+        new.clicked.connect(lambda: self.editors["participant"].show_value(self._free[1]))
+        self.begin.clicked.connect(self.accept)
+        self.cancel.clicked.connect(self.reject)
+        self._check()
+        participant = self.editors["participant"].control
+        assert isinstance(participant, QLineEdit)  # noqa: S101 - an id is typed
+        participant.setFocus()
+        participant.selectAll()
+
+    def _make_editors(self, machine: MachineSettings) -> None:
+        study, screens, device = self.facts.protocol.study, screens_shown(), device_or_default(machine.device)
+        self._suggested = str(study_results(self._all_results, study.name, device))
+        devices = dict.fromkeys((*list_devices(), device))
+        languages = {code: language_name(code) for code in study.languages}
+        fields = (
+            Field("participant", "Participant", aside="letters and digits, no name"),
+            Field("session", "Session", "count", limits=(1, MAX_SESSION)),
+            seed("determines every order; recorded"),
+            Field("operator", "Operator", longest=40, placeholder="Initials, such as AK"),
+            choice("language", "Language of the participant's pages", languages),
+            choice("device", "Device", {name: device_label(name) for name in devices}),
+            choice(
+                "screen", "Participant's screen", {one.number: f"Screen {one.number}: {one.words}" for one in screens}
+            ),
+            Field("windowed", "In a window instead of full screen", "check"),
+            Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
+            Field("results", "Results folder of this study", "folder"),
+            Field("row_of", "Replaces participant", aside=ROW_HINT, parse=lambda text: text or None),
+            *(
+                Field(
+                    option.name, option.title, "file" if option.file_filter else "line", aside=option.hint,
+                    placeholder=option.placeholder, file_filter=option.file_filter,
+                    parse=partial(_file, option.name) if option.file_filter else str,
+                )
+                for option in window_options()
+            ),
+        )  # fmt: skip
+        redraw = ActionButton("repeat", "Draw another", height=40)
+        redraw.setAutoDefault(False)
+        redraw.clicked.connect(lambda: self.editors["seed"].show_value(draw_seed()))
+        self.editors: dict[str, Editor] = {
+            one.name: Editor(one, redraw if one.name == "seed" else None, judges=True) for one in fields
+        }
+        values = {
+            "seed": draw_seed(),
+            "operator": machine.operator,
+            "device": device,
+            "windowed": len(screens) == 1,
+            "screen": machine.screen_among([one.name for one in screens]),
+            "results": self._suggested,
+            **machine.device_options,
+        }
+        for name, value in values.items():
+            self.editors[name].show_value(value)
+        self.editors["participant"].show_value(self._state_now().used.suggested())
+        self.editors["row_of"].setVisible(self.facts.protocol.assigns_rows)
+
+    def _lay_out(self) -> None:
+        self._ways_row, self._inside = QWidget(), QWidget()
+        hbox(*self.ways, STRETCH, margins=(26, 0, 0, 0), parent=self._ways_row)
+        for button in (*self.ways, self.cancel):
+            button.setAutoDefault(False)
+        self.begin.setDefault(True)
+        verdict = hbox((self.verdict_icon, 0, Qt.AlignmentFlag.AlignTop), (self.verdict, 1), spacing=8)
+        judged, checks, e = QWidget(), QWidget(), self.editors
+        vbox(verdict, self._ways_row, spacing=6, margins=0, parent=judged)
+        vbox(e["windowed"], e["pilot"], spacing=2, margins=(0, 4, 0, 0), parent=checks)
+        pairs = (
+            (e["participant"], e["session"]),
+            (judged,),
+            (e["seed"], e["operator"]),
+            (e["language"], e["device"]),
+            (e["screen"], checks),
+            (e["results"],),
+            (e["row_of"],),
+            *((e[option.name],) for option in window_options()),
+        )
+        grid = QGridLayout(self._inside)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(16)
+        grid.setVerticalSpacing(12)
+        grid.setRowStretch(len(pairs), 1)
+        for row, pair in enumerate(pairs):
+            for column, part in enumerate(pair):
+                grid.setColumnStretch(column, 1)
+                grid.addWidget(part, row, column, 1, 3 - len(pair))
+        self._area = scrolled(self._inside)
+        about = f"{self.facts.title}  ·  {self.facts.extent}  ·  {self.facts.duration}"
+        head, told = label("New session", "title_dense"), label(about, "body", "text2", wraps=True)
+        note = label("Nothing is created until you begin.", "label", "text2")
+        foot = hbox(self.cancel, note, STRETCH, self.begin, spacing=16)
+        vbox(head, told, 6, (self._area, 1), 10, Rule(), 4, foot, spacing=10, margins=(32, 28, 32, 24), parent=self)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        QTimer.singleShot(0, self, self._fit)  # once the parts have their style
+
+    def _fit(self) -> None:
+        """Be as high as the questions are, but no higher than the screen: then they scroll, and the foot stays."""
+        inside, whole = self._inside.layout(), self.layout()
+        assert inside is not None and whole is not None  # noqa: S101, PT018 - laid out above
+        wide = self.minimumWidth() - whole.contentsMargins().left() - whole.contentsMargins().right()
+        inside.activate()
+        needed = inside.totalHeightForWidth(wide)
+        self._area.setMinimumHeight(0)
+        around = whole.totalMinimumSize().height() - self._area.minimumSizeHint().height()
+        self._area.setMinimumHeight(min(needed, self.screen().availableSize().height() - FRAME - around))
+        self.adjustSize()
+
+    def _choose_device(self) -> None:
+        """Ask for another folder where the device is simulated."""
+        self._suggest_folder()
+        self._check()
+
+    def _suggest_folder(self) -> None:
+        """Keep pilots and a simulated hand's sessions apart, unless the operator chose a folder."""
+        if self._value("results") == self._suggested:
+            study, device, pilot = self.facts.protocol.study.name, self._value("device"), self._value("pilot")
+            self._suggested = str(study_results(self._all_results, study, device, pilot=pilot))
+            self.editors["results"].show_value(self._suggested)
+
+    def _choose_pilot(self) -> None:
+        """Put a pilot in a framed window and suggest its folder; restore both choices if it is no pilot."""
+        pilot, windowed = self._value("pilot"), self.editors["windowed"]
+        if pilot:
+            self._windowed_without_pilot = windowed.value
+        windowed.show_value(pilot or self._windowed_without_pilot)
+        windowed.setEnabled(not pilot)
+        self._suggest_folder()
+        self._check()
+
+    def _value(self, name: str) -> Any:
+        return self.editors[name].value
+
+    def _check(self) -> None:
+        """Judge what stands there, and look outside the window's thread whether the folder has changed since."""
+        self._show_verdict()
+        if text := self._value("results"):
+            self._reader.run(partial(read_study_folder_state, Path(text), self.facts.protocol))
+
+    def _take_state(self, state: StudyFolderState) -> None:
+        if state.path == Path(self._value("results")) and state != self._state:
+            self._state = state
+            self._show_verdict()
+
+    def _state_now(self) -> StudyFolderState:
+        """Return the study's folder as it was last read; one that was just chosen is read at once."""
+        path = Path(self._value("results") or ".")
+        if self._state is None or self._state.path != path:
+            self._state = read_study_folder_state(path, self.facts.protocol)
+        return self._state
+
+    def _show_verdict(self) -> None:
+        inside = Path(self._value("results")).resolve().is_relative_to(workspace().folder.resolve())
+        self.editors["results"].aside.setText(INSIDE if inside else OUTSIDE)
+        for option in window_options():
+            self.editors[option.name].setVisible(option.name in self._asked())
+        participant, session, used = self._value("participant"), self._value("session"), self._state_now().used
+        numbers = used.numbers(participant)
+        self._ways_row.setVisible(session in numbers)
+        if session in numbers:  # ways to go on that need no thought; resuming is for home
+            self._free = min(max(numbers) + 1, MAX_SESSION), used.suggested()
+            self.ways[0].show_action("", f"Session {self._free[0]} of {participant}")
+            self.ways[1].show_action("", f"New participant {self._free[1]}")
+        fault = ""
+        try:
+            self._refuse()
+        except (StudyError, ValueError) as error:
+            fault = str(error)
+        words = fault or f"{participant} is free, session {session}"
+        by_id = words.startswith(f"{participant} ")  # an id stands as it was typed
+        self.verdict.setText(words if by_id else words[:1].upper() + words[1:])
+        set_ink(self.verdict, "bad" if fault else "ok")
+        self.verdict_icon.show_icon(*(("warning", "bad") if fault else ("check", "ok")))
+        self.begin.setEnabled(not fault)
+        self._fit()
+
+    def _refuse(self) -> None:
+        """Raise an error if this cannot begin; nothing is touched to find out."""
+        if not self._value("results"):
+            raise ValueError("choose a results folder")
+        participant, session, state = self._value("participant"), self._value("session"), self._state_now()
+        check_participant(participant, pilot=self._value("pilot"))
+        if state.fault:
+            raise ValueError(state.fault)
+        state.used.check_unused(participant, session)
+        check_row(self._value("row_of"), self.facts.protocol)
+        refuse_beyond_last(self.facts.protocol, session)
+        self.chosen()
+
+    def _asked(self) -> set[str]:
+        return {option.name for option in descriptor_of(self._value("device")).window_options}
+
+    def chosen(self) -> NewSession:
+        """Return what was chosen; a ValueError says what is not permitted."""
+        asked, options = self._asked(), {option.name for option in window_options()}
+        values = {name: editor.value for name, editor in self.editors.items() if name in asked or name not in options}
+        chosen = {name: values.pop(name) for name in asked}
+        return NewSession(
+            **values | {"results": Path(values["results"])},
+            source=self.facts.source,
+            device_options={name: value for name, value in chosen.items() if value},
+        )
+
+
+def _file(name: str, text: str) -> Path | None:
+    if text and not Path(text).is_file():
+        raise ValueError(f"there is no {name} in {text}: choose the file, or leave the field empty")
+    return Path(text) if text else None
+
+
+class WorkspaceDialog(Question):
+    """Shows the folder that is offered; another can be chosen or typed. Nothing is created until it is accepted."""
+
+    def __init__(self, parent: QWidget, theme: Theme, offered: Path) -> None:
+        super().__init__(
+            parent,
+            theme,
+            "Choose your workspace",
+            "Protocols and results of this computer are kept in one folder. Windows and commands use it wherever they "
+            "are started. You can change it later under This machine.",
+        )
+        self.setModal(True)
+        self.setMinimumWidth(620)
+        self.path = QLineEdit(str(offered))
+        self.path.setFont(font("body"))
+        self.path.setAccessibleName("Workspace folder")
+        self.choose = ActionButton("", "Choose …", height=40)
+        self.choose.setAutoDefault(False)
+        self.choose.clicked.connect(self._choose)
+        add_layout(self.column, hbox((self.path, 1), self.choose, spacing=8))
+        holds = label("It will contain the folders protocols and results.", "label", "text2")
+        self.column.addWidget(holds)
+        self.add_buttons("Not now", ActionButton("check", "Use this folder", role="primary"))
+        self.path.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
+        self.go_on.setFocus()
+
+    @property
+    def folder(self) -> Path:
+        """The folder in the field."""
+        return Path(self.path.text().strip()).expanduser()
+
+    def _choose(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, "Workspace", self.path.text())
+        if chosen:
+            self.path.setText(chosen)

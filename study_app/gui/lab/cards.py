@@ -1,0 +1,496 @@
+"""The lab's cards: flow curve, cost and error, limiters, estimation."""
+
+import math
+from typing import Final, Literal
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QGridLayout, QLabel, QStackedLayout, QVBoxLayout, QWidget
+
+from study_app.gui.lab.lab_plots import DASH, LIMIT, A, B, CurvePlot, PlotCard
+from study_app.gui.lab.parameters import HIDDEN
+from study_app.gui.theme.theme import LIGHT, RADIUS_CONTROL, Theme, font
+from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
+from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
+from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_ink
+from study_app.gui.widgets.live_plots import Plot, draw_quickly, number
+from study_app.gui.widgets.masked_panel import MaskedPanel
+from study_app.haptics.model.scene import Scene
+from study_app.lab.limiters import Limiter
+from study_app.lab.steady_curves import RATES_PER_S, SPEEDS_MPS, SteadyCurves, has_flow_curve, steady_curves
+from study_app.viewmodels.lab import OFF, PARAMETERS, Choices, CostRow, ErrorRow, EstimateRow, Floats, LabView
+from study_app.viewmodels.number_words import grouped
+
+NAME_WIDTH = 84
+LINE = 26
+COST_HEIGHT, ERROR_HEIGHT = 252, 3 * LINE + 6  # of what is usual, kept free until it is measured
+UNKNOWN = "–"
+LEAST_NS = 1.0  # the smallest cost that a measurement next to a running servo resolves
+LimiterState = Literal["acting", "acted", "quiet"]
+
+
+class ReadingCard(Card):
+    """A card whose content is hidden, in the same place, while the comparison is blind."""
+
+    def __init__(self, title: str, aside: QLabel, why: str) -> None:
+        super().__init__(title, aside, padding=15, gap=6)
+        self.aside = aside
+        self._shown = QWidget()
+        self.content = vbox(spacing=4, margins=0, parent=self._shown)
+        self.stack = QStackedLayout()
+        self.stack.addWidget(self._shown)
+        self.stack.addWidget(MaskedPanel(HIDDEN, why))
+        add_layout(self.column, self.stack, 1)
+
+    def show_blind(self, blind: bool) -> bool:
+        """Show the content, or that it is hidden; return which.
+
+        Hidden content stays as it was before: its size would tell when another setting is felt.
+        """
+        self.stack.setCurrentIndex(int(blind))
+        self.aside.setVisible(not blind)
+        return blind
+
+
+class CostLine(QWidget):
+    """An effect, a bar as long as its share of the most expensive, and its ns."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.name = Elided("label")
+        self.name.setFixedWidth(NAME_WIDTH)
+        self.bar = Bar()
+        self.ns = figures("", "label")
+        self.ns.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.ns.setMinimumWidth(56)
+        hbox(self.name, (self.bar, 1), self.ns, spacing=10, margins=0, parent=self)
+        self.setFixedHeight(LINE)
+
+    def show_cost(self, cost: CostRow, most_ns: float) -> None:
+        ns = cost.ns or 0.0
+        self.name.show_text(cost.effect)
+        self.bar.show_share(ns / most_ns if most_ns > 0 else 0.0)
+        words = f"{ns:.0f} ns" if ns >= LEAST_NS else f"< {LEAST_NS:g} ns"
+        self.ns.setText(words)
+        self.setAccessibleName(f"{cost.effect}: {words}")
+
+    def show_waiting(self) -> None:
+        self.bar.show_share(0.0)
+        self.ns.setText(UNKNOWN)
+        self.setAccessibleName(f"{self.name.accessibleName()}: measuring")
+
+
+class AbsentLine(QWidget):
+    """An effect that takes nothing, and why."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.name = label("", "label", "text2")
+        self.why = Elided("small", "text2")
+        self.why.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        hbox(Icon("minus", "text3", 14), self.name, (self.why, 1), spacing=8, margins=0, parent=self)
+        self.setFixedHeight(LINE - 3)
+
+    def show_cost(self, cost: CostRow) -> None:
+        self.name.setText(cost.effect)
+        self.why.show_text(cost.why)
+
+
+class CostCard(ReadingCard):
+    """What each effect takes of a tick."""
+
+    def __init__(self) -> None:
+        super().__init__("Cost per tick", label("", "small", "text2"), "Costs would reveal which is which.")
+        self.lines: list[CostLine] = []
+        self.absent: list[AbsentLine] = []
+        self._costs = vbox(spacing=0)
+        self._absent = vbox(spacing=0)
+        self.sum_name = label("Sum", "label")
+        self.sum_name.setFont(font("label", weight=600))
+        self.sum = figures("", "label")
+        self.sum.setFont(font("label", weight=600, tabular=True))
+        self.sum.setAlignment(Qt.AlignmentFlag.AlignRight)
+        whole = hbox(self.sum_name, (self.sum, 1))
+        add_parts(self.content, self._costs, Rule(), whole, self._absent, STRETCH)
+        self.stack.widget(1).setMinimumHeight(COST_HEIGHT)  # of the hidden page: the lines may need more
+
+    def show_view(self, view: LabView) -> None:
+        if self.show_blind(view.workbench.blind):
+            return
+        self.aside.setText(_aside(view))
+        if view.measuring and not view.cost and self.lines:
+            self._wait()
+            return
+        here = [row for row in view.cost if row.ns is not None]
+        away = [row for row in view.cost if row.ns is None]
+        most_ns = max((row.ns or 0.0 for row in here), default=0.0)
+        _fit(self.lines, len(here), CostLine, self._costs, self)
+        _fit(self.absent, len(away), AbsentLine, self._absent, self)
+        for line, row in zip(self.lines, here, strict=True):
+            line.show_cost(row, most_ns)
+        for gone, row in zip(self.absent, away, strict=True):
+            gone.show_cost(row)
+        tick_ns = view.tick_ns if view.tick_ns is not None else sum(row.ns or 0.0 for row in here)
+        period_ms = 1000 / view.workbench.in_hand.scene.rate_hz
+        self.sum.setText(f"{grouped(round(tick_ns))} ns of {period_ms:g} ms" if view.cost else "not measured yet")
+
+    def _wait(self) -> None:
+        """Take the numbers away and leave the lines, so that nothing below jumps while a slider is dragged."""
+        for line in self.lines:
+            line.show_waiting()
+        self.sum.setText(UNKNOWN)
+
+
+class ErrorCard(ReadingCard):
+    """How far the felt setting is from its reference."""
+
+    def __init__(self) -> None:
+        why = "Errors would reveal which is which."
+        super().__init__("Error against the reference", label("", "small", "text2"), why)
+        self._grid = QGridLayout()
+        self._grid.setColumnStretch(0, 1)
+        self._grid.setVerticalSpacing(2)
+        self.lines: list[tuple[Elided, QLabel]] = []
+        add_parts(self.content, self._grid, STRETCH)
+        self.stack.widget(0).setMinimumHeight(ERROR_HEIGHT)
+
+    def show_view(self, view: LabView) -> None:
+        if self.show_blind(view.workbench.blind):
+            return
+        rows = view.errors or (ErrorRow("Not measured yet", ""),)
+        if view.measuring and not view.errors and self.lines and self.lines[0][1].text():
+            for name, value in self.lines:
+                value.setText(UNKNOWN if name.isVisibleTo(self) else "")
+            return
+        while len(self.lines) < len(rows):
+            name, value = Elided("label", "text2"), figures("", "label")
+            value.setFont(font("label", weight=600, tabular=True))
+            name.setFixedHeight(LINE)
+            self._grid.addWidget(name, len(self.lines), 0)
+            self._grid.addWidget(value, len(self.lines), 1, Qt.AlignmentFlag.AlignRight)
+            self.lines.append((name, value))
+        for at, (name, value) in enumerate(self.lines):
+            shown = at < len(rows)
+            name.setVisible(shown)
+            value.setVisible(shown)
+            if shown:
+                name.show_text(rows[at].measure)
+                value.setText(rows[at].value)
+                value.setToolTip(rows[at].note)
+
+
+class LimiterLine(Themed, QWidget):
+    """A limiter: a mark, its name, and in how many ticks it acted; tinted while it acts."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._state: LimiterState = "quiet"
+        self.name = Elided("label")
+        self.word = label("", "small", "warn")
+        self.count = figures("0", "label", "text2")
+        self.count.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.count.setMinimumWidth(40)
+        hbox((self.name, 1), self.word, self.count, spacing=6, margins=(34, 0, 10, 0), parent=self)
+        self.setFixedHeight(LINE + 2)
+
+    def show_limiter(self, limiter: Limiter) -> None:
+        state: LimiterState = "acting" if limiter.acting else "acted" if limiter.ticks else "quiet"
+        self.name.show_text(limiter.name)
+        self.count.setText(grouped(limiter.ticks))
+        if state != self._state:
+            self._state = state
+            self.word.setText({"acting": "acting now", "acted": "acted", "quiet": ""}[state])
+            set_ink(self.count, "text2" if state == "quiet" else "warn")
+            weight = 600 if state == "acting" else None
+            self.name.setFont(font("label", weight=weight))
+            self.count.setFont(font("label", weight=weight, tabular=True))
+            self.update()
+        self.setAccessibleName(f"{limiter.name}: {self.word.text() or 'did not act'}, {limiter.ticks} ticks")
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        t = self.theme
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if self._state == "acting":
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(t.warn_bg))
+            painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+        mark = QRectF(12, self.height() / 2 - 6, 12, 12)
+        ink = QColor(t.text3 if self._state == "quiet" else t.warn)
+        painter.setPen(ink)
+        painter.setBrush(ink if self._state == "acting" else Qt.BrushStyle.NoBrush)
+        painter.drawEllipse(mark)
+        if self._state == "acted":
+            painter.setBrush(ink)
+            painter.drawChord(mark, 90 * 16, 180 * 16)
+
+
+class LimiterCard(ReadingCard):
+    """Which limiter acts, and in how many ticks of the last ten seconds each did."""
+
+    def __init__(self) -> None:
+        why = "Limiters would reveal which is which."
+        super().__init__("Limiters", label("ticks, last 10 s", "small", "text2"), why)
+        self.lines: list[LimiterLine] = []
+        self._lines = vbox(spacing=0, margins=(-8, 0, -8, 0))
+        add_parts(self.content, self._lines, STRETCH)
+
+    def show_view(self, view: LabView) -> None:
+        if self.show_blind(view.workbench.blind):
+            return
+        _fit(self.lines, len(view.limiters), LimiterLine, self._lines, self)
+        for line, limiter in zip(self.lines, view.limiters, strict=True):
+            line.show_limiter(limiter)
+
+
+def _aside(view: LabView) -> str:
+    if view.measuring:
+        return f"{view.felt}, measuring …"
+    return f"{view.felt}, measured" if view.cost else ""
+
+
+def _fit(lines: list, count: int, kind: type, layout: QVBoxLayout, whole: ReadingCard) -> None:
+    """Have so many lines of a kind in a layout."""
+    while len(lines) > count:
+        gone = lines.pop()
+        layout.removeWidget(gone)
+        gone.hide()
+        gone.deleteLater()
+    while len(lines) < count:
+        line = kind()
+        layout.addWidget(line)
+        lines.append(line)
+        apply_theme_within(line, whole.theme)
+
+
+BUTTON: Final = 32
+MESSAGE_LINES: Final = 3
+
+
+class EstimateCard(ReadingCard):
+    """Where the force comes from, what is estimated, the values, and how they are applied.
+
+    ``source_chosen`` is a source, ``parameters_chosen`` which parameters; ``apply_asked`` the values now,
+    ``follow_asked`` whether they are applied continuously.
+    """
+
+    source_chosen = Signal(str)
+    parameters_chosen = Signal(str)
+    apply_asked = Signal()
+    follow_asked = Signal(bool)
+
+    def __init__(self) -> None:
+        super().__init__("Estimate", label("", "small", "text2"), "Estimates would reveal which is which.")
+        self.source, self.parameters = _choice("Measured force"), _choice("Estimated parameters")
+        _offer(self.parameters, PARAMETERS, PARAMETERS[0][0])
+        self._offered: Choices = ()
+        self.lines: list[tuple[Elided, QLabel, QLabel]] = []
+        self._grid = QGridLayout()
+        self._grid.setColumnStretch(0, 1)
+        self._grid.setHorizontalSpacing(8)
+        self._grid.setVerticalSpacing(0)
+        self.message = Clamped("", MESSAGE_LINES, "small", "text2")
+        self.apply = ActionButton("check", "Apply", height=BUTTON)
+        self.apply.setProperty("dense", "true")
+        self.follow = Toggle("Continuously")
+        self.follow.setFont(font("label"))
+        self.follow.setToolTip("Apply estimates as they come, slowly, within the slope and force limits")
+        self._inside = QWidget()
+        buttons = hbox(self.apply, self.follow, STRETCH, spacing=10)
+        inner = QGridLayout(self._inside)
+        inner.setContentsMargins(0, 0, 0, 0)
+        inner.setVerticalSpacing(6)
+        inner.addWidget(self.parameters, 0, 0)
+        add_layout(inner, self._grid, 1, 0)
+        inner.addWidget(self.message, 2, 0)
+        add_layout(inner, buttons, 3, 0)
+        add_parts(self.content, self.source, self._inside, STRETCH)
+        self.source.activated.connect(lambda index: self.source_chosen.emit(self.source.itemData(index)))
+        self.parameters.activated.connect(lambda index: self.parameters_chosen.emit(self.parameters.itemData(index)))
+        self.apply.clicked.connect(self.apply_asked)
+        self.follow.clicked.connect(self._ask_follow)
+
+    def show_view(self, view: LabView) -> None:
+        shown = view.estimate
+        if self.show_blind(view.workbench.blind):
+            return
+        if shown.sources != self._offered:
+            self._offered = shown.sources
+            _offer(self.source, shown.sources, shown.source)
+        if not self.source.view().isVisible():
+            self.source.setCurrentIndex(self.source.findData(shown.source))
+        self.parameters.setCurrentIndex(self.parameters.findData(shown.parameters))
+        self.aside.setText(f"{view.felt}, 95 % interval" if shown.rows else "")
+        self._inside.setVisible(shown.source != OFF or bool(shown.message))
+        self.message.show_text(shown.message)
+        set_ink(self.message, "text2" if shown.sound else "warn")
+        self._show_rows(shown.rows, sound=shown.sound)
+        self.apply.setEnabled(shown.may_apply)
+        self.follow.setEnabled(shown.may_follow)
+        with QSignalBlocker(self.follow):
+            self.follow.setChecked(shown.follows)
+
+    def _show_rows(self, rows: tuple[EstimateRow, ...], *, sound: bool) -> None:
+        while len(self.lines) < len(rows):
+            name, value, interval = Elided("label", "text2"), figures("", "label"), figures("", "small", "text2")
+            value.setFont(font("label", weight=600, tabular=True))
+            name.setFixedHeight(LINE)
+            for at, part in enumerate((name, value, interval)):
+                side = Qt.AlignmentFlag.AlignVCenter | (Qt.AlignmentFlag.AlignRight if at else Qt.AlignmentFlag(0))
+                self._grid.addWidget(part, len(self.lines), at, side)
+            self.lines.append((name, value, interval))
+        for line, parts in enumerate(self.lines):
+            for part in parts:
+                part.setVisible(line < len(rows))
+            if line < len(rows):
+                row, (name, value, interval) = rows[line], parts
+                name.show_text(row.name)
+                value.setText(row.value)
+                interval.setText(row.interval)
+                set_ink(value, "text" if sound else "text3")
+
+    def _ask_follow(self, on: bool) -> None:
+        self.follow.setChecked(not on)  # the view says when it is
+        self.follow_asked.emit(on)
+
+
+def _choice(name: str) -> Choice:
+    made = Choice()
+    made.setProperty("dense", "true")
+    made.setFont(font("label"))
+    made.setAccessibleName(name)
+    made.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+    made.setMinimumContentsLength(12)
+    return made
+
+
+def _offer(choice: Choice, choices: Choices, chosen: str) -> None:
+    choice.clear()
+    for value, words in choices:
+        choice.addItem(words, value)
+    choice.setCurrentIndex(choice.findData(chosen))
+
+
+NOT_MODELLED: Final = "Steady shear. Not modelled: thixotropy, impact, fracture."
+STRESS_SENTENCE: Final = f"Shear stress of settings A and B over the shear rate. {NOT_MODELLED}"
+FORCE_SENTENCE: Final = (
+    "Force of settings A and B on a hand that moves evenly, over its speed in m/s, after the limits."
+)
+STYLES: Final = (B, A)
+EMPTY: Final[Floats] = np.empty(0)
+
+
+class FlowCurvePlot(Plot):
+    """Stress over shear rate, both logarithmic."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.curves = [pg.PlotCurveItem(antialias=True) for _ in STYLES]
+        for curve, style in zip(self.curves, STYLES, strict=True):
+            draw_quickly(curve, solid=style.stroke == "solid")
+            self.box.addItem(curve, ignoreBounds=True)
+        self.axes["left"].setWidth(56)
+        self.axes["bottom"].setHeight(26)
+        first, last = (round(math.log10(rate)) for rate in (RATES_PER_S[0], RATES_PER_S[-1]))
+        self.box.setXRange(first, last + 0.06 * (last - first), padding=0)
+        self.show_ticks("bottom", _decades(first, last))
+        self.apply_theme(LIGHT)
+
+    def sizeHint(self) -> QSize:
+        """Return a small size: a plot takes what is left."""
+        return QSize(240, 120)
+
+    def show_stresses(self, stresses_pa: tuple[Floats | None, ...]) -> None:
+        """Draw stresses (n,) [Pa], each at the shear rates; None draws nothing."""
+        shown = np.concatenate([it for it in stresses_pa if it is not None] or [np.ones(1)])
+        first, last = math.floor(math.log10(shown.min()) + 1e-9), math.ceil(math.log10(shown.max()) - 1e-9)
+        last = max(last, first + 1)
+        self.show_ticks("left", _decades(first, last))
+        self.box.setYRange(first - 0.02, last + 0.12 * (last - first), padding=0)
+        for curve, it in zip(self.curves, stresses_pa, strict=True):
+            curve.setData(*((EMPTY, EMPTY) if it is None else (np.log10(RATES_PER_S), np.log10(it))))
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().apply_theme(theme)
+        for curve, style in zip(self.curves, STYLES, strict=True):
+            curve.setPen(self.stroke(style.colour(theme), style.width, DASH[style.stroke]))
+
+
+class SpeedPlot(CurvePlot):
+    """Curves over the speed of the hand."""
+
+    def __init__(self) -> None:
+        super().__init__(STYLES, 1.0)
+        most_mps = float(SPEEDS_MPS[-1])
+        self.box.setXRange(0.0, 1.06 * most_mps, padding=0)
+        self.show_ticks("bottom", [(round(it, 6), number(round(it, 6))) for it in np.arange(0.0, most_mps + 0.01, 0.1)])
+
+
+class FlowCurveCard(PlotCard):
+    """Shear stress over shear rate of both settings."""
+
+    def __init__(self) -> None:
+        self.stresses = FlowCurvePlot()
+        super().__init__("Flow curve", "Pa over 1/s", self.stresses, STRESS_SENTENCE)
+        note = Elided("small", "text2")
+        note.show_text(NOT_MODELLED)
+        self.column.addWidget(note)
+
+    def show_curves(self, a: SteadyCurves, b: SteadyCurves) -> None:
+        """Draw both flow curves."""
+        self.legend.show_entries(((A, _name("A", a)), (B, _name("B", b))))
+        self.stresses.show_stresses((b.stress_pa, a.stress_pa))
+
+
+class SteadyForceCard(PlotCard):
+    """Force over the speed of the hand in both settings."""
+
+    def __init__(self) -> None:
+        self.forces = SpeedPlot()
+        super().__init__("Force over speed", "N over m/s", self.forces, FORCE_SENTENCE)
+
+    def show_curves(self, a: SteadyCurves, b: SteadyCurves, limit_n: float) -> None:
+        """Draw both forces."""
+        self.legend.show_entries(((A, "A"), (B, "B"), (LIMIT, f"limit {limit_n:g} N")))
+        self.forces.show_curves(SPEEDS_MPS, (b.force_n, a.force_n), limit_n)
+
+
+class FlowCurveRow(QWidget):
+    """Both cards side by side; hidden while neither setting has a flow curve."""
+
+    def __init__(self, gap: int) -> None:
+        super().__init__()
+        self.stress, self.force = FlowCurveCard(), SteadyForceCard()
+        self._shown: tuple[Scene, Scene, float] | None = None
+        hbox((self.stress, 1), (self.force, 1), spacing=gap, margins=0, parent=self)
+        self.hide()
+
+    def show_view(self, view: LabView) -> None:
+        """Draw the curves of both settings and the limit of the one in hand, if one of them has changed."""
+        bench = view.workbench
+        for card in (self.stress, self.force):
+            card.show_blind(bench.blind)
+        scenes, limit_n = (bench.a.scene, bench.b.scene), bench.in_hand.scene.force_limit_n
+        shown = (*scenes, limit_n)
+        if shown == self._shown:
+            return
+        self._shown = shown
+        self.setVisible(any(map(has_flow_curve, scenes)))
+        if not self.isHidden():
+            a, b = map(steady_curves, scenes)
+            self.stress.show_curves(a, b)
+            self.force.show_curves(a, b, limit_n)
+
+
+def _name(side: str, curves: SteadyCurves) -> str:
+    return f"{side}, no viscosity" if curves.stress_pa is None else side
+
+
+def _decades(first: int, last: int) -> list[tuple[float, str]]:
+    step = 1 + (last - first) // 5
+    return [(float(k), number(10.0**k)) for k in range(first, last + 1, step)]

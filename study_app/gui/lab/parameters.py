@@ -1,0 +1,447 @@
+"""The form of a liquid's parameters: groups of rows, each with slider, field and unit."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QGridLayout, QLabel, QStackedLayout, QWidget
+
+from study_app.gui.lab.header import Badge
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import apply_theme_within
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import Card, Icon, Rule, scrolled
+from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
+from study_app.gui.widgets.labels import Clamped, label
+from study_app.gui.widgets.masked_panel import MaskedPanel
+from study_app.gui.widgets.number_field import NumberField, read_number, write_number
+from study_app.gui.widgets.sliders import Range, Slider
+from study_app.haptics.model.effect import Parameter, Value
+from study_app.lab.ab_comparison import Setting, other
+from study_app.lab.parameters import OFF, ON
+from study_app.viewmodels.lab import FormRow, FormSection, LabView, form
+
+LABEL_WIDTH, FIELD_WIDTH, UNIT_WIDTH = 108, 86, 44
+GAP = 8
+HEIGHT = 36
+SWITCHED = {OFF, ON}
+
+
+class ParameterRow(QWidget):
+    """What every row has: ``changed(name, value, held)``, and a line below for why something was refused."""
+
+    changed = Signal(str, object, bool)
+
+    def __init__(self, parameter: Parameter) -> None:
+        super().__init__()
+        self.parameter = parameter
+        self._refused = ""
+        self.line = hbox(spacing=GAP, margins=0)
+        self.sign = Icon("warning", "bad", 14)
+        self.why = label("", "small", "bad", wraps=True)
+        self._below = QWidget()
+        hbox(
+            (self.sign, 0, Qt.AlignmentFlag.AlignTop),
+            (self.why, 1),
+            spacing=6,
+            margins=(0, 0, 0, 4),
+            parent=self._below,
+        )
+        self._below.hide()
+        vbox(self.line, self._below, spacing=0, margins=0, parent=self)
+
+    @property
+    def refused(self) -> str:
+        """Why what was asked for last cannot be, or nothing."""
+        return self._refused
+
+    def show_row(self, row: FormRow) -> None:
+        raise NotImplementedError
+
+    def show_refused(self, why: str) -> None:
+        """Show in one line why a value is refused; the typed text stays."""
+        self._refused = why
+        self.why.setText(why)
+        self._below.setVisible(bool(why))
+
+    def let_go(self) -> None:
+        """Release what is held, and hide the refusal, which belongs to another setting."""
+        self.show_refused("")
+
+    def parts(self) -> tuple[QWidget, ...]:
+        """Return what takes the keyboard, in its order."""
+        raise NotImplementedError
+
+
+class NumberRow(ParameterRow):
+    """A number: slider and field, the unit behind them, the preset's value a tick on the slider."""
+
+    def __init__(self, parameter: Parameter) -> None:
+        super().__init__(parameter)
+        self._row: FormRow | None = None
+        self.name = _name(parameter.label)
+        self.slider = Slider()
+        self.field = NumberField()
+        self.field.setFixedWidth(FIELD_WIDTH)
+        unit = label(parameter.shown_unit, "small", "text2")
+        unit.setFixedWidth(UNIT_WIDTH)
+        add_parts(self.line, self.name, (self.slider, 1), self.field, unit)
+        words = f"{parameter.label}, {parameter.shown_unit}".rstrip(", ")
+        self.slider.setAccessibleName(words)
+        self.field.setAccessibleName(words)
+        self.slider.slid.connect(self._slide)
+        self.field.entered.connect(self._enter)
+        self.field.unread.connect(self._misread)
+        self.field.abandoned.connect(self._forget)
+        self.field.stepped.connect(self.slider.step)
+
+    def show_row(self, row: FormRow) -> None:
+        """Show the number, unless it is being dragged or typed; changed ones are bold."""
+        if self._row is not None and row.value != self._row.value:
+            self.show_refused("")
+        self._row = row
+        it = self.parameter = row.parameter
+        span = Range(it.least * it.factor, it.most * it.factor, it.logarithmic, it.whole)
+        number = row.value if isinstance(row.value, int | float) else None
+        preset = row.preset if isinstance(row.preset, int | float) else None
+        if not self.slider.dragged:
+            usual = it.default if isinstance(it.default, int | float) else it.least
+            at = (usual if number is None else number) * it.factor
+            self.slider.show_number(span, at, None if preset is None else preset * it.factor)
+        if not self.refused:
+            self.field.show_text("" if number is None else self._text(number))
+            self.field.show_state("changed" if row.changed else "")
+        self.field.setPlaceholderText("none" if number is None else "")
+        self.name.setFont(font("label", weight=600 if row.changed else None))
+        was = "none" if preset is None else it.shown(preset)
+        self.setToolTip(f"{it.shown(it.least)} to {it.shown(it.most)}; initially {was}")
+        self.field.setAccessibleDescription(f"initially {was}" if row.changed else "")
+
+    def show_refused(self, why: str) -> None:
+        super().show_refused(why)
+        changed = "changed" if self._row is not None and self._row.changed else ""
+        self.field.show_state("refused" if why else changed)
+        if why:
+            self.field.setAccessibleDescription(why)
+
+    def let_go(self) -> None:
+        """Let go of the knob, too."""
+        super().let_go()
+        self.slider.let_go()
+
+    def parts(self) -> tuple[QWidget, ...]:
+        """Return slider and field."""
+        return self.slider, self.field
+
+    def _text(self, value: float) -> str:
+        return write_number(value * self.parameter.factor, self.parameter.decimals)
+
+    def _slide(self, shown: float, held: bool) -> None:
+        self.show_refused("")
+        self.field.show_text(write_number(shown, self.parameter.decimals))
+        self.field.put_back()
+        self.changed.emit(self.parameter.name, self._value(shown), held)
+
+    def _enter(self, shown: float) -> None:
+        self.show_refused("")
+        self.changed.emit(self.parameter.name, self._value(shown), False)
+
+    def _value(self, shown: float) -> float:
+        """Return what a shown number is in SI: exactly the preset's or the present one's where it reads the same."""
+        row = self._row
+        for known in (row.preset, row.value) if row is not None else ():
+            if isinstance(known, int | float) and read_number(self._text(known)) == shown:
+                return float(known)
+        return shown / self.parameter.factor
+
+    def _misread(self, text: str) -> None:
+        preset = self._row.preset if self._row is not None else None
+        example = self._text(preset) if isinstance(preset, int | float) else "1.5"
+        said = f"“{text}” is not a number" if text.strip() else "This needs a number"
+        self.show_refused(f"{said}: write one such as {example}, or press Esc.")
+
+    def _forget(self) -> None:
+        self.show_refused("")
+        if self._row is not None:
+            self.show_row(self._row)
+            self.field.put_back()
+
+
+class ChoiceRow(ParameterRow):
+    """One of a few words."""
+
+    def __init__(self, parameter: Parameter) -> None:
+        super().__init__(parameter)
+        self._value: Value = None
+        self.name = _name(parameter.label)
+        self.choice = Choice()
+        self.choice.setProperty("dense", "true")
+        self.choice.setFont(font("label"))
+        self.choice.setAccessibleName(parameter.label)
+        for value, words in parameter.choices:
+            self.choice.addItem(words, value)
+        self.choice.activated.connect(self._choose)
+        add_parts(self.line, self.name, (self.choice, 1))
+
+    def show_row(self, row: FormRow) -> None:
+        """Show which it is; changed ones are bold with an accent edge."""
+        if row.value != self._value:
+            self.show_refused("")
+        self._value = row.value
+        self.choice.setCurrentIndex(self.choice.findData(row.value))
+        state = "changed" if row.changed else ""
+        if self.choice.property("state") != state:
+            self.choice.setProperty("state", state)
+            self.choice.style().unpolish(self.choice)
+            self.choice.style().polish(self.choice)
+        for part in (self.name, self.choice):
+            part.setFont(font("label", weight=600 if row.changed else None))
+
+    def parts(self) -> tuple[QWidget, ...]:
+        """Return the list."""
+        return (self.choice,)
+
+    def _choose(self, index: int) -> None:
+        """Ask for another one; the view says when it is."""
+        self.show_refused("")
+        self.choice.setCurrentIndex(self.choice.findData(self._value))
+        self.changed.emit(self.parameter.name, self.choice.itemData(index), False)
+
+
+class SwitchRow(ParameterRow):
+    """On or off."""
+
+    def __init__(self, parameter: Parameter) -> None:
+        super().__init__(parameter)
+        self.toggle = Toggle(parameter.label)
+        self.toggle.setFont(font("label"))
+        self.toggle.clicked.connect(self._switch)
+        add_parts(self.line, self.toggle, STRETCH)
+
+    def show_row(self, row: FormRow) -> None:
+        """Show whether it is on; changed ones are bold."""
+        if (row.value == ON) != self.toggle.isChecked():
+            self.show_refused("")
+        self.toggle.setChecked(row.value == ON)
+        self.toggle.setFont(font("label", weight=600 if row.changed else None))
+
+    def parts(self) -> tuple[QWidget, ...]:
+        """Return the switch."""
+        return (self.toggle,)
+
+    def _switch(self, on: bool) -> None:
+        """Ask for the other; the view says when it is."""
+        self.show_refused("")
+        self.toggle.setChecked(not on)
+        self.changed.emit(self.parameter.name, ON if on else OFF, False)
+
+
+def row_for(parameter: Parameter) -> ParameterRow:
+    """Return the row that suits a parameter."""
+    if not parameter.choices:
+        return NumberRow(parameter)
+    return (SwitchRow if {value for value, _ in parameter.choices} == SWITCHED else ChoiceRow)(parameter)
+
+
+def _name(words: str) -> QLabel:
+    made = label(words, "label", "text")
+    made.setFixedWidth(LABEL_WIDTH)
+    made.setMinimumHeight(HEIGHT)
+    made.setWordWrap(True)
+    return made
+
+
+HIDDEN = "Hidden during a blind comparison"
+
+
+class SectionBlock(QWidget):
+    """A heading with its rows, and how many of them are changed."""
+
+    def __init__(self, title: str) -> None:
+        super().__init__()
+        self.rows: dict[str, ParameterRow] = {}
+        self.count = label("", "small", "text2")
+        head = hbox(label(title, "strong", heading=True), STRETCH, self.count)
+        self._grid = QGridLayout()
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(8)
+        self._grid.setVerticalSpacing(2)
+        vbox(head, self._grid, spacing=4, margins=(0, 8, 0, 8), parent=self)
+
+    def show_section(self, section: FormSection) -> list[ParameterRow]:
+        """Show the section's rows; return those that came new."""
+        names = [row.parameter.name for row in section.rows]
+        for name in self.rows.keys() - set(names):
+            gone = self.rows.pop(name)
+            self._grid.removeWidget(gone)
+            gone.hide()
+            gone.deleteLater()
+        came = []
+        for row in section.rows:
+            if row.parameter.name not in self.rows:
+                came.append(row_for(row.parameter))
+                self.rows[row.parameter.name] = came[-1]
+        self.rows = {name: self.rows[name] for name in names}
+        if came or len(names) != self._grid.count():
+            self._place()
+        for row in section.rows:
+            self.rows[row.parameter.name].show_row(row)
+        changed = sum(row.changed for row in section.rows)
+        self.count.setText(f"{changed} of {len(names)} changed" if changed else "")
+        return came
+
+    def _place(self) -> None:
+        """Place two switches per line, and every other row on a line of its own."""
+        line, column = 0, 0
+        for row in self.rows.values():
+            if isinstance(row, SwitchRow):
+                self._grid.addWidget(row, line, column)
+                line, column = (line + 1, 0) if column else (line, 1)
+                continue
+            line, column = (line + 1, 0) if column else (line, 0)
+            self._grid.addWidget(row, line, 0, 1, 2)
+            line += 1
+
+
+class FormPanel(Card):
+    """Liquid and parameters of the side that is felt; while blind, nothing of them in the same place."""
+
+    changed = Signal(str, object, bool)
+    liquid_chosen = Signal(str, object)
+    copied = Signal()
+    open_asked = Signal()
+    use_asked = Signal()
+    put_back_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=16, gap=8)
+        self._setting: Setting | None = None
+        self._liquids: tuple[object, ...] = ()
+        self._side = "A"
+        self._refused: tuple[str, str] | None = None
+        self.blocks: dict[str, SectionBlock] = {}
+        self.rows: dict[str, ParameterRow] = {}
+        self.badge = Badge()
+        self.liquid = Choice()
+        self.liquid.setProperty("dense", "true")
+        self.liquid.setFont(font("label"))
+        self.liquid.activated.connect(self._choose)
+        self.copy = ActionButton("copy", "Copy to B", height=32)
+        self.copy.setProperty("dense", "true")
+        self.copy.clicked.connect(self.copied)
+        self.open = ActionButton("file", "Open preset …", height=32)
+        self.use = ActionButton("layers", "Use in a study …", height=32)
+        self.back = ActionButton("designer", "Put back into the study", height=32)
+        self.back.hide()
+        self.said = Clamped("", 2, "small", "text2")
+        for button, asked in (
+            (self.open, self.open_asked),
+            (self.use, self.use_asked),
+            (self.back, self.put_back_asked),
+        ):
+            button.setProperty("dense", "true")
+            button.clicked.connect(asked)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        head = hbox(self.badge, (self.liquid, 1), self.copy, spacing=8)
+        inside = QWidget()
+        self._column = vbox(STRETCH, spacing=0, margins=(0, 0, 6, 0), parent=inside)
+        self._rules: list[Rule] = []
+        self.area = scrolled(inside)
+        whole = QWidget()
+        column = vbox(head, Rule(), (self.area, 1), spacing=8, margins=0, parent=whole)
+        foot = hbox((self.open, 1), (self.use, 1), spacing=8)
+        column.addWidget(Rule())
+        column.addWidget(self.said)  # above the buttons, which stay in their place when it appears
+        add_parts(column, self.back, foot)
+        self.hidden = MaskedPanel(HIDDEN, "Parameters would reveal which is which.")
+        self._stack = QStackedLayout()
+        self._stack.addWidget(whole)
+        self._stack.addWidget(self.hidden)
+        add_layout(self.column, self._stack, 1)
+
+    def show_view(self, view: LabView) -> None:
+        bench = view.workbench
+        self._stack.setCurrentIndex(int(bench.blind))
+        if bench.blind:
+            return
+        self._show_liquids(view)
+        self.said.show_text(view.said)
+        self.said.setVisible(bool(view.said))
+        self.back.setVisible(bool(view.study))
+        self.back.setToolTip(f"{view.study} is open in the study designer")
+        setting = bench.in_hand
+        if setting != self._setting or bench.felt != self._side:
+            refused = self._side != bench.felt
+            self._setting, self._side = setting, bench.felt
+            self._show_form(form(setting), forget=refused)
+        if view.refused is not self._refused:
+            self._refused = view.refused
+            name, why = view.refused or ("", "")
+            if name in self.rows:
+                self.rows[name].show_refused(why)
+
+    def _show_liquids(self, view: LabView) -> None:
+        bench = view.workbench
+        if view.liquids != self._liquids:
+            self._liquids = view.liquids
+            self.liquid.clear()
+            for liquid in view.liquids:
+                self.liquid.addItem(liquid.title)
+        self.badge.show_side(bench.felt)
+        self.liquid.setAccessibleName(f"Liquid of {bench.felt}")
+        index = self.liquid.findText(bench.in_hand.name)
+        self.liquid.setCurrentIndex(index)
+        self.liquid.setPlaceholderText(bench.in_hand.name)
+        words = f"Copy to {other(bench.felt)}"
+        self.copy.show_action("copy", words)
+
+    def _show_form(self, sections: tuple[FormSection, ...], *, forget: bool) -> None:
+        titles = [section.title for section in sections]
+        new = titles != list(self.blocks)
+        for title in self.blocks.keys() - set(titles):
+            gone = self.blocks.pop(title)
+            self._column.removeWidget(gone)
+            gone.hide()
+            gone.deleteLater()
+        for title in titles:
+            if title not in self.blocks:
+                self.blocks[title] = SectionBlock(title)
+        self.blocks = {title: self.blocks[title] for title in titles}
+        if new:
+            self._stack_up()
+        if forget:
+            for row in self.rows.values():
+                row.let_go()
+        came = [row for section in sections for row in self.blocks[section.title].show_section(section)]
+        for row in came:
+            row.changed.connect(self.changed)
+        self.rows = {name: row for block in self.blocks.values() for name, row in block.rows.items()}
+        if new or came:
+            self._order()
+            for block in self.blocks.values():
+                apply_theme_within(block, self.theme)
+
+    def _stack_up(self) -> None:
+        """Place the blocks below one another, a hairline between them."""
+        for rule in self._rules:
+            self._column.removeWidget(rule)
+            rule.hide()
+            rule.deleteLater()
+        for block in self.blocks.values():
+            self._column.removeWidget(block)
+        self._rules = [Rule() for _ in list(self.blocks)[1:]]
+        for rule in self._rules:
+            rule.apply_theme(self.theme)
+        parts = [part for pair in zip(self.blocks.values(), self._rules, strict=False) for part in pair]
+        for at, part in enumerate([*parts, *list(self.blocks.values())[-1:]]):
+            self._column.insertWidget(at, part)
+
+    def _order(self) -> None:
+        """Let Tab go from top to bottom."""
+        before: QWidget = self.copy
+        for row in self.rows.values():
+            for part in row.parts():
+                QWidget.setTabOrder(before, part)
+                before = part
+
+    def _choose(self, index: int) -> None:
+        self.liquid_chosen.emit(self._side, self._liquids[index])

@@ -1,0 +1,428 @@
+"""What the operator can do: stop the force, pause, repeat, exclude, end, write a note, have the device examined."""
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QGridLayout,
+    QLabel,
+    QLineEdit,
+    QPlainTextEdit,
+    QPushButton,
+    QSizePolicy,
+    QStyle,
+    QStyleOptionButton,
+    QStylePainter,
+    QWidget,
+)
+
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import Card, Chip, Icon
+from study_app.gui.widgets.controls import ActionButton, Radio
+from study_app.gui.widgets.dialogs import Question
+from study_app.gui.widgets.labels import Clamped, Elided, figures, label
+from study_app.viewmodels.number_words import minutes
+from study_app.viewmodels.operator import NOTES_SHOWN, DeviceView, OperatorView
+
+
+class Actions(Card):
+    """The bar of buttons at the bottom."""
+
+    pause_asked = Signal()
+    resume_asked = Signal()
+    repeat_asked = Signal()
+    exclude_asked = Signal()
+    end_asked = Signal()
+    close_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=14)
+        self.pause = ActionButton("pause", "Pause", key="P")
+        self.repeat = ActionButton("repeat", "Repeat trial …", key="R")
+        self.hint = label("", "label", "text2", wraps=True)
+        self.hint.setFont(font("label", weight=400))
+        self.exclude = ActionButton("flag", "Exclude …", key="X")
+        self.end = ActionButton("cross", "End session …", role="danger")
+        self.close_session = ActionButton("check", "Close session", role="primary")
+        self._resumes = False
+        self._signs = True
+        row = hbox(self.pause, self.repeat, self.exclude, STRETCH, self.end, self.close_session, spacing=10)
+        for button in (self.pause, self.repeat, self.exclude, self.end, self.close_session):
+            button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # its padding gives way
+        self.close_session.hide()
+        add_parts(self.column, row, self.hint)
+        self.pause.clicked.connect(self._pause_or_resume)
+        self.repeat.clicked.connect(self.repeat_asked)
+        self.exclude.clicked.connect(self.exclude_asked)
+        self.end.clicked.connect(self.end_asked)
+        self.close_session.clicked.connect(self.close_asked)
+
+    def narrow(self, yes: bool) -> None:
+        """Do without the buttons' signs where there is no room for them."""
+        self._signs = not yes
+        for button, sign in ((self.repeat, "repeat"), (self.exclude, "flag"), (self.end, "cross")):
+            button.show_action("" if yes else sign, button.text())
+        self._show_pause()
+
+    def _show_pause(self) -> None:
+        sign, words = ("play", "Resume") if self._resumes else ("pause", "Pause")
+        self.pause.show_action(sign if self._signs else "", words)
+
+    def show_view(self, view: OperatorView) -> None:
+        """Offer what is possible now and say what it does."""
+        self._resumes = view.may_resume
+        self._show_pause()
+        self.pause.setEnabled(view.may_pause or view.may_resume)
+        self.repeat.setEnabled(view.may_repeat)
+        for button in (self.pause, self.repeat, self.end):
+            button.setVisible(not view.over)
+        if view.over and self.close_session.isHidden():
+            self.close_session.show()
+            self.close_session.setFocus()
+        self.hint.setText(_hint(view))
+
+    def _pause_or_resume(self) -> None:
+        (self.resume_asked if self._resumes else self.pause_asked).emit()
+
+
+def _hint(view: OperatorView) -> str:
+    if view.over and view.trouble:
+        return ""
+    if view.over:
+        return "The journal is closed and the tables are written."
+    if view.waits:
+        return "The force is off. The answers are kept in memory until the disk accepts them."
+    if view.state == "trouble":
+        return "The force is off. All answers so far are on disk."
+    if view.state == "force off":
+        return "The force returns only when you turn it on again."
+    if view.state == "paused":
+        return "An interrupted trial starts again."
+    return "You will be asked for a reason; both recordings are kept." if view.may_repeat else ""
+
+
+class RepeatQuestion(Question):
+    """Why the trial is to come again."""
+
+    def __init__(self, parent: QWidget, theme: Theme, setting: str) -> None:
+        super().__init__(
+            parent,
+            theme,
+            "Repeat this trial?",
+            f"{setting} starts again from the beginning. The first recording is kept, together with your reason.",
+        )
+        self.setting = setting
+        self.reason = QLineEdit()
+        self.reason.setFont(font("body"))
+        self.reason.setPlaceholderText("Reason, for example: phone rang")
+        self.reason.setAccessibleName("Reason")
+        self.column.addWidget(self.reason)
+        self.add_buttons("Cancel", ActionButton("repeat", "Repeat trial", role="primary"))
+        self.go_on.setEnabled(False)
+        self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
+
+
+class ExcludeQuestion(Question):
+    """What to exclude from the analysis, and why; ``trial`` is the one under way or the last, None before the first."""
+
+    def __init__(self, parent: QWidget, theme: Theme, trial: int | None, setting: str) -> None:
+        super().__init__(
+            parent,
+            theme,
+            "Exclude this from the analysis?",
+            "Nothing is deleted. The list of exclusions records what was excluded, by whom and why.",
+        )
+        self.choices = QButtonGroup(self)
+        self._trial = trial
+        for index, words in enumerate((setting, "Whole session")):
+            choice = Radio(words)
+            choice.setFont(font("body"))
+            choice.setVisible(index == 1 or trial is not None)
+            self.choices.addButton(choice, index)
+            self.column.addWidget(choice)
+        self.choices.button(1 if trial is None else 0).setChecked(True)
+        self.reason = QLineEdit()
+        self.reason.setFont(font("body"))
+        self.reason.setPlaceholderText("Reason, for example: talked during the trial")
+        self.reason.setAccessibleName("Reason")
+        self.column.addWidget(self.reason)
+        self.add_buttons("Cancel", ActionButton("flag", "Exclude", role="primary"))
+        self.go_on.setEnabled(False)
+        self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
+
+    @property
+    def trial(self) -> int | None:
+        """Return the trial to leave out, None for the whole session."""
+        return self._trial if self.choices.checkedId() == 0 else None
+
+
+class EndQuestion(Question):
+    """Whether, and why, the session ends now."""
+
+    STATUSES = (("withdrawn", "The participant withdrew"), ("aborted", "Another reason"))
+
+    def __init__(self, parent: QWidget, theme: Theme, answers: str) -> None:
+        super().__init__(
+            parent,
+            theme,
+            "End this session now?",
+            f"{answers} answers are on disk and are kept. The force is turned off when the session ends.",
+        )
+        self.choices = QButtonGroup(self)
+        for index, (_, words) in enumerate(self.STATUSES):
+            choice = Radio(words)
+            choice.setFont(font("body"))
+            self.choices.addButton(choice, index)
+            self.column.addWidget(choice)
+        self.choices.button(1).setChecked(True)
+        self.choices.button(1).setFocus()
+        self.reason = QLineEdit()
+        self.reason.setFont(font("body"))
+        self.reason.setPlaceholderText("Reason (optional)")
+        self.reason.setAccessibleName("Reason")
+        self.column.addWidget(self.reason)
+        self.add_buttons("Continue the session", ActionButton("cross", "End session", role="danger"))
+        self.go_on.setDefault(False)
+        self.back.setDefault(True)
+
+    @property
+    def status(self) -> str:
+        """Return "withdrawn" or "aborted"."""
+        return self.STATUSES[self.choices.checkedId()][0]
+
+
+class NoteField(QPlainTextEdit):
+    """Where a note is written; Enter keeps it, Shift+Enter begins a line."""
+
+    entered = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setPlaceholderText("Write a note …")
+        self.setAccessibleName("Note")
+        self.setFont(font("label", weight=400))
+        self.setTabChangesFocus(True)
+        self.setMinimumHeight(52)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Keep the note on Enter; leave Esc to the window."""
+        plain = not event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and plain:
+            self.entered.emit()
+        elif event.key() == Qt.Key.Key_Escape:
+            self.clearFocus()
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
+
+
+class NotesCard(Card):
+    """The last notes and marks, a field for the next, and two buttons."""
+
+    note_written = Signal(str)
+    mark_set = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=16, gap=10)
+        self._shown = NOTES_SHOWN
+        self._view: OperatorView | None = None
+        self._head = QWidget()
+        stored = label("stored in the journal", "small", "text2")
+        hbox(label("Notes and marks", "card"), STRETCH, stored, margins=0, parent=self._head)
+        self.lines = [_NoteRow(newest=number == 0) for number in range(NOTES_SHOWN)]
+        self.none = label("No notes yet.", "label", "text2")
+        self._list = QWidget()
+        vbox(self.none, *self.lines, STRETCH, spacing=6, margins=0, parent=self._list)
+        self.field = NoteField()
+        self.hint = label("Press Enter to store it with the time", "small", "text3")
+        self.add = ActionButton("pen", "Add note", key="N")
+        self.mark = ActionButton("flag", "Mark", key="M")
+        buttons = hbox((self.add, 1), (self.mark, 1), spacing=12)
+        add_parts(self.column, self._head, self._list, (self.field, 1), self.hint, buttons)
+        self.field.entered.connect(self._keep)
+        self.add.clicked.connect(self._add)
+        self.mark.clicked.connect(self.mark_set)
+
+    def show_lines(self, most: int) -> None:
+        """Show so many notes at most; heading and hint go with the first that is left out."""
+        self._shown = most
+        self._head.setVisible(most == NOTES_SHOWN)
+        self._list.setVisible(most > 0)
+        self.hint.setVisible(most == NOTES_SHOWN)
+        self.field.setToolTip("" if most == NOTES_SHOWN else self.hint.text())
+        if self._view is not None:
+            self.show_view(self._view)
+
+    def show_view(self, view: OperatorView) -> None:
+        self._view = view
+        self.none.setVisible(not view.notes)
+        for index, row in enumerate(self.lines):
+            shown = index < min(len(view.notes), self._shown)
+            row.setVisible(shown)
+            if shown:
+                row.show_note(view.notes[index].kind, minutes(view.notes[index].t_s), view.notes[index].text)
+        for button in (self.add, self.mark):
+            button.setEnabled(not view.over)
+        self.field.setEnabled(not view.over)
+
+    def _add(self) -> None:
+        if self.field.toPlainText().strip():
+            self._keep()
+        else:
+            self.field.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def _keep(self) -> None:
+        text = self.field.toPlainText().strip()
+        if text:
+            self.field.clear()
+            self.note_written.emit(text)
+
+
+class _NoteRow(QWidget):
+    """Sign, time and text, of the newest note in two lines; a long text ends in "…" and is whole in the tip."""
+
+    def __init__(self, *, newest: bool) -> None:
+        super().__init__()
+        self.sign = Icon("pen", "text2", 16)
+        self.time = figures("", "label", "text2")
+        self.text = Clamped("", 2, "label", steady=False) if newest else Elided("label")
+        self.text.setFont(font("label", weight=400))
+        top = Qt.AlignmentFlag.AlignTop
+        hbox((self.sign, 0, top), (self.time, 0, top), (self.text, 1), spacing=8, margins=0, parent=self)
+
+    def show_note(self, kind: str, at: str, text: str) -> None:
+        self.sign.show_icon(*(("flag", "warn") if kind == "mark" else ("pen", "text2")))
+        self.time.setText(at)
+        self.text.show_text(" ".join(text.split()) or "Mark")
+
+
+LEAST_WIDTH, LEAST_HEIGHT = 320, 160
+
+
+class StopButton(Themed, QPushButton):
+    """STOP FORCE; it acts when pressed, not when released."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setProperty("role", "stop")
+        self.setAccessibleName("Stop force")
+        self.setMinimumSize(LEAST_WIDTH, LEAST_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+
+    def sizeHint(self) -> QSize:
+        return QSize(LEAST_WIDTH, LEAST_HEIGHT)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QStylePainter(self)
+        option = QStyleOptionButton()
+        self.initStyleOption(option)
+        painter.drawControl(QStyle.ControlElement.CE_PushButtonBevel, option)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        ink = QColor(self.theme.on_stop)
+        middle, width = self.height() / 2, self.width()
+        draw_icon(painter, "stop", QRectF(0, middle - 68, width, 58), ink, 2.0)
+        painter.setPen(ink)
+        painter.setFont(font("title", weight=700, scale=1.08))
+        centred = Qt.AlignmentFlag.AlignCenter
+        painter.drawText(QRectF(0, middle, width, 38), centred, "STOP FORCE")
+        painter.setFont(font("label", weight=600))
+        painter.drawText(QRectF(8, middle + 42, width - 16, 22), centred, "Hold Esc in any window, or device button 4")
+
+
+class StopPanel(Card):
+    """The button under a line that says whether there is force, with the way back after a stop.
+
+    Of a device that exerts none (``felt``) the line says so.
+    """
+
+    stop_asked = Signal()
+    fade_in_asked = Signal()
+
+    def __init__(self, *, felt: bool = True) -> None:
+        super().__init__(padding=12, gap=10)
+        self._felt = felt
+        self.sign = Icon("check", "ok", 18)
+        self.word = label("", "strong")
+        self.fade_in = ActionButton("", "Fade in again", height=36)
+        self.stop = StopButton()
+        # Pressed, not clicked: the force goes with the finger's first touch.
+        self.stop.pressed.connect(self.stop_asked)
+        self.fade_in.clicked.connect(self.fade_in_asked)
+        row = hbox(self.sign, self.word, STRETCH, self.fade_in, spacing=10, margins=(6, 0, 0, 0))
+        keep = self.fade_in.sizePolicy()
+        keep.setRetainSizeWhenHidden(True)
+        self.fade_in.setSizePolicy(keep)
+        self.fade_in.hide()
+        add_parts(self.column, row, (self.stop, 1))
+
+    def show_view(self, view: OperatorView) -> None:
+        if view.over:
+            self._say("minus", "text2", "Force is off")
+        elif view.force_on and self._felt:
+            self._say("check", "ok", "Force is on")
+        elif view.force_on:
+            self._say("minus", "text2", "Visual only, no force")
+        else:
+            self._say("stop", "warn", "Force is off")
+        self.fade_in.setVisible(not view.force_on and view.may_resume)
+
+    def _say(self, icon: str, ink: str, word: str) -> None:
+        self.sign.show_icon(icon, ink)  # type: ignore[arg-type]  # one of three literals above
+        self.word.setText(word)
+
+
+ALL_ROWS = 99
+
+
+class DeviceCard(Card):
+    """Name, state and rows; ``diagnose_asked`` when the operator wants to know what is wrong with it."""
+
+    diagnose_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=16, gap=10)
+        self.icon = Icon("device", "text2", 22)
+        self.name = label("", "card")
+        self.chip = Chip("neutral", "ring", "Waiting", small=True)
+        self.diagnose = ActionButton("pulse", "Diagnose …", key="D", height=36)
+        self.diagnose.setToolTip("Turns the force off and pauses first")
+        self.diagnose.clicked.connect(self.diagnose_asked)
+        self._most = ALL_ROWS
+        self._view: DeviceView | None = None
+        row = hbox(self.icon, self.name, STRETCH, self.chip, spacing=10)
+        add_layout(self.column, row)
+        self._grid = QGridLayout()
+        self._grid.setVerticalSpacing(8)
+        self._grid.setHorizontalSpacing(12)
+        self._grid.setColumnStretch(1, 1)
+        add_parts(self.column, self._grid, self.diagnose)
+        self.rows: list[tuple[QLabel, Elided]] = []
+
+    def show_rows(self, most: int) -> None:
+        """Show so many rows at most; the rest is in the card's tip."""
+        self._most = most
+        if self._view is not None:
+            self.show_device(self._view)
+
+    def show_device(self, device: DeviceView) -> None:
+        self._view = device
+        self.icon.show_icon(device.icon, "text2")
+        self.name.setText(device.name)
+        self.chip.show_state(*(("ok", "check", "Ready") if device.ready else ("bad", "warning", "Fault")))
+        while len(self.rows) < len(device.rows):
+            name, value = label("", "label", "text2"), Elided("label")
+            value.setFont(font("label", weight=600, tabular=True))
+            value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self._grid.addWidget(name, len(self.rows), 0)
+            self._grid.addWidget(value, len(self.rows), 1)
+            self.rows.append((name, value))
+        for index, ((name, value), (word, said)) in enumerate(zip(self.rows, device.rows, strict=True)):
+            name.setText(word)
+            value.show_text(said)
+            for part in (name, value):
+                part.setVisible(index < self._most)
+        self.setToolTip("\n".join(f"{word}: {said}" for word, said in device.rows[self._most :]))

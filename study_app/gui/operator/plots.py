@@ -1,0 +1,287 @@
+"""What the operator watches: tiles of the servo's health, and plots of force, position and lateness."""
+
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QSize, Qt
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QGridLayout, QWidget
+
+from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.widgets.accessible import describe_plot
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
+from study_app.gui.widgets.cards import Card, Chip, Icon
+from study_app.gui.widgets.labels import Elided, Ink, figures, label
+from study_app.gui.widgets.live_plots import (
+    LINE_PX,
+    NAME_MARGIN,
+    NAMES,
+    NOTHING,
+    STROKE,
+    Floats,
+    LatenessPlot,
+    Plot,
+    TracePlot,
+    draw_quickly,
+    number,
+    step_for,
+    time_ticks,
+)
+from study_app.gui.widgets.masked_panel import MaskedPanel
+from study_app.viewmodels.operator import OperatorView
+from study_app.viewmodels.servo_health import TRACE_WINDOW_S, Forces, ServoHealth, Tile, Verdict
+
+FIELD = QSize(320, 210)
+"""What the card asks for, whether it shows the force or hides it."""
+LEAST_SHARE = 1 / 16  # of the limit: a plot of less would show noise as large as force
+NARROWS_BELOW = 0.8  # of the reach that would do, so that a force at its edge does not make the scale come and go
+LEAST_WAKE_MPS = 0.1
+FILL_ALPHA = 46
+
+
+class ForcePlot(TracePlot):
+    """Force on the hand along x, y, z, its size as a field behind them, and the limit.
+
+    The scale follows the force of the last ten seconds, up to the limit: most liquids stay far below it.
+    """
+
+    limits: tuple[pg.InfiniteLine, ...] = ()
+    limit_name: pg.TextItem | None = None
+    size_field: pg.PlotCurveItem | None = None
+
+    def __init__(self, limit_n: float) -> None:
+        super().__init__(TRACE_WINDOW_S, limit_n, (*NAMES, "size"))
+        self.limit_n = limit_n
+        self._least = limit_n * LEAST_SHARE
+        self.size_field = pg.PlotCurveItem(fillLevel=0.0)  # the last curve's field, without its line
+        self.size_field.setZValue(-5)
+        self.limits = tuple(pg.InfiniteLine(sign * limit_n, angle=0) for sign in (1, -1))
+        self.limit_name = pg.TextItem(f"limit {number(limit_n)} N", anchor=(0, 0))
+        self.limit_name.textItem.setFont(font("small", weight=600, tabular=True))
+        self.limit_name.textItem.document().setDocumentMargin(NAME_MARGIN)
+        for item in (self.size_field, *self.limits, self.limit_name):
+            self.box.addItem(item)
+        self.axes["bottom"].setHeight(6)
+        self.show_ticks("bottom", [])
+        self._make_room()
+        self.apply_theme(LIGHT)
+
+    def show_forces(self, times_s: Floats, forces_n: Floats) -> None:
+        """Draw forces (n, 4: x, y, z, size) [N]."""
+        peak = float(forces_n[:, 3].max(initial=0.0))
+        wanted = min(max(peak, self._least), self.limit_n)
+        if wanted < NARROWS_BELOW * self.reach:
+            self.show_reach(wanted / NARROWS_BELOW if wanted < self.limit_n else self.limit_n)
+        self.show_traces(times_s, forces_n)
+        if self.size_field is not None:
+            self.size_field.setData(times_s, forces_n[:, 3])
+
+    def _make_room(self) -> None:
+        super()._make_room()
+        for line in self.limits:
+            line.setVisible(self.limit_n <= self.reach)
+        if self.limit_name is not None:
+            self.limit_name.setVisible(self.limit_n <= self.reach)
+            self.limit_name.setPos(QPointF(-1.01 * self._span_s, self.limit_n))
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().apply_theme(theme)
+        self.curves[3].setPen(self.stroke(theme.text3, 1.4))
+        self.ends[3].setColor(QColor(theme.text3))
+        for line in self.limits:
+            line.setPen(self.stroke(theme.bad, 1.4, (4.0, 3.0)))
+        if self.limit_name is not None:
+            self.limit_name.setColor(QColor(theme.bad))
+        if self.size_field is not None:
+            field = QColor(theme.text3)
+            field.setAlpha(FILL_ALPHA)
+            self.size_field.setPen(NOTHING)
+            self.size_field.setBrush(field)
+
+
+class WakePlot(Plot):
+    """How fast the liquid at the ball moves by itself, from zero up."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._asked = self.reach = LEAST_WAKE_MPS
+        self.rows_and_step: tuple[int, float] = (0, 0.0)
+        self.curve = pg.PlotCurveItem(antialias=True)
+        draw_quickly(self.curve, solid=True)
+        self.box.addItem(self.curve)
+        self.box.sigResized.connect(self._make_room)
+        self.show_ticks("bottom", time_ticks(TRACE_WINDOW_S))
+        self._right = 0.0
+        self._make_room()
+        self.apply_theme(LIGHT)
+
+    def keep_right(self, seconds: float) -> None:
+        """Leave as much room right of now as the plot above, so that both share their times."""
+        if seconds != self._right:
+            self._right = seconds
+            self._make_room()
+
+    def show_wake(self, times_s: Floats, speeds_mps: Floats) -> None:
+        """Draw speeds (n,) [m/s] over ``times_s`` (n,)."""
+        peak = max(float(speeds_mps.max(initial=0.0)), LEAST_WAKE_MPS)
+        if peak > self.reach or peak < 0.4 * self.reach:
+            self._asked = peak
+            self._make_room()
+        self.curve.setData(times_s, speeds_mps)
+
+    def _make_room(self) -> None:
+        height = max(2.0 * LINE_PX, self.box.height())
+        step = step_for(self._asked, max(1, int(height / LINE_PX / 1.5) - 1))
+        step = step if step <= self._asked else step_for(self._asked / 2.6, 1)  # one line at least above zero
+        rows = int(self._asked / step + 1e-9)
+        self.reach = self._asked
+        if (rows, step) != self.rows_and_step:
+            self.rows_and_step = (rows, step)
+            self.show_ticks("left", [(k * step, number(k * step)) for k in range(rows + 1)])
+        half = 0.5 * self.reach * LINE_PX / (height - LINE_PX)
+        self.box.setYRange(-half, self.reach + half, padding=0)
+        self.box.setXRange(-1.02 * TRACE_WINDOW_S, self._right or 0.08 * TRACE_WINDOW_S, padding=0)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().apply_theme(theme)
+        self.curve.setPen(self.stroke(theme.accent, STROKE))
+
+
+class ForceCard(Card):
+    """Force and wake, one above the other over the same ten seconds."""
+
+    def __init__(self, limit_n: float) -> None:
+        aside = label(f"last {TRACE_WINDOW_S:.0f} s, N; limit {limit_n:g}", "small", "text2")
+        super().__init__("Force", aside, padding=16, gap=2)
+        self.plot = ForcePlot(limit_n)
+        self.wake = WakePlot()
+        add_parts(self.column, (self.plot, 5), label("Wake speed, m/s in the scene", "small", "text2"), (self.wake, 3))
+        for plot in (self.plot, self.wake):
+            plot.setMinimumHeight(48)
+        span = f"over the last {TRACE_WINDOW_S:.0f} s"
+        force = f"Force along x, y and z and its magnitude {span}, in N, with the limit of {limit_n:g} N."
+        describe_plot(self.plot, "Force on the hand", force)
+        describe_plot(self.wake, "Wake speed", f"Speed of the wake in the scene {span}, in m/s.")
+
+    def show_forces(self, forces: Forces, now_ns: int) -> None:
+        """Draw force and wake as of now, on the servo's clock."""
+        times_s, forces_n, wakes_mps = forces.trace(now_ns)
+        self.plot.show_forces(times_s, forces_n)
+        self.wake.keep_right(float(self.plot.box.viewRange()[0][1]))
+        self.wake.show_wake(times_s, wakes_mps)
+
+    def sizeHint(self) -> QSize:
+        return FIELD
+
+    def minimumSizeHint(self) -> QSize:
+        return FIELD
+
+
+class LatenessCard(Card):
+    """Histogram of the last minute's ticks."""
+
+    def __init__(self, limit_s: float) -> None:
+        super().__init__("Tick lateness", label("last 60 s", "small", "text2"), padding=16, gap=4)
+        self.plot = LatenessPlot(limit_s * 1e6)
+        describe_plot(self.plot, "Tick lateness", "Histogram of how late the ticks of the last minute began, in µs.")
+        axes = label("lateness, µs (log), ticks per bin (log)", "small", "text2")
+        axes.setAlignment(Qt.AlignmentFlag.AlignHCenter)
+        add_parts(self.column, (self.plot, 1), axes)
+
+    def show_health(self, health: ServoHealth) -> None:
+        """Draw the ticks as of now."""
+        edges, counts = health.lateness_histogram()
+        p99 = health.vitals().lateness_p99_s
+        self.plot.show_histogram(edges, counts, None if p99 is None else p99 * 1e6)
+
+
+class PositionCard(Card):
+    """The hand along x, y and z over the last ten seconds; with the mouse, the pointer."""
+
+    def __init__(self, reach_m: float, *, pointer: bool) -> None:
+        title = "Position of the pointer" if pointer else "Position of the hand"
+        super().__init__(title, label(f"last {TRACE_WINDOW_S:.0f} s, mm", "small", "text2"), padding=16, gap=4)
+        self.plot = TracePlot(TRACE_WINDOW_S, reach_m * 1000)
+        what = f"Position along x, y and z over the last {TRACE_WINDOW_S:.0f} s, in mm."
+        describe_plot(self.plot, title, what)
+        self.column.addWidget(self.plot, 1)
+
+    def show_health(self, health: ServoHealth, now_s: float) -> None:
+        """Draw the curves as of now."""
+        times, positions = health.trace(now_s)
+        self.plot.show_traces(times, positions * 1000)
+
+
+class HiddenForceCard(Card):
+    """In the place and size of the force's plot while the study is double-blind: nothing about the force."""
+
+    TITLE = "Hidden while the study is double-blind"
+    WHY = "A trace would reveal the liquid."
+
+    def __init__(self) -> None:
+        super().__init__("Force", Chip("neutral", "eye_off", "Hidden", small=True), padding=16, gap=8)
+        self.column.addWidget(MaskedPanel(self.TITLE, self.WHY), 1)
+
+    def sizeHint(self) -> QSize:
+        return FIELD
+
+    def minimumSizeHint(self) -> QSize:
+        return FIELD
+
+
+VERDICTS: dict[Verdict, tuple[str, Ink]] = {
+    "ok": ("check", "ok"),
+    "late": ("warning", "warn"),
+    "open": ("ring", "text3"),
+}
+
+
+class TileCard(Card):
+    """One number."""
+
+    def __init__(self) -> None:
+        super().__init__(padding=14, gap=4)
+        self.title = label("", "label", "text2")
+        self.value = figures("", "number")
+        self.unit = label("", "label", "text2")
+        self.sign = Icon("ring", "text3", 14)
+        self.line = Elided("small", "text2")
+        self.column.addWidget(self.title)
+        row = hbox(self.value, self.unit, STRETCH, spacing=6)
+        add_layout(self.column, row)
+        below = hbox(self.sign, (self.line, 1), spacing=8)
+        add_layout(self.column, below)
+
+    def show_tile(self, tile: Tile) -> None:
+        self.title.setText(tile.title)
+        self.value.setText(tile.value)
+        self.unit.setText(tile.unit)
+        self.line.show_text(tile.line)
+        self.sign.show_icon(*VERDICTS[tile.verdict])
+        words = {"ok": "within limits", "late": "outside limits", "open": "not measured yet"}
+        value = f"{tile.value} {tile.unit}".strip()
+        self.setAccessibleName(f"{tile.title}: {value}, {words[tile.verdict]}, {tile.line}")
+
+
+class Tiles(QWidget):
+    """The row of four tiles."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setSpacing(10)
+        self.cards = [TileCard() for _ in range(4)]
+        self.narrow(False)
+
+    def narrow(self, yes: bool) -> None:
+        """Stand two by two in a small window."""
+        self.across = across = 2 if yes else 4
+        for index, card in enumerate(self.cards):
+            self._grid.addWidget(card, index // across, index % across)
+        for column in range(4):
+            self._grid.setColumnStretch(column, int(column < across))
+
+    def show_view(self, view: OperatorView) -> None:
+        for card, tile in zip(self.cards, view.tiles, strict=True):
+            card.show_tile(tile)

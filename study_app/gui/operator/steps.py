@@ -1,0 +1,269 @@
+"""Where the session is: the steps, the present one, and counts."""
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
+
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import TypeRole, font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import Bar, Card, Rule, scrolled
+from study_app.gui.widgets.labels import Elided, figures, label, set_ink
+from study_app.viewmodels.number_words import minutes
+from study_app.viewmodels.operator import OperatorView, StepRow
+
+HEADINGS: tuple[TypeRole, ...] = ("display", "title", "title_dense", "card")
+
+
+class Now(QWidget):
+    """Part, trial, what is done in it, and for how long."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.part = Elided("label", "text2")
+        self.heading = label("", "display")
+        self.heading.setMinimumWidth(1)
+        self.setting = label("", "body", "text2", wraps=True)
+        self.elapsed_word = label("Elapsed", "label", "text2")
+        self.elapsed = figures("", "label")
+        self.bar = Bar()
+        keep = self.bar.sizePolicy()
+        keep.setRetainSizeWhenHidden(True)
+        self.bar.setSizePolicy(keep)
+        self.least = figures("", "small", "text2")
+        self._words, self._time = QWidget(), QWidget()
+        row = hbox(self.elapsed_word, STRETCH, self.elapsed)
+        vbox(self.part, self.heading, self.setting, STRETCH, spacing=6, margins=0, parent=self._words)
+        vbox(row, self.bar, self.least, STRETCH, spacing=6, margins=0, parent=self._time)
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(24)
+        self._grid.setVerticalSpacing(12)
+        self.lie_flat(False)
+
+    def lie_flat(self, yes: bool) -> None:
+        """Put the time next to the words instead of under them."""
+        self._grid.addWidget(self._words, 0, 0)
+        self._grid.addWidget(self._time, 0 if yes else 1, 1 if yes else 0)
+        self._grid.setColumnStretch(0, 3)
+        self._grid.setColumnStretch(1, 2 if yes else 0)
+
+    def show_view(self, view: OperatorView) -> None:
+        self.part.show_text(view.part_line)
+        if view.heading != self.heading.text():
+            self.heading.setText(view.heading)
+            self._fit_heading()
+        self.setting.setText(view.setting_line)
+        self._show_time(view)
+
+    def _show_time(self, view: OperatorView) -> None:
+        time = view.trial_time
+        self.elapsed_word.setText("Elapsed" if time else "")
+        self.elapsed.setText(time.words if time else "")
+        self.bar.setVisible(time is not None and bool(time.most_s))
+        if time is None or not time.most_s:
+            self.least.setText("")
+            return
+        self.bar.show_share(time.elapsed_s / time.most_s, time.least_s / time.most_s if time.least_s else None)
+        self.least.setText(f"at least {minutes(time.least_s)}" if time.least_s else "")
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit_heading()
+
+    def _fit_heading(self) -> None:
+        for role in HEADINGS:
+            self.heading.setFont(font(role, tabular=True))
+            if self.heading.fontMetrics().horizontalAdvance(self.heading.text()) <= self._words.width():
+                break
+
+
+class Tally(QWidget):
+    """What is on disk, how many trials were within limits, marks and repeats; the limit broken last; the track."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.counts: list[tuple[QLabel, QLabel]] = []
+        self.beyond = label("", "small", "warn", wraps=True)
+        self.beyond.hide()
+        self.track = label("", "small", "text2", wraps=True)
+        self.track.hide()
+        self._flat = False
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(8)
+        self._grid.setVerticalSpacing(8)
+
+    def lie_flat(self, yes: bool) -> None:
+        """Stand in one row instead of one below the other."""
+        self._flat = yes
+        self._place()
+
+    def show_view(self, view: OperatorView) -> None:
+        """Show the counts, the newest limit that was broken (the tip has all of them), and how the track is doing."""
+        if len(self.counts) < len(view.counts):
+            for _ in range(len(view.counts) - len(self.counts)):
+                value = figures("", "label")
+                value.setFont(font("label", weight=600, tabular=True))
+                self.counts.append((label("", "label", "text2"), value))
+            self._place()
+        for (name, value), (word, count) in zip(self.counts, view.counts, strict=True):
+            name.setText(word)
+            value.setText(count)
+        self.beyond.setVisible(bool(view.beyond))
+        self.beyond.setText(f"{view.beyond[0]}." if view.beyond else "")
+        self.beyond.setToolTip("\n".join(view.beyond) if len(view.beyond) > 1 else "")
+        self.track.setVisible(bool(view.track))
+        self.track.setText("  ·  ".join(view.track))
+
+    def _place(self) -> None:
+        left, right = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight
+        for index, (name, value) in enumerate(self.counts):
+            row, column = (0, 3 * index) if self._flat else (index, 0)
+            self._grid.addWidget(name, row, column, left)
+            self._grid.addWidget(value, row, column + 1, left if self._flat else right)
+        for column in range(9):
+            self._grid.setColumnStretch(column, int(column in {2, 5} if self._flat else column == 1))
+        for row, line in enumerate((self.beyond, self.track), start=len(self.counts)):
+            self._grid.addWidget(line, row, 0, 1, 9 if self._flat else 2)
+
+
+WIDTH, NARROW, SLIM = 318, 248, 72
+ROW_HEIGHT = 44
+LEAST_ROW_HEIGHT = 26
+DOT = 11
+
+
+class StepLine(Themed, QWidget):
+    """One step: a dot on the line that joins all steps, its name, and its time or place."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.row = StepRow("", "open", "")
+        self.first = self.last = False
+        self.name = Elided("body")
+        self.note = figures("", "label", "text2")
+        layout = hbox((self.name, 1), self.note, margins=(37, 0, 0, 0), parent=self)
+        self._layout = layout
+        self.setMinimumHeight(LEAST_ROW_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
+
+    def sizeHint(self) -> QSize:
+        """Return the room that a row likes; where there are many, each takes less."""
+        return QSize(super().sizeHint().width(), ROW_HEIGHT)
+
+    def slim(self, yes: bool) -> None:
+        """Show the dot alone; the rest is in its tip."""
+        self._layout.setContentsMargins(0 if yes else 37, 0, 0, 0)
+        for part in (self.name, self.note):
+            part.setVisible(not yes)
+
+    def show_row(self, row: StepRow, *, first: bool, last: bool) -> None:
+        if (row, first, last) == (self.row, self.first, self.last):
+            return
+        self.row, self.first, self.last = row, first, last
+        self.name.show_text(row.label)
+        self.note.setText(row.note)
+        self.name.setFont(font("body", weight=600 if row.state == "now" else 400, scale=0.94))
+        set_ink(self.name, "text2" if row.state == "open" else "text")
+        set_ink(self.note, "accent" if row.state == "now" else "text2")
+        note = "" if row.note == row.state else row.note
+        self.setAccessibleName(f"{row.label}, {row.state} {note}".strip())
+        self.setToolTip(f"{row.label}  ·  {row.note}" if row.note else row.label)
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        t = self.theme
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        middle = QPointF(12, self.height() / 2)
+        reached = self.row.state != "open"
+        if not self.first:
+            painter.setPen(QPen(QColor(t.ok if reached else t.border), 1.6))
+            painter.drawLine(QPointF(12, 0), QPointF(12, middle.y() - DOT))
+        if not self.last:
+            painter.setPen(QPen(QColor(t.ok if self.row.state == "done" else t.border), 1.6))
+            painter.drawLine(QPointF(12, middle.y() + DOT), QPointF(12, self.height()))
+        if self.row.state == "done":
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(t.ok_bg))
+            painter.drawEllipse(middle, DOT, DOT)
+            draw_icon(painter, "check", QRectF(5, middle.y() - 7, 14, 14), t.ok, 2.6)
+        elif self.row.state == "now":
+            painter.setPen(QPen(QColor(t.accent), 1.8))
+            painter.setBrush(QColor(t.selected))
+            painter.drawEllipse(middle, DOT, DOT)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(t.accent))
+            painter.drawEllipse(middle, 4.5, 4.5)
+        else:
+            painter.setPen(QPen(QColor(t.ctl), 1.5))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawEllipse(middle, 7, 7)
+
+
+class Rail(Card):
+    """Now, steps and counts; slim, the steps' dots alone."""
+
+    def __init__(self) -> None:
+        super().__init__(gap=10)
+        self.now, self.tally = Now(), Tally()
+        self.heading = self.now.heading
+        self.lines: list[StepLine] = []
+        self._slim = False
+        self._steps = QWidget()
+        self._steps_column = vbox((STRETCH, 1), spacing=0, parent=self._steps)
+        self.steps_area = scrolled(self._steps)
+        self._rules = Rule(), Rule()
+        add_parts(self.column, self._rules[0], (self.steps_area, 1), self._rules[1])
+        self.take_back()
+
+    def take_back(self) -> None:
+        """Hold now and counts, above and below the steps."""
+        for part in (self.now, self.tally):
+            part.lie_flat(False)
+        self.column.insertWidget(0, self.now)
+        self.column.addWidget(self.tally)
+        self._be(slim=False)
+
+    def give_away(self) -> None:
+        """Show the steps' dots alone: now and counts stand elsewhere."""
+        for part in (self.now, self.tally):
+            part.lie_flat(True)
+        self._be(slim=True)
+
+    def narrow(self, yes: bool) -> None:
+        """Take less room in a smaller window."""
+        self.setFixedWidth(SLIM if self._slim else NARROW if yes else WIDTH)
+
+    def _be(self, *, slim: bool) -> None:
+        self._slim = slim
+        for part in self._rules:
+            part.setVisible(not slim)
+        self._steps_column.setContentsMargins(0, 0, 0 if slim else 8, 0)
+        bars = Qt.ScrollBarPolicy
+        self.steps_area.setVerticalScrollBarPolicy(bars.ScrollBarAlwaysOff if slim else bars.ScrollBarAsNeeded)
+        for line in self.lines:
+            line.slim(slim)
+
+    def show_view(self, view: OperatorView) -> None:
+        """Show the steps; ``now`` and ``tally`` are shown for themselves, since each may fail alone."""
+        rows = view.steps
+        while len(self.lines) < len(rows):
+            line = StepLine()
+            line.apply_theme(self.theme)
+            line.slim(self._slim)
+            self.lines.append(line)
+            self._steps_column.insertWidget(len(self.lines) - 1, line)
+        for index, (line, row) in enumerate(zip(self.lines, rows, strict=True)):
+            arrived = row.state == "now" != line.row.state
+            line.show_row(row, first=index == 0, last=index == len(rows) - 1)
+            if arrived:
+                self.steps_area.ensureWidgetVisible(line, 0, 2 * LEAST_ROW_HEIGHT)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        for line in self.lines:
+            if line.row.state == "now":
+                self.steps_area.ensureWidgetVisible(line, 0, LEAST_ROW_HEIGHT)

@@ -1,0 +1,619 @@
+"""The fields of a participant's form, one class for each kind of question."""
+
+from __future__ import annotations
+
+import unicodedata
+from typing import TYPE_CHECKING, ClassVar, Final
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QKeyEvent, QMouseEvent, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QPlainTextEdit, QPushButton, QSizePolicy, QSlider, QWidget
+
+from study_app.gui.participant.forms.question_field import (
+    ENTER,
+    CheckOption,
+    EntryKeys,
+    OptionsField,
+    QuestionField,
+    RadioOption,
+    ScaleField,
+    TypedField,
+    question_of,
+    target_px,
+)
+from study_app.gui.participant.pages.page_widget import DigitPad, page_painter, point_at
+from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.widgets.accessible import say
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.number_field import read_number, write_number
+from study_app.protocol.questions import (
+    ChoiceView,
+    ItemView,
+    NumberView,
+    RatingView,
+    SliderView,
+    TextView,
+    Value,
+    plain_number,
+)
+from study_app.protocol.table import UNPRINTABLE
+
+if TYPE_CHECKING:
+    from study_app.protocol.wording.languages import Words
+
+SHORT = 12  # letters of options of which three stand side by side
+MEDIUM = 28  # of which two do
+MOST_ACROSS = 4
+
+
+class ChoiceField(OptionsField):
+    """Options in a grid; of several, a key or a click adds one or removes it."""
+
+    widget_id: ClassVar[str] = "choice"
+
+    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+        assert isinstance(view, ChoiceView)  # noqa: S101 - the registry names this widget
+        self.several = view.several
+        self._ids = [option for option, _ in view.options]
+        self._texts = dict(view.options)
+        super().__init__(view, words, parent)
+        kind = CheckOption if view.several else RadioOption
+        self.hold([kind(text, text, view.text, self) for _, text in view.options])
+        longest = max(len(text) for _, text in view.options)
+        self._across = min(len(self.options), 3 if longest <= SHORT else 2 if longest <= MEDIUM else 1)
+        area = QWidget(self)
+        self._cells = QGridLayout(area)
+        self._cells.setContentsMargins(0, 0, 0, 0)
+        self._arrange(self._across)
+        self.put(area)
+
+    @property
+    def note(self) -> str:
+        """The small line under the words says that several can be chosen."""
+        note = super().note
+        return " · ".join(filter(None, (self._words.several_possible, note))) if self.several else note
+
+    @property
+    def forward(self) -> int:
+        """Which way the key → goes."""
+        return -1 if self.layoutDirection() == Qt.LayoutDirection.RightToLeft else 1
+
+    @property
+    def chosen(self) -> tuple[int, ...]:
+        """The places of the options that are chosen."""
+        given = self.value if isinstance(self.value, tuple) else (self.value,)
+        return tuple(place for place, one in enumerate(self._ids) if one in given)
+
+    def value_at(self, place: int) -> Value:
+        """Return the option."""
+        return self._ids[place]
+
+    def spoken(self) -> str:
+        """Return the words of what was chosen."""
+        return self._words.joined([self._texts[self._ids[place]] for place in self.chosen])
+
+    def height_in(self, width: int, room: int) -> int:
+        """Return the height [px] in a width, with more options side by side where there is too little room."""
+        for across in range(self._across, min(MOST_ACROSS, len(self.options)) + 1):
+            self._arrange(across)
+            if (height := super().height_in(width, room)) <= room:
+                return height
+        return height
+
+    def _arrange(self, across: int) -> None:
+        """Put so many options side by side."""
+        for number, option in enumerate(self.options):
+            self._cells.addWidget(option, number // across, number % across)
+        for column in range(MOST_ACROSS):
+            self._cells.setColumnStretch(column, 1 if column < across else 0)
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        super().set_scale(scale)
+        self._cells.setSpacing(round(8 * scale))
+
+    def choose(self, place: int, *, by_key: bool) -> None:
+        """Answer with an option; of several, add it or remove it."""
+        if not self.several:
+            super().choose(place, by_key=by_key)
+            return
+        before = self.chosen
+        if now := tuple(one for number, one in enumerate(self._ids) if (number in before) != (number == place)):
+            self.give(now)
+        else:
+            self.take_back()
+        self._check()
+        point_at(self.options[place])
+
+
+ACROSS = 6
+WAIT_MS = 400
+FIELD_WIDTH = 120.0
+
+
+class Entry(EntryKeys, QLineEdit):
+    """The field."""
+
+
+class NumberField(TypedField):
+    """Point or comma; an entry that is not a permitted number is reported and not taken."""
+
+    widget_id: ClassVar[str] = "number"
+
+    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+        assert isinstance(view, NumberView)  # noqa: S101 - the registry names this widget
+        self._number = view
+        super().__init__(view, words, parent)
+        self.entry = Entry(self)
+        self.entry.setAccessibleName(" ".join(filter(None, (view.text, view.unit))))
+        self.entry.setMaxLength(20)
+        self.entry.textChanged.connect(self._edit)
+        self._unit = QLabel(view.unit)
+        self._unit.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
+        more = (*(() if view.whole else (".",)), *self._signs())
+        self._pad = DigitPad(self.entry, more, ACROSS, words.delete_digit, self)
+        self._wrong = QLabel()
+        self._wrong.setWordWrap(True)
+        self._wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
+        self._wrong.hide()
+        self._row = hbox(self.entry, self._unit, (STRETCH, 1), self._pad)
+        area = QWidget(self)
+        vbox(self._row, self._wrong, margins=0, parent=area)
+        self.put(area)
+        self.type_into(self.entry, WAIT_MS, self._take)
+
+    @property
+    def keys(self) -> list[QPushButton]:
+        """The keys on the screen."""
+        return self._pad.keys
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with the entry; "" where nothing is."""
+        return self._wrong.text()
+
+    def show_answer(self, value: Value) -> None:
+        self.kept(value)
+        if isinstance(value, int | float):
+            self._write(write_number(value, 9))
+
+    def clear(self) -> None:
+        """Empty the field."""
+        self._timer.stop()
+        self._write("")
+        self._say("")
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        super().set_scale(scale)
+        side = round(target_px(scale))
+        self.entry.setFont(font("cell", scale=scale, tabular=True))
+        self.entry.setFixedSize(round(FIELD_WIDTH * scale), side)
+        self._unit.setFont(font("body", scale=scale))
+        self._wrong.setFont(font("label", scale=scale, weight=600))
+        self._row.setSpacing(round(10 * scale))
+        self._pad.set_size(side, side, round(6 * scale), font("cell", scale=scale))
+
+    def height_in(self, width: int, room: int) -> int:
+        """Return the height [px] that the question needs where its entry is reported as wrong, too."""
+        problem = self._wrong.text()
+        self._wrong.setText(problem or self._expected())
+        self._wrong.show()
+        height = super().height_in(width, room)
+        self._wrong.setText(problem)
+        self._wrong.setVisible(bool(problem))
+        return height
+
+    def typed(self) -> str:
+        """Return what was typed."""
+        return self.entry.text()
+
+    def finish(self) -> bool:
+        """Take the entry; say what is wrong with it."""
+        self._timer.stop()
+        text = self.entry.text().strip()
+        if not text:
+            self._say("")
+            self.take_back()
+            return True
+        number = read_number(text)
+        if number is None or not self._number.permits(number):
+            self._say(self._expected())
+            self.take_back()
+            return False
+        self._say("")
+        self.give(plain_number(number))
+        return True
+
+    def _signs(self) -> tuple[str, ...]:
+        below = self._number.least is None or self._number.least < 0
+        return ("-",) if below else ()
+
+    def _write(self, text: str) -> None:
+        self.entry.blockSignals(True)
+        self.entry.setText(text)
+        self.entry.blockSignals(False)
+
+    def _edit(self) -> None:
+        self._say("")
+        self._timer.start()
+
+    def _take(self) -> None:
+        """Take what was typed so far if it is a number; while one types, nothing is reported."""
+        number = read_number(self.entry.text())
+        if number is not None and self._number.permits(number):
+            self.give(plain_number(number))
+        else:
+            self.take_back()
+
+    def _expected(self) -> str:
+        """Return which number is permitted."""
+        words, view = self._words, self._number
+        kind = words.whole_number if view.whole else words.any_number
+        least, most = (None if one is None else write_number(one, 9) for one in (view.least, view.most))
+        if least is not None and most is not None:
+            return words.number_between.format(kind=kind, least=least, most=most)
+        if least is not None:
+            return words.number_from.format(kind=kind, least=least)
+        if most is not None:
+            return words.number_to.format(kind=kind, most=most)
+        return words.number_needed.format(kind=kind)
+
+    def _say(self, problem: str) -> None:
+        self._wrong.setText(problem)
+        self._wrong.setVisible(bool(problem))
+        self.entry.setProperty("state", "refused" if problem else "")
+        self.entry.style().unpolish(self.entry)
+        self.entry.style().polish(self.entry)
+        self.entry.setAccessibleDescription(problem)
+        if problem:
+            say(self.entry, problem)
+
+
+JUDGE_SHARE = 2  # of the row, where every point has one
+ALL_NAMED = 5  # points whose names stand side by side; of more the ends, the middle and the one pointed at
+
+
+class RatingField(ScaleField):
+    """Points with their names above them."""
+
+    widget_id: ClassVar[str] = "rating"
+
+    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+        assert isinstance(view, RatingView)  # noqa: S101 - the registry names this widget
+        super().__init__(view, words, parent)
+        self.build(view.labels, view.cannot_judge, view.cannot_judge)
+        scale, area = QWidget(self), QWidget(self)
+        scale.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
+        self.cells = QGridLayout(scale)
+        self.cells.setContentsMargins(0, 0, 0, 0)
+        self.row = hbox((scale, len(self.points)), margins=0, parent=area)
+        if self.judge is not None:
+            self.row.addWidget(self.judge, JUDGE_SHARE, Qt.AlignmentFlag.AlignBottom)
+        self.put(area)
+        self._names = [QLabel() for _ in self._columns()]
+        for (first, last), label, side in zip(self._columns(), self._names, self._sides(), strict=True):
+            label.setWordWrap(True)
+            label.setAlignment(side | Qt.AlignmentFlag.AlignAbsolute | Qt.AlignmentFlag.AlignBottom)
+            self.cells.addWidget(label, 0, first, 1, last - first + 1)
+        for place, point in enumerate(self.points):
+            self.cells.addWidget(point, 1, place)
+            self.cells.setColumnStretch(place, 1)
+        self.pointed_at.connect(self._name_points)
+        self._name_points()
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        super().set_scale(scale)
+        self.cells.setSpacing(round(6 * scale))
+        self.row.setSpacing(round(14 * scale))
+        widest = max(point.sizeHint().width() for point in self.points)
+        for point in self.points:
+            point.setMinimumWidth(widest)
+        for label in self._names:
+            label.setFont(font("label", scale=scale, weight=600))
+
+    def _columns(self) -> list[tuple[int, int]]:
+        """Return over which columns each name stands, the first and the last of them."""
+        points = len(self.labels)
+        if points <= ALL_NAMED:
+            return [(place, place) for place in range(points)]
+        end = points // 3
+        return [(0, end - 1), (end, points - end - 1), (points - end, points - 1)]
+
+    def _sides(self) -> list[Qt.AlignmentFlag]:
+        """Return to which side of its columns each name stands."""
+        centre = Qt.AlignmentFlag.AlignHCenter
+        if len(self.labels) <= ALL_NAMED:
+            return [centre] * len(self.labels)
+        return [Qt.AlignmentFlag.AlignLeft, centre, Qt.AlignmentFlag.AlignRight]
+
+    def _name_points(self, _place: int = -1) -> None:
+        """Show the names: all of a short scale; of a long one the ends, and in the middle the one pointed at."""
+        texts = list(self.labels)
+        if len(texts) > ALL_NAMED:
+            middle = self.labels[len(texts) // 2] if len(texts) % 2 else ""
+            if 0 < self.pointed < len(texts) - 1:
+                middle = f"{self.pointed + 1} {self.labels[self.pointed]}"
+            texts = [self.labels[0], middle, self.labels[-1]]
+        for place, (label, text) in enumerate(zip(self._names, texts, strict=True)):
+            at = self.pointed == place if len(self.labels) <= ALL_NAMED else place == 1 and self.pointed > 0
+            ink = PARTICIPANT.accent if at else PARTICIPANT.text2
+            label.setStyleSheet(f"color: {ink}; background: transparent;")
+            label.setText(text)
+
+
+ABSOLUTE = Qt.AlignmentFlag.AlignAbsolute
+KNOB = 12.0  # radius
+TRACK = 6.0
+PAGE_STEPS = 10
+STEP_KEYS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_PageDown: -PAGE_STEPS, Qt.Key.Key_PageUp: PAGE_STEPS}
+
+
+class Line(QSlider):
+    """The line and its handle; ``set_to(step)`` comes with a click, a key, and where the handle is let go."""
+
+    set_to = Signal(int)
+
+    def __init__(self, steps: int, parent: QWidget) -> None:
+        super().__init__(Qt.Orientation.Horizontal, parent)
+        self.touched = False
+        self._scale = 1.0
+        self.setRange(0, steps)
+        self.setPageStep(PAGE_STEPS)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.valueChanged.connect(self._hear)
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        self._scale = scale
+        self.setFixedHeight(round(target_px(scale)))
+
+    def sizeHint(self) -> QSize:
+        return QSize(round(240 * self._scale), round(target_px(self._scale)))
+
+    def show_step(self, step: int) -> None:
+        """Put the handle at a step without a signal."""
+        self.touched = True
+        self.blockSignals(True)
+        self.setValue(step)
+        self.blockSignals(False)
+        self.update()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Move by steps, or to the ends; the first key puts the handle into the middle, or to an end."""
+        if event.key() in (Qt.Key.Key_Home, Qt.Key.Key_End):
+            self._move(self.minimum() if event.key() == Qt.Key.Key_Home else self.maximum())
+        elif (by := STEP_KEYS.get(Qt.Key(event.key()))) is not None:
+            self._move(self.value() + by if self.touched else self.maximum() // 2)
+        else:
+            event.ignore()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.setSliderDown(True)
+            self._drag(event.position().x())
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self.isSliderDown():
+            self._drag(event.position().x())
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Let the handle go: that is the answer."""
+        if self.isSliderDown():
+            self._drag(event.position().x())
+            self.setSliderDown(False)
+            self.set_to.emit(self.value())
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Leave the wheel alone: it changes no answer by accident."""
+        event.ignore()
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self._repaint_question()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self._repaint_question()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = page_painter(self)
+        theme, scale = PARTICIPANT, self._scale
+        left, right, middle = self._left(), self.width() - self._left(), self.height() / 2
+        painter.setPen(QPen(QColor(theme.ctl), 1.5))
+        for x in (left, right):
+            painter.drawLine(QPointF(x, middle - KNOB * scale), QPointF(x, middle + KNOB * scale))
+        painter.setPen(QPen(QColor(theme.ctl), 1))
+        painter.setBrush(QColor(theme.sunk))
+        half = TRACK * scale / 2
+        painter.drawRoundedRect(QRectF(left, middle - half, right - left, 2 * half), half, half)
+        if self.touched:
+            x = left + (right - left) * (self.value() / max(1, self.maximum()))
+            painter.setPen(QPen(QColor(theme.text), 2))
+            painter.setBrush(QColor(theme.accent))
+            painter.drawEllipse(QPointF(x, middle), KNOB * scale, KNOB * scale)
+        painter.end()
+
+    def _left(self) -> float:
+        return (KNOB + 3) * self._scale
+
+    def _drag(self, x: float) -> None:
+        width = max(1.0, self.width() - 2 * self._left())
+        share = min(1.0, max(0.0, (x - self._left()) / width))
+        self.touched = True
+        self.setValue(round(share * self.maximum()))
+        self.update()
+
+    def _move(self, step: int) -> None:
+        self.touched = True
+        self.blockSignals(True)
+        self.setValue(step)
+        self.blockSignals(False)
+        self.update()
+        self.set_to.emit(self.value())
+
+    def _hear(self, step: int) -> None:
+        """Hear a screen reader, which sets the value itself."""
+        if not self.isSliderDown():
+            self.touched = True
+            self.update()
+            self.set_to.emit(step)
+
+    def _repaint_question(self) -> None:
+        if (question := question_of(self)) is not None:
+            question.update()
+
+
+class SliderField(QuestionField):
+    """Arrows move one step, Page ten, Home and End to the ends; a click or a finger puts the handle anywhere."""
+
+    widget_id: ClassVar[str] = "slider"
+
+    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+        assert isinstance(view, SliderView)  # noqa: S101 - the registry names this widget
+        self._slider = view
+        super().__init__(view, words, parent)
+        area = QWidget(self)
+        area.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # a scale has the same order in every language
+        self.line = Line(view.steps, area)
+        self.line.setAccessibleName(view.text)
+        self.line.set_to.connect(lambda step: self.give(view.at(step)))
+        self._ends = (QLabel(view.low), QLabel(words.no_answer_yet), QLabel(view.high))
+        for end, side in zip(self._ends, (Qt.AlignmentFlag.AlignLeft, None, Qt.AlignmentFlag.AlignRight), strict=True):
+            end.setWordWrap(side is not None)
+            end.setAlignment((side or Qt.AlignmentFlag.AlignHCenter) | ABSOLUTE | Qt.AlignmentFlag.AlignTop)
+            end.setStyleSheet(f"color: {PARTICIPANT.text2 if side else PARTICIPANT.text3}; background: transparent;")
+        names = hbox(*((end, 1) for end in self._ends))
+        vbox(self.line, names, spacing=0, margins=0, parent=area)
+        self.put(area)
+        self.setFocusProxy(self.line)
+        self._tell_line()
+
+    def show_answer(self, value: Value) -> None:
+        """Put the handle where it was."""
+        self.kept(value)
+        if isinstance(value, int | float):
+            self.line.show_step(round((value - self._slider.least) / self._slider.step))
+        self._tell_line()
+
+    def clear(self) -> None:
+        """Take the handle away."""
+        self.line.touched = False
+        self.line.update()
+        self._tell_line()
+
+    def give(self, value: Value) -> None:
+        """Take the place of the handle."""
+        super().give(value)
+        self._tell_line()
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        super().set_scale(scale)
+        self.line.set_scale(scale)
+        for end in self._ends:
+            end.setFont(font("label", scale=scale, weight=600))
+
+    def _tell_line(self) -> None:
+        self._ends[1].setText("" if self.is_answered else self._words.no_answer_yet)
+        self.line.setAccessibleDescription(f"{self._slider.low} – {self._slider.high}, {self.accessibleDescription()}")
+
+
+TEXT_WAIT_MS = 600
+FRAME = 20.0  # of a field around its lines
+
+
+class TextEntry(EntryKeys, QPlainTextEdit):
+    """The field; Tab leaves it, and in a single line Enter is the page's."""
+
+    def __init__(self, lines: int, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._lines = lines
+        self.setTabChangesFocus(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        if lines == 1:
+            self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+            self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+
+    def leaves_to_page(self, event: QKeyEvent) -> bool:
+        """Return whether a key is the page's: of several lines only Ctrl+Enter."""
+        if self._lines == 1:
+            return super().leaves_to_page(event)
+        return event.key() in ENTER and bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier)
+
+
+class TextField(TypedField):
+    """A text of one line or several."""
+
+    widget_id: ClassVar[str] = "text"
+
+    def __init__(self, view: ItemView, words: Words, parent: QWidget) -> None:
+        assert isinstance(view, TextView)  # noqa: S101 - the registry names this widget
+        self._shown = view
+        super().__init__(view, words, parent)
+        self.entry = TextEntry(view.lines, self)
+        self.entry.setAccessibleName(view.text)
+        self.entry.textChanged.connect(self._edit)
+        self.put(self.entry)
+        self.type_into(self.entry, TEXT_WAIT_MS, self.finish)
+
+    def show_answer(self, value: Value) -> None:
+        self.kept(value)
+        self.entry.blockSignals(True)
+        self.entry.setPlainText(str(value))
+        self.entry.blockSignals(False)
+
+    def clear(self) -> None:
+        """Empty the field."""
+        self.entry.blockSignals(True)
+        self.entry.clear()
+        self.entry.blockSignals(False)
+        self._timer.stop()
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        super().set_scale(scale)
+        face = font("statement", scale=scale)
+        self.entry.setFont(face)
+        height = self._shown.lines * QFontMetricsF(face).lineSpacing() + FRAME * scale
+        self.entry.setFixedHeight(round(max(target_px(scale), height)))
+
+    def finish(self) -> bool:
+        """Take the text; an empty one is no answer."""
+        self._timer.stop()
+        text = self.entry.toPlainText().strip()
+        if text:
+            self.give(text)
+        else:
+            self.take_back()
+        return True
+
+    def typed(self) -> str:
+        """Return what was typed."""
+        return self.entry.toPlainText()
+
+    def _edit(self) -> None:
+        """Keep the text within its length, and free of what cannot be printed."""
+        text = self.entry.toPlainText()
+        kept = "".join(one for one in text if one == "\n" or unicodedata.category(one) not in UNPRINTABLE)
+        kept = kept[: self._shown.longest]
+        if self._shown.lines == 1:
+            kept = kept.replace("\n", " ")
+        if kept != text:
+            place = min(self.entry.textCursor().position(), len(kept))
+            self.entry.blockSignals(True)
+            self.entry.setPlainText(kept)
+            self.entry.blockSignals(False)
+            cursor = self.entry.textCursor()
+            cursor.setPosition(place)
+            self.entry.setTextCursor(cursor)
+        self._timer.start()
+
+
+FIELDS: Final[dict[str, type[QuestionField]]] = {
+    kind.widget_id: kind for kind in (ChoiceField, NumberField, RatingField, SliderField, TextField)
+}
+"""Every widget by the id that a question names it by."""

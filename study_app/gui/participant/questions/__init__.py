@@ -1,1 +1,0 @@
-"""The widgets of questions, one module each; a new one is a new module here."""

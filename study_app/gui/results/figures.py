@@ -1,0 +1,383 @@
+"""The figures of a study: drawn in the background, shown one at a time."""
+
+import queue
+import re
+import threading
+from collections.abc import Mapping
+
+from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtSvg import QSvgRenderer
+from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QWidget
+
+from study_app.gui.theme.fonts import FAMILIES
+from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import SHADOW, Bar, Card
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, label
+from study_app.viewmodels.results import FigureShown, Going, Remedy, ResultsView, Trouble
+
+LOOK_MS = 15
+LETTERS = re.compile(rb"(<text.*?</text>)", re.DOTALL)
+FAMILY = re.compile(rb"font-family: [^;\"]*")
+SIZE = re.compile(rb'viewBox="0 0 ([0-9.]+) ([0-9.]+)"')
+WHITE = b"#ffffff"
+BAND_LIGHT, BAND_DARK = 0.22, 0.34
+
+
+def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
+    """Return a figure with its print colours (role → ``#rrggbb``) replaced by those of ``theme``.
+
+    White is the paper and what stands on it, but in letters, which stand on coloured bars. The levels of agreement keep
+    their colours everywhere; on dark paper they get an edge. Qt takes one family of a list: the first is written.
+    """
+    letters = {colour.lower().encode(): _ink(theme, role).encode() for role, colour in colours.items()}
+    edge = theme.ctl if theme.dark else theme.surface
+    paper = {**letters, b"stroke: " + WHITE: f"stroke: {edge}".encode(), WHITE: theme.surface.encode()}
+    family = b"font-family: " + FAMILIES[0].encode()
+    parts = LETTERS.split(svg)  # every second one is a text
+    accent = colours.get("accent", "#").lower().encode()
+    parts[::2] = [_dyed(part, paper, accent) for part in parts[::2]]
+    parts[1::2] = [FAMILY.sub(family, _dyed(part, letters, accent)) for part in parts[1::2]]
+    return b"".join(parts)
+
+
+def _ink(theme: Theme, role: str) -> str:
+    """Return the colour of a role; "band" is the accent thinned until lines are seen on it."""
+    if role != "band":
+        return str(getattr(theme, role))
+    paper, accent = QColor(theme.surface), QColor(theme.accent)
+    share = BAND_DARK if theme.dark else BAND_LIGHT
+    mixed = [round(share * of(accent) + (1 - share) * of(paper)) for of in (QColor.red, QColor.green, QColor.blue)]
+    return QColor(*mixed).name()
+
+
+def _dyed(part: bytes, by: Mapping[bytes, bytes], accent: bytes) -> bytes:
+    """Replace colours; the accent as a shade, laid on with an opacity under letters, stays as deep as it is."""
+    shade = b"fill: " + re.escape(accent) + rb"; (?:fill-)?opacity"
+    found = re.compile(b"|".join([shade, *map(re.escape, sorted(by, key=len, reverse=True))]))
+    return found.sub(lambda match: by.get(match[0], match[0]), part)
+
+
+def drawn(svg: bytes, size: QSize, ratio: float) -> QImage:
+    """Return an SVG as an image of ``size`` logical px for a screen of that device pixel ratio."""
+    renderer = QSvgRenderer(svg)
+    image = QImage(round(size.width() * ratio), round(size.height() * ratio), QImage.Format.Format_ARGB32_Premultiplied)
+    image.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(image)
+    renderer.render(painter, QRectF(image.rect()))
+    painter.end()
+    image.setDevicePixelRatio(ratio)
+    return image
+
+
+class FigureView(Themed, QWidget):
+    """One figure as wide as it is given room, with its true proportions."""
+
+    def __init__(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
+        super().__init__()
+        self._figure, self._colours = figure, colours
+        self._image = QImage()
+        self._wanted: tuple[object, ...] = ()
+        self._drawing: threading.Thread | None = None
+        self._made: queue.SimpleQueue[tuple[tuple[object, ...], QImage]] = queue.SimpleQueue()
+        self._look = QTimer(self)
+        self._look.setInterval(LOOK_MS)
+        self._look.timeout.connect(self._take)
+        policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
+        self.show_figure(figure, colours)
+
+    @property
+    def settled(self) -> bool:
+        """Whether what is shown is what was asked for last."""
+        return self._drawing is None and not self._image.isNull()
+
+    def show_figure(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
+        """Draw another figure from now on; the one before stays until that one is drawn."""
+        self._figure, self._colours = figure, colours
+        found = SIZE.search(figure.svg)
+        self._proportion = float(found[2]) / float(found[1]) if found else 0.5
+        self.setAccessibleName(figure.title)
+        self.setAccessibleDescription(figure.caption)
+        self.updateGeometry()
+        self._ask()
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Draw in the colours of ``theme``."""
+        super().apply_theme(theme)
+        self._ask()
+
+    def heightForWidth(self, width: int) -> int:
+        return round(width * self._proportion)
+
+    def sizeHint(self) -> QSize:
+        return QSize(900, self.heightForWidth(900))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(320, self.heightForWidth(320))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._ask()
+
+    def _ask(self) -> None:
+        """Have it drawn as it is to be now, unless it is."""
+        if self.width() < 2 or self.height() < 2 or not self.testAttribute(Qt.WidgetAttribute.WA_Resized):
+            return
+        size, ratio = self.size(), self.devicePixelRatioF()
+        wanted = (self._figure, self.theme.name, size, ratio)
+        if wanted == self._wanted:
+            return
+        self._wanted = wanted
+        if self._drawing is None:
+            self._begin()
+
+    def _begin(self) -> None:
+        wanted, figure, colours, theme = self._wanted, self._figure, self._colours, self.theme
+        size, ratio = self.size(), self.devicePixelRatioF()
+        made = self._made
+
+        def draw() -> None:
+            made.put((wanted, drawn(themed_svg(figure.svg, colours, theme), size, ratio)))
+
+        self._drawing = threading.Thread(target=draw, name="figure", daemon=True)
+        self._drawing.start()
+        self._look.start()
+
+    def _take(self) -> None:
+        """Show what was drawn; begin again where something else is wanted by now."""
+        try:
+            what, self._image = self._made.get_nowait()
+        except queue.Empty:
+            return
+        self._look.stop()
+        self._drawing = None
+        self.update()
+        if what != self._wanted:
+            self._begin()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        if self._image.isNull():
+            self._ask()
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        if self.devicePixelRatioF() != self._image.devicePixelRatioF():
+            self._ask()
+        painter.drawImage(QRectF(self.rect()), self._image)
+
+
+GAP = 12
+PADDING = 14
+AROUND = 2 * (PADDING + SHADOW)
+AT_ONCE = 2
+"""So many figures are to be seen without scrolling, where they can be and still be read."""
+LEAST_WIDTH, MOST_WIDTH = 830, 1240
+
+
+class FigureCard(Card):
+    """One figure, or why it is not there; its caption is shown where that is asked for."""
+
+    def __init__(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
+        super().__init__(padding=PADDING, gap=8)
+        self.figure = figure
+        self.drawing: FigureView | None = None
+        self.caption = label("", "label", "text2", wraps=True)
+        self.caption.setContentsMargins(0, 0, 120, 4)
+        self.caption.setTextInteractionFlags(
+            Qt.TextInteractionFlag.TextSelectableByMouse | Qt.TextInteractionFlag.TextSelectableByKeyboard
+        )
+        self.caption.hide()
+        self.more = ActionButton("info", "Caption", role="plain", height=30)
+        self.more.setCheckable(True)
+        self.more.toggled.connect(self.caption.setVisible)
+        self.more.setFont(font("label"))
+        self._title = label("", "card")
+        self.column.addWidget(self._title)
+        self._place = QHBoxLayout()
+        add_parts(self.column, self._place, self.caption)
+        self.more.setParent(self)  # in the corner that figures leave free
+        self.show_figure(figure, colours)
+
+    def show_figure(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
+        self.figure = figure
+        self.caption.setText(figure.caption)
+        there = bool(figure.svg)
+        self._title.setText(figure.title)
+        self._title.setVisible(not there)  # a figure has its own
+        self.more.setVisible(there)
+        self.more.setAccessibleName(f"Caption of {figure.title}")
+        self.caption.setVisible(not there or self.more.isChecked())
+        if self.drawing is not None and there:
+            self.drawing.show_figure(figure, colours)
+        elif self.drawing is not None:
+            remove_widget(self.drawing)
+            self.drawing = None
+        elif there:
+            self.drawing = FigureView(figure, colours)
+            apply_theme_within(self.drawing, self.theme)
+            self._place.addWidget(self.drawing, 0, Qt.AlignmentFlag.AlignHCenter)
+            self.more.raise_()
+
+    def fit(self, width: int) -> None:
+        """Draw the figure so wide."""
+        size = QSize(width, 0 if self.drawing is None else self.drawing.heightForWidth(width))
+        if self.drawing is not None and self.drawing.maximumSize() != size:
+            self.drawing.setFixedSize(size)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        size = self.more.sizeHint()
+        self.more.setGeometry(
+            self.width() - size.width() - SHADOW - 6,
+            self.height() - size.height() - SHADOW - 5,
+            size.width(),
+            size.height(),
+        )
+
+
+class WorkLine(Card):
+    """What is being done and how far it is, with a way to stop it."""
+
+    stop_asked = Signal()
+    again_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=14, gap=0)
+        self.words = Elided("label", "text2")
+        self.bar = Bar()
+        self.stop = ActionButton("", "Stop", height=36)
+        self.again = ActionButton("", "Go on", height=36)
+        self.stop.clicked.connect(self.stop_asked)
+        self.again.clicked.connect(self.again_asked)
+        row = hbox((self.words, 1), (self.bar, 1), self.stop, self.again, spacing=16)
+        add_layout(self.column, row)
+
+    def show_going(self, going: Going | None, *, untested: bool) -> None:
+        """Say how far it is; ``untested``: that it was stopped, and what is missing."""
+        self.setVisible(going is not None or untested)
+        self.bar.setVisible(going is not None)
+        self.stop.setVisible(going is not None)
+        self.again.setVisible(going is None)
+        if going is not None:
+            self.words.show_text(f"{going.what[:1].upper()}{going.what[1:]} …")
+            self.bar.show_share(going.share)
+        elif untested:
+            self.words.show_text("Stopped before the tests: recognition and the lowest delays are missing.")
+
+
+class TroubleCard(Card):
+    """Why there is nothing to show: one sentence and one button; ``asked`` carries what the button does."""
+
+    asked = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__(padding=28, gap=12)
+        self._remedy: Remedy = "again"
+        self.title = label("", "card")
+        self.sentence = label("", "body", "text2", wraps=True)
+        self.sentence.setMaximumWidth(640)
+        self.sentence.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.bar = Bar()
+        self.bar.setMaximumWidth(420)
+        self.button = ActionButton("", "", height=40)
+        self.button.clicked.connect(lambda: self.asked.emit(self._remedy))
+        row = hbox(self.button, STRETCH)
+        add_parts(self.column, self.title, self.sentence, self.bar, row)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
+
+    def show_trouble(self, trouble: Trouble) -> None:
+        self.title.setText(trouble.title)
+        self.sentence.setText(trouble.sentence)
+        self.sentence.setVisible(bool(trouble.sentence))
+        self.button.show_action("", trouble.button)
+        self.bar.hide()
+        self._remedy = trouble.remedy
+
+    def show_going(self, going: Going) -> None:
+        self.show_trouble(Trouble(f"{going.what[:1].upper()}{going.what[1:]} …", "", "Stop", "stop"))
+        self.bar.setVisible(True)
+        self.bar.show_share(going.share)
+
+
+class FiguresPanel(QScrollArea):
+    """The cards of the figures; while there are none, what is going on or why.
+
+    ``asked`` carries what the button of a sentence does.
+    """
+
+    asked = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.cards: list[FigureCard] = []
+        self.trouble = TroubleCard()
+        self.work = WorkLine()
+        self.trouble.asked.connect(self.asked)
+        self.work.stop_asked.connect(lambda: self.asked.emit("stop"))
+        self.work.again_asked.connect(lambda: self.asked.emit("read"))
+        self._inside = QWidget()
+        self._column = vbox(self.trouble, self.work, STRETCH, spacing=GAP - 2 * SHADOW, margins=0, parent=self._inside)
+        self.trouble.hide()
+        self.work.hide()
+        self.setWidgetResizable(True)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setWidget(self._inside)
+        self._whole = False
+
+    def show_view(self, view: ResultsView) -> None:
+        """Show the figures there are; a card whose figure is drawn anew stays where it is."""
+        names = [figure.name for figure in view.figures]
+        if [card.figure.name for card in self.cards] != names:
+            self._order(view)
+        for card, figure in zip(self.cards, view.figures, strict=True):
+            if card.figure is not figure:
+                card.show_figure(figure, view.colours)
+        if view.trouble is not None:
+            self.trouble.show_trouble(view.trouble)
+        elif view.drawing is not None and not view.figures:
+            self.trouble.show_going(view.drawing)
+        self.trouble.setVisible(view.trouble is not None or (view.drawing is not None and not view.figures))
+        self.work.show_going(view.testing or (view.drawing if view.figures else None), untested=view.untested)
+        self.fit()
+
+    def _order(self, view: ResultsView) -> None:
+        """Keep the cards whose figures are still there, make the others, all in the figures' order."""
+        kept = {card.figure.name: card for card in self.cards}
+        self.cards = []
+        for place, figure in enumerate(view.figures):
+            card = kept.pop(figure.name, None) or FigureCard(figure, view.colours)
+            apply_theme_within(card, self.trouble.theme)
+            self._column.insertWidget(place, card)
+            self.cards.append(card)
+        for gone in kept.values():
+            remove_widget(gone)
+
+    def show_whole(self, yes: bool) -> None:
+        """Be as high as the figures are, for a page that scrolls as a whole."""
+        self._whole = yes
+        off = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        self.setVerticalScrollBarPolicy(off if yes else Qt.ScrollBarPolicy.ScrollBarAsNeeded)
+        self.fit()
+
+    def fit(self) -> None:
+        """Give the figures the width there is; less where two of them can be seen at once by that."""
+        bar = 0 if self._whole else self.verticalScrollBar().sizeHint().width()  # there or not: or they would flutter
+        width = min(self.width() - bar - AROUND, MOST_WIDTH)
+        first = [card.drawing for card in self.cards if card.drawing is not None][:AT_ONCE]
+        if first and not self._whole:
+            heights = sum(drawing.heightForWidth(1000) for drawing in first) / 1000
+            frames = len(first) * (AROUND - 4) + (len(first) - 1) * self._column.spacing()
+            width = min(width, max(int((self.height() - frames) / heights), LEAST_WIDTH))
+        for card in self.cards:
+            card.fit(max(width, 320))
+        self.setMinimumHeight(self._inside.sizeHint().height() if self._whole else 0)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.fit()

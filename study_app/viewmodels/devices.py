@@ -1,0 +1,199 @@
+"""What windows say of devices, the device that a dialog selects first, the options it asks for, and benches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from study_app.devices.descriptor import DRIVER_READY, NONE, READY, Backend, DeviceDescriptor, DeviceOption
+from study_app.devices.names import DEFAULT_DEVICE
+from study_app.devices.registry import descriptor_of, discover, title_of
+from study_app.errors import DeviceError
+from study_app.store.workstation import REMEMBERED_OPTIONS, DeviceBench
+
+if TYPE_CHECKING:
+    from study_app.viewmodels.tones import Tone
+
+
+@dataclass(frozen=True, slots=True)
+class BenchShown:
+    """The last bench of a device: date and numbers in ``words``; its ``report``, None where that file is missing."""
+
+    words: str
+    report: Path | None
+
+
+def benches_shown(benches: Iterable[DeviceBench]) -> dict[str, BenchShown]:
+    """Return the first bench of each device in ``benches`` (newest first), by the device's name."""
+    shown: dict[str, BenchShown] = {}
+    for bench in benches:
+        shown.setdefault(bench.name, _bench_shown(bench))
+    return shown
+
+
+def _bench_shown(bench: DeviceBench) -> BenchShown:
+    serial = f", serial number {bench.serial}" if bench.serial else ""
+    numbers = [
+        f"mass {_range(bench.mass_kg, 2)} kg",
+        f"damping {_range(bench.damping_nspm, 1)} N·s/m",
+        f"friction {_range(bench.friction_n, 2)} N",
+        f"delay {_range(bench.delay_ms, 1)} ms",
+        f"stable damping {_range(bench.stable_nspm, 0)} N·s/m",
+    ]
+    if bench.gain is not None:
+        numbers.append(f"{bench.gain:.2f} N on the scale per newton sent")
+    words = f"Measured {bench.measured}{serial}: {', '.join(numbers)}."
+    report = None if bench.report is None else Path(bench.report)
+    if report is not None and not report.is_file():
+        return BenchShown(f"{words} The report is missing: {report}.", None)
+    return BenchShown(words, report)
+
+
+def _range(of_axes: tuple[float, float, float], digits: int) -> str:
+    """Return the least and the greatest of three axes, once where they are equal."""
+    least, most = (f"{value:.{digits}f}" for value in (min(of_axes), max(of_axes)))
+    return least if least == most else f"{least} to {most}"
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """One library that a device is reached by: ``state`` is what it found, ``why`` why it cannot be used now."""
+
+    by: str
+    state: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceShown:
+    """A device: ``name`` is for ``--device``, ``can`` says what it can and cannot do.
+
+    ``tone``, ``sign`` and ``word`` are its state; ``why`` says why it cannot be used now, "" where it can.
+    ``choosable`` is whether its name can be taken as it is, ``diagnosable`` whether it can be examined as it is.
+    """
+
+    name: str
+    title: str
+    icon: str
+    tone: Tone
+    sign: str
+    word: str
+    can: str
+    why: str
+    ways: tuple[Way, ...] = ()
+    simulated: bool = False
+    choosable: bool = False
+    diagnosable: bool = False
+
+    @property
+    def ready(self) -> bool:
+        """Whether it can be felt with now."""
+        return self.tone == "ok"
+
+
+def devices_shown(backends: Sequence[Backend]) -> tuple[DeviceShown, ...]:
+    """Return what to show of each device, those that people use first; backends of one device are one."""
+    names = list(dict.fromkeys(backend.name for backend in backends))
+    shown = [_shown(name, [one for one in backends if one.name == name]) for name in names]
+    return tuple(sorted(shown, key=lambda device: device.simulated))
+
+
+def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
+    """Return what to show of the preferred device; of one that was not looked at, its name alone."""
+    try:
+        kind = descriptor_of(name).name
+    except DeviceError as error:
+        return DeviceShown(name, name, "device", "bad", "warning", "Not known", "", _sentence(str(error)))
+    for device in shown:
+        if device.name.partition(":")[0] == kind:
+            return device
+    return looking(name)
+
+
+def looking(name: str) -> DeviceShown:
+    """Return what to show of a device before anybody looked."""
+    device = _descriptor(name)
+    icon = "device" if device is None else device.icon
+    return DeviceShown(name, title_of(name), icon, "neutral", "clock", "Looking …", "", "")
+
+
+def device_label(device: str) -> str:
+    """Return what to choose a device by."""
+    return descriptor_of(device).label
+
+
+def device_or_default(device: str) -> str:
+    """Return the device, or the default device if the registry does not know it."""
+    try:
+        descriptor_of(device)
+    except DeviceError:
+        return DEFAULT_DEVICE
+    return device
+
+
+def window_options() -> tuple[DeviceOption, ...]:
+    """Return the options of all devices that windows ask for, each name once."""
+    return tuple({option.name: option for device in discover().devices for option in device.window_options}.values())
+
+
+def remembered_options() -> tuple[DeviceOption, ...]:
+    """Return the options that are remembered on this computer."""
+    return tuple(option for option in window_options() if option.name in REMEMBERED_OPTIONS)
+
+
+def _shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
+    device = _descriptor(name)
+    best = min(ways, key=_rank)
+    by_command = device is not None and device.argument_required
+    tone, sign, word = _state(best, by_command=by_command)
+    choosable = device is not None and not by_command
+    return DeviceShown(
+        name=name,
+        title=title_of(name),
+        icon="device" if device is None else device.icon,
+        tone=tone,
+        sign=sign,
+        word=word,
+        can=_sentence(ways[0].can),
+        why="" if tone == "ok" and not best.why else _sentence(best.why),
+        ways=tuple(Way(way.by, way.state, way.why) for way in ways),
+        simulated=device is not None and device.simulated,
+        choosable=choosable,
+        diagnosable=choosable and device is not None and device.doctor is not None,
+    )
+
+
+def _rank(backend: Backend) -> int:
+    """Return how far a backend is from being felt with; a driver that is ready has not found a device yet."""
+    if _connected(backend):
+        return 0
+    return {READY: 1, DRIVER_READY: 1, NONE: 2}.get(backend.state, 3)
+
+
+def _connected(backend: Backend) -> bool:
+    return backend.state.startswith("connected")
+
+
+def _state(backend: Backend, *, by_command: bool) -> tuple[Tone, str, str]:
+    if _connected(backend):
+        return ("warn", "warning", "Check it") if backend.why else ("ok", "check", "Connected")
+    if backend.state == DRIVER_READY:
+        return "neutral", "ring", "Driver ready"
+    if backend.state == READY and by_command:
+        return "neutral", "info", "Command line only"
+    if backend.state == READY:
+        return "ok", "check", "Ready"
+    return ("neutral", "ring", "Not connected") if backend.state == NONE else ("warn", "warning", "Not available")
+
+
+def _descriptor(name: str) -> DeviceDescriptor | None:
+    """Return the descriptor of a device; None of one that could not be loaded."""
+    kind = name.partition(":")[0]
+    return next((device for device in discover().devices if device.name == kind), None)
+
+
+def _sentence(words: str) -> str:
+    """Return a clause with a capital letter and a full stop."""
+    return words[:1].upper() + words[1:] + ("" if not words or words[-1] in ".!?" else ".")

@@ -1,1 +1,0 @@
-"""What windows show of haptic devices, as values without Qt."""

@@ -1,1 +1,0 @@
-"""What windows show of one session."""
