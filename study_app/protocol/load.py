@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from study_app.errors import Problem, ProtocolError
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
-from study_app.haptics.model.scene import Liquid, RateHz, Scene
+from study_app.haptics.model.scene import Liquid, RateHz, Scene, Withdrawn
 from study_app.protocol import formats
 from study_app.protocol.checks.consistency import check
 from study_app.protocol.checks.designs import designs
@@ -274,9 +274,12 @@ def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, l
     named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
     faults = [Fault(path, "unknown key", "the name of the table is its id") for path in named]
     try:
-        return model.model_validate(document, strict=True), faults
+        found = model.model_validate(document, strict=True)
     except ValidationError as error:
         return None, faults + faults_of(error, document, schema(model))
+    if isinstance(velocity := getattr(getattr(found, "scene", None), "velocity", None), Withdrawn):
+        return None, [*faults, Fault(("scene", "velocity", "kind"), *velocity.refusal)]
+    return found, faults
 
 
 def located(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:

@@ -29,8 +29,6 @@ _OF_THE_SCENE: Final = {
         _P("body.drag_coefficient", "Drag coefficient", "", most=2.0),
         _P("body.density_kg_m3", "Body density", "kg/m³", 1.0, logarithmic=True, decimals=1),
         _P("velocity.alpha", "Weight", "", 0.005, logarithmic=True, decimals=3),
-        _P("velocity.samples", "Samples", "ticks", whole=True, decimals=0),
-        _P("velocity.tolerance_m", "Tolerance", "m", most=1e-3, factor=1e6, shown_unit="µm", decimals=0),
         _P("knee.threshold_mps", "Speed knee", "m/s", 0.1, 20.0, logarithmic=True),
         _P("scene.scale", "Scale", "", 0.5, 50.0, logarithmic=True, decimals=2),
         _P("scene.force_limit_n", "Force limit", "N", 0.1, MAX_FORCE_N, decimals=1),

@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.errors import StoreError
+from study_app.errors import StoreError, StudyError
 from study_app.haptics.kernels.safety import START_FADE_S, new_safety
 from study_app.haptics.model.device_dynamics import Dynamics, dynamics_from
 from study_app.haptics.model.force_rules import ForceRules, rules_from
@@ -248,7 +248,12 @@ def replay(session_folder: Path) -> Replayed:
         recorded, checks = recordings.read_samples(path), recordings.read_checks(path)
         start = time.perf_counter()
         samples = as_one_scene(recorded, steps)
-        before = _again(samples, scene, devices[resumed], before, places_of(recorded, steps))
+        try:
+            before = _again(samples, scene, devices[resumed], before, places_of(recorded, steps))
+        except StudyError as refused:
+            before = None
+            found.uncompared.append(f"{name}: not recomputable: {refused}")
+            continue
         found.compare(name, samples, before, checks)
         if (ended := ends.get(which)) is not None and _until_gap(samples.tick) == len(samples):
             again: dict[str, float | None] = {}

@@ -19,7 +19,7 @@ from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, Ewma, Given, Kalman, Line, Liquid, MotionBox, Raw, Scene
+from study_app.haptics.model.scene import Box, Ewma, Given, Kalman, Liquid, MotionBox, Raw, Scene
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.load import load, load_scenes
 from study_app.protocol.trials.tasks import Explore, Reach, Stroke
@@ -89,9 +89,7 @@ def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("velocity", "lag_ms"),
-    [(Ewma(), 9.5), (Ewma(alpha=0.5), 1.5), (Raw(), 0.5), (Line(samples=15), 7.0)],
-    ids=["ewma", "quick", "raw", "line"],
+    ("velocity", "lag_ms"), [(Ewma(), 9.5), (Ewma(alpha=0.5), 1.5), (Raw(), 0.5)], ids=["ewma", "quick", "raw"]
 )
 def test_the_lag_of_a_filter_is_that_of_its_closed_form(velocity: Ewma, lag_ms: float) -> None:
     scene = THESIS["water"].model_copy(update={"velocity": velocity})

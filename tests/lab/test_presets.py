@@ -19,7 +19,7 @@ EDITS = (
     ("region.kind", "cylinder"),
     ("effects.surface", "on"),
     ("effects.local_wake", "on"),
-    ("velocity.kind", "foaw"),
+    ("velocity.kind", "raw"),
     ("liquid.density_kg_m3", 1234.5678901234567),
     ("liquid.viscosity_pa_s", 1e-5),
     ("effects.history", "on"),

@@ -16,8 +16,8 @@ import study_app.protocol
 
 pytestmark = pytest.mark.slow
 
-FIND_THEIR_MODULES = ("study_app.haptics.model.effects", "study_app.haptics.model.estimators")
-HEAVY = ("numba", "llvmlite", "PySide6", "pyqtgraph", "pandas", "scipy", "matplotlib")
+FIND_THEIR_MODULES = ("study_app.haptics.model.effects",)
+HEAVY = ("numba", "llvmlite", "PySide6", "pyqtgraph", "pandas", "scipy", "matplotlib", "numpy")
 EXTRAS = {"analysis", "cfd", "cluster", "lsl", "spss", "triggers", "video"}
 ROOT = Path(__file__).resolve().parents[2] / "study_app"
 

@@ -10,7 +10,7 @@ from study_app.errors import Problem, ProtocolError
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.overrides import override, value_of
-from study_app.haptics.model.scene import Ewma, Kalman, Line, Liquid, Scene
+from study_app.haptics.model.scene import Ewma, Kalman, Liquid, Raw, Scene
 from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse, protocol_hash, source_bytes
@@ -171,8 +171,17 @@ def test_the_estimator_of_a_scene_file_is_that_of_its_format(
 ) -> None:
     text = f"format = {number}\n[scene]\nscale = 3\n[liquids.water]\ndensity_kg_m3 = 1000\n"
     assert load_scene(written(tmp_path / "water.toml", text), "water").velocity == velocity
-    named = text.replace("scale = 3", 'scale = 3\nvelocity = { kind = "line" }')
-    assert load_scene(written(tmp_path / "water.toml", named), "water").velocity == Line()
+    named = text.replace("scale = 3", 'scale = 3\nvelocity = { kind = "raw" }')
+    assert load_scene(written(tmp_path / "water.toml", named), "water").velocity == Raw()
+
+
+@pytest.mark.parametrize("kind", ["line", "foaw", "lead"])
+def test_an_estimator_that_left_is_refused_with_its_place_and_what_to_write(tmp_path: Path, kind: str) -> None:
+    liquid = f'[scene]\nvelocity = {{ kind = "{kind}" }}\n[liquids.water]\ndensity_kg_m3 = 1000\n'
+    with pytest.raises(ProtocolError, match=f'"{kind}" left the program') as refused:
+        load_scene(written(tmp_path / "water.toml", f"format = 2\n{liquid}"), "water")
+    (problem,) = refused.value.problems
+    assert (problem.place, problem.line, problem.hint) == ("scene.velocity.kind", 3, 'write "ewma", "kalman" or "raw"')
 
 
 def test_a_damper_in_format_1_is_refused(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws.drag_laws import Law
 from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.motion import Floats, Motion
-from study_app.haptics.model.scene import Effect, Estimator, Ewma, Foaw, Given, Line, Raw, Scene
+from study_app.haptics.model.scene import Effect, Estimator, Ewma, Given, Raw, Scene
 from study_app.haptics.model.slope_limits import DampingLimits
 from study_app.haptics.runtime.pack import Model, pack
 
@@ -391,7 +391,7 @@ def _lists(exact: Scene) -> list[Candidate]:
 def _estimators(scene: Scene) -> tuple[Estimator, ...]:
     """Return one of each kind, the scene's own unchanged."""
     own = scene.velocity
-    kinds: tuple[Estimator, ...] = (Ewma(), Line(), Foaw(), Raw())
+    kinds: tuple[Estimator, ...] = (Ewma(), Raw())
     return tuple(own if not isinstance(own, Given) and own.kind == it.kind else it for it in kinds)
 
 

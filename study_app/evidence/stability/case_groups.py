@@ -47,7 +47,7 @@ KALMAN_CASES: Final = 250
 """Of each group that is judged with the Kalman filter, too."""
 
 DRAWN: Final[Mapping[str, tuple[Any, ...]]] = {
-    "estimator": ("ewma", "ewma", "ewma", "line", "foaw", "raw"),
+    "estimator": ("ewma", "ewma", "ewma", "raw", "raw", "raw"),
     "motion": (REACHES, CIRCLES, STROKE),
     "speed_mps": (0.1, 0.3, 0.6, 1.0),
     "mass_kg": (0.1, 0.25, 0.6),

@@ -34,7 +34,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.estimators.kalman import take_force
+from study_app.haptics.kernels.estimators import take_force
 from study_app.haptics.kernels.force_link import delay_force
 from study_app.haptics.kernels.loop import follow_delay
 from study_app.haptics.kernels.passivity import log_acted, log_command, update_observer

@@ -4,7 +4,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -13,10 +13,9 @@ from study_app.evidence.stability.closed_loop import TRACE
 from study_app.evidence.stability.stability_cases import STROKE, THROWN, Case
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.estimators import NAMED as ESTIMATORS
-from study_app.haptics.model.estimators import lead
+from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.layout import records
-from study_app.haptics.model.scene import Body, Ewma, Foaw, Kalman, Knee, Lead, Line, Liquid, Scene, Velocity
+from study_app.haptics.model.scene import Body, Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity
 from study_app.haptics.model.slope_limits import INERTIA_SHARE, DampingLimits, Entry
 
 PERIODS_S: Final = (0.5e-3, 1e-3, 2e-3, 4e-3)
@@ -47,7 +46,6 @@ oil at scale 40 was restless with 3 ticks of delay."""
 COUNT_N: Final = 0.25
 """The most that one count of a Falcon's encoder may be felt as [N]."""
 COUNT_M: Final = 38e-6
-WINDOWS: Final = ("line", "foaw")
 NOMINAL_S: Final = 1e-3
 
 SWING_MPS: Final = 0.04
@@ -99,13 +97,7 @@ def passive_nspm(friction_nspm: float, period_s: float = NOMINAL_S, delay: int =
 
 def measured_estimators() -> tuple[Velocity, ...]:
     """Return the estimators that the table has entries of."""
-    found: tuple[Any, ...] = tuple(
-        kind.model(**({} if kind.parameter is None else {kind.parameter: value}))
-        for kind in ESTIMATORS.values()
-        if kind.of_device
-        for value in kind.measured or (None,)
-    )
-    return found
+    return (*(Ewma(alpha=alpha) for alpha in NAMED["ewma"].measured), Raw(), Kalman())
 
 
 def measure_limits(
@@ -122,20 +114,15 @@ def _entry(velocity: Velocity, period_s: float, delay: int) -> Entry:
     drag = _limit_nspm(velocity, period_s, delay, felt=felt)
     inertia = (FELT_INERTIA_SHARE if felt else INERTIA_SHARE) * drag
     limits = DampingLimits(_rounded_down(drag), _rounded_down(inertia))
-    parameter = ESTIMATORS[velocity.kind].parameter
-    value = None if parameter is None else float(getattr(velocity, parameter))
-    return Entry(velocity.kind, value, period_s, delay, limits)
+    return Entry(velocity.kind, velocity.alpha if isinstance(velocity, Ewma) else None, period_s, delay, limits)
 
 
 def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) -> float:
     """Return the limit of drag: a share of the boundary, less where that is noisy or the filter may be mistaken.
 
-    The raw difference passes a count of the encoder on whole, the others as `_weight` says. A window has a fixed number
-    of samples: in a faster loop it is shorter, its slope noisier in the same ratio.
+    The raw difference passes a count of the encoder on whole, EWMA as `_weight` says.
     """
     fast = period_s < NOMINAL_S
-    if velocity.kind in WINDOWS and fast:
-        return _limit_nspm(velocity, NOMINAL_S, delay, felt=felt) * period_s / NOMINAL_S
     share = FELT_SHARE if felt else FAST_SHARE if fast else SHARE
     limits = [share * boundary_nspm(velocity, period_s, delay)]
     if felt:
@@ -143,7 +130,8 @@ def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) 
     if fast:
         limits.append(FAST_KALMAN_NSPM if isinstance(velocity, Kalman) else FAST_NSPM)
     if not isinstance(velocity, Kalman):
-        limits.append(COUNT_N * period_s / COUNT_M / _newest_weight(velocity, period_s))
+        weight = _weight(velocity.alpha, period_s) if isinstance(velocity, Ewma) else 1.0
+        limits.append(COUNT_N * period_s / COUNT_M / weight)
     else:
         wrong = (it for it in (delay - 1, delay + 1) if it <= MOST_DELAY)
         limits += [boundary_nspm(velocity, period_s, it, believed=delay) for it in wrong]
@@ -156,19 +144,6 @@ def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) 
 def _weight(alpha: float, period_s: float) -> float:
     """Return the weight of the newest difference in a loop of this period."""
     return float(1.0 - (1.0 - alpha) ** (period_s / NOMINAL_S))
-
-
-def _newest_weight(velocity: Velocity, period_s: float) -> float:
-    """Return how much of a count's speed an estimator takes on at once: 6/(n(n + 1)) of a slope through n samples."""
-    match velocity:
-        case Ewma():
-            return _weight(velocity.alpha, period_s)
-        case Lead():
-            return _weight(lead.ALPHA, period_s) * (1.0 + lead.LEAD_S / lead.SMOOTHING_S)
-        case Line() | Foaw():
-            return 6.0 / (velocity.samples * (velocity.samples + 1))
-        case _:
-            return 1.0
 
 
 def _rounded_down(value: float) -> float:

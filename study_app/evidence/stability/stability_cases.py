@@ -10,7 +10,7 @@ from typing import Any, Final
 from study_app.errors import StudyError
 from study_app.haptics.model.effects.drag import DAMPING_NSPM, Drag
 from study_app.haptics.model.estimators import ESTIMATORS as KINDS
-from study_app.haptics.model.estimators.device import MOST_LAG_TICKS
+from study_app.haptics.model.estimators import MOST_LAG_TICKS
 from study_app.haptics.model.scene import (
     MOST_DELAY_MS,
     MOST_JITTER_MS,

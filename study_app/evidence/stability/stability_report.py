@@ -23,6 +23,7 @@ from study_app.evidence.stability.stability_map import draw_map
 from study_app.evidence.stability.verdict import REASONS, Verdict, judge
 from study_app.evidence.table import Evidence, Table, plot_files, run
 from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.haptics.model.slope_limits import table
 from study_app.store.tables.csv_files import csv_text_of
 
 MEASURES: Final = ("balance_j", "permitted_j", "swing_mps", "fast_n", "played_n")
@@ -172,13 +173,17 @@ def evidence(swept: Swept, fidelities: Sequence[Fidelity]) -> Evidence:
 
 
 def limits(executor: Executor, progress: Callable[[int, int], object], file: str) -> Evidence:
-    """Measure the table of limits that `haptics.model.slope_limits` reads, by an executor."""
+    """Measure the table of limits that `haptics.model.slope_limits` reads, by an executor.
+
+    The rows of "line", which are for velocities that a device measures, are those of the shipped table.
+    """
     lines = len(measured_estimators()) * len(PERIODS_S) * len(DELAYS[1:])
     rows = []
-    for name, value, period_s, delay, (drag, inertia) in measure_limits(executor=executor):
+    shipped = (entry for entry in table() if entry.estimator == "line")
+    for name, value, period_s, delay, (drag, inertia) in itertools.chain(measure_limits(executor=executor), shipped):
         parameter = "" if value is None else f"{value:g}"
         rows.append((name, parameter, f"{period_s * 1e3:g}", delay, f"{drag:g}", f"{inertia:g}"))
-        progress(len(rows), lines)
+        progress(min(len(rows), lines), lines)
     names = ("estimator", "parameter", "period_ms", "delay_ticks", "drag_nspm", "inertia_nspm")
     return Evidence("", {file: Table(names, rows).csv()})
 

@@ -32,7 +32,7 @@ from study_app.evidence.table import Evidence
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.motion import Floats, Motion
-from study_app.haptics.model.scene import Ewma, Kalman, Knee, Lead, Liquid, Raw, Scene, Velocity
+from study_app.haptics.model.scene import Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.runtime.offline import simulate
 
@@ -241,7 +241,7 @@ def _linear_law(scene: Scene, turns: Any, size_m: Floats) -> Any:
     return np.linalg.lstsq(courses, law_n - law_n.mean(), rcond=None)[0] @ parts
 
 
-ESTIMATORS: Final[tuple[Velocity, ...]] = (Kalman(), Ewma(), Lead())
+ESTIMATORS: Final[tuple[Velocity, ...]] = (Kalman(), Ewma())
 """The estimator that is judged, then its references."""
 PERIOD_S: Final = 1e-3
 MASSES_KG: Final = (0.05, 0.1, 0.2, 0.25, 0.5)

@@ -7,7 +7,7 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import copy, norm, square, square_distance
-from study_app.haptics.model.estimators import device
+from study_app.haptics.model.estimators import DEVICE
 from study_app.haptics.model.layout import (
     LIMITER_GLITCH,
     LIMITER_STALE,
@@ -67,7 +67,7 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
     _note_step(state, hand_m, interval_s)
     copy(hand_m, state.hand_m)
     place(state, *_in_scene(parameters, hand_m))
-    if parameters.estimator == device.CODE:
+    if parameters.estimator == DEVICE:
         for axis in range(3):
             state.estimate_mps[axis] = parameters.scale * sample.device_velocity_mps[axis]
     state.rejected = 0
@@ -100,7 +100,7 @@ def _plausible(parameters: Record, state: Record, safety: Record, sample: Record
     for axis in range(3):
         if not abs(hand_m[axis]) <= FARTHEST_HAND_M:  # NaN neither
             return False
-    if parameters.estimator == device.CODE and not _has_velocity(sample):
+    if parameters.estimator == DEVICE and not _has_velocity(sample):
         return False
     if state.tracking == 0:
         return True

@@ -19,8 +19,7 @@ from study_app.haptics.kernels.effects.non_newtonian import non_newtonian_force
 from study_app.haptics.kernels.effects.surface import wetted_fraction
 from study_app.haptics.kernels.effects.unsteady_drag import unsteady_drag_force
 from study_app.haptics.kernels.effects.wake import update_wake, wake_velocity
-from study_app.haptics.kernels.estimators.kalman import take_force
-from study_app.haptics.kernels.estimators.velocity import estimate_velocity, reset_estimator
+from study_app.haptics.kernels.estimators import estimate_velocity, reset_estimator, take_force
 from study_app.haptics.kernels.regions import update_volume_fractions
 from study_app.haptics.kernels.safety import guard
 from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
@@ -68,7 +67,7 @@ def step_model(model: Any, interval_s: float, delay_ticks: int) -> None:
     parameters, state = model.parameters[0], model.state[0]
     if state.tracking == 0:
         reset_tracking(model)
-    estimate_velocity(parameters, state, model.window, interval_s)
+    estimate_velocity(parameters, state, interval_s)
     update_volume_fractions(model, interval_s)
 
     clear(state.force_n)

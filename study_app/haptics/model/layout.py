@@ -168,8 +168,6 @@ PARAMETERS = np.dtype(
         ("weight_n", np.float64),  # of the body
         ("estimator", np.int64),  # code of `estimators`
         ("log_keep_per_s", np.float64),  # ln(1 - α) per second: after t the share of the old velocity is exp of it · t
-        ("window_samples", np.int64),  # of line and foaw: their greatest number of samples
-        ("tolerance_m", np.float64),  # of foaw, in the scene
         ("knee_law", np.int64),  # KNEE_*
         ("knee_threshold_mps", np.float64),
         ("slope_limit_nspm", np.float64, (MOST_DELAY + 1,)),  # greatest |drag| / |w| [N·s/m, scene], by the delay
@@ -221,8 +219,6 @@ STATE = np.dtype(
         ("fastest_mps", np.float64),  # the greater speed of it and the one before
         ("position_m", np.float64, (3,)),  # the same in the scene
         ("previous_m", np.float64, (3,)),  # the one before
-        ("window_newest", np.int64),  # row of the newest sample in the model's window
-        ("window_held", np.int64),  # how many samples are in it
         ("weight", np.float64),  # of the newest difference, for an interval of ``weighted_s``
         ("weighted_s", np.float64),
         *((it.name, record_type(it.state)) for it in ESTIMATORS if it.state is not None),
@@ -235,15 +231,6 @@ STATE = np.dtype(
         ("returnable_j", np.float64),  # the greatest energy that effects can return, times the scale
         ("growth", np.int64),  # GROWS_* of the force that depends least on the speed
         ("link", LINK_STATE),
-    ],
-    align=True,
-)
-
-WINDOW = np.dtype(
-    [
-        ("position_m", np.float64, (3,)),  # of one accepted sample
-        ("interval_s", np.float64),  # Δt from the sample before it
-        ("age_s", np.float64),  # scratch: its age at this tick
     ],
     align=True,
 )

@@ -9,14 +9,9 @@ import math
 from typing import Annotated, Final, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
+from pydantic.json_schema import SkipJsonSchema
 
-from study_app.haptics.model.estimators.ewma import Ewma
-from study_app.haptics.model.estimators.foaw import Foaw
-from study_app.haptics.model.estimators.given import Given
-from study_app.haptics.model.estimators.kalman import Kalman
-from study_app.haptics.model.estimators.lead import Lead
-from study_app.haptics.model.estimators.line import MAX_WINDOW, Line
-from study_app.haptics.model.estimators.raw import Raw
+from study_app.haptics.model.estimators import Ewma, Given, Kalman, Raw, Withdrawn
 from study_app.haptics.model.liquid import MAX_LIQUIDS, Box, Cylinder, Effect, Everywhere, Liquid, Region
 from study_app.haptics.model.ranges import (
     Coordinate,
@@ -37,7 +32,6 @@ STORED_FORCES: Final = 1024
 """Number of stored forces: delay and jitter together are shorter [ticks]."""
 __all__ = [
     "MAX_LIQUIDS",
-    "MAX_WINDOW",
     "Accuracy",
     "Body",
     "Box",
@@ -46,19 +40,17 @@ __all__ = [
     "Estimator",
     "Everywhere",
     "Ewma",
-    "Foaw",
     "Frozen",
     "Given",
     "Kalman",
     "Knee",
-    "Lead",
-    "Line",
     "Liquid",
     "MotionBox",
     "Raw",
     "Region",
     "Scene",
     "Velocity",
+    "Withdrawn",
 ]
 RateHz: TypeAlias = Annotated[float, within(50, 5000, "below, no servo is stable; above, no tick fits")]
 SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a stroke of 60 mm is then 0.6 mm to 6 m in the scene")]
@@ -66,8 +58,8 @@ FADE_S = 0.05
 HAND_SPEED_MPS = 0.3
 HAND_ACCELERATION_MPS2 = 3.0  # 0.3 m/s at 1.6 Hz
 HAND_REACH_M = 0.04
-Estimator: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Lead | Raw, Field(discriminator="kind")]
-Velocity: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Lead | Raw | Given, Field(discriminator="kind")]
+Estimator: TypeAlias = Annotated[Ewma | Kalman | Raw | SkipJsonSchema[Withdrawn], Field(discriminator="kind")]
+Velocity: TypeAlias = Annotated[Ewma | Kalman | Raw | SkipJsonSchema[Withdrawn] | Given, Field(discriminator="kind")]
 
 
 class ForceLink(Frozen):

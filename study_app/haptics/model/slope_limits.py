@@ -16,11 +16,10 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.effects.drag import resistance_n
 from study_app.haptics.model.effects.non_newtonian import VISCOUS_SHARE, steady_n
 from study_app.haptics.model.effects.unsteady_drag import LATE_SHARE, even_n
-from study_app.haptics.model.estimators import NAMED
-from study_app.haptics.model.estimators.device import DeviceVelocity
+from study_app.haptics.model.estimators import LINES, NAMED, DeviceVelocity
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.scene import Ewma, Foaw, Given, Kalman, Scene, Velocity
+from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene, Velocity, Withdrawn
 
 SLOWEST_HZ: Final = 500.0
 """Slower servos are for trials only: participants would feel the limits rather than the liquids."""
@@ -53,7 +52,8 @@ class DampingLimits(NamedTuple):
 class Entry(NamedTuple):
     """One line of the table: a velocity estimator, a tick period and a delay, and the limits of such a loop.
 
-    ``parameter`` is the weight of "ewma" and the samples of "line" and "foaw"; None for the others.
+    ``parameter`` is the weight of "ewma" and the samples of "line"; None for the others. "line" is a least-squares
+    line, as `DeviceVelocity` needs it; its rows were measured by an earlier version.
     """
 
     estimator: str
@@ -73,14 +73,14 @@ def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | Devic
     """Return the limits of a loop with a tick period [s], a delay [ticks] and a velocity estimator.
 
     Between two periods or parameters in the table the lower limit counts, between two delays the longer one; below the
-    shortest period, the limit falls in proportion to the period. An adaptive window of smaller tolerance than usual
-    also has the limit of the raw difference. A given velocity has no estimator; it is taken as the thesis' own, "ewma".
-    The velocity that a device measures has the limits of a line of the same lag (`DeviceVelocity.window`). The entries
+    shortest period, the limit falls in proportion to the period. A given velocity has no estimator; it is taken as the
+    thesis' own, "ewma".
+    The velocity that a device measures has the limits of a line of the same lag (`DeviceVelocity.line`). The entries
     of "kalman" also hold if the delay is one tick longer or shorter than assumed, and while EWMA replaces it.
     """
-    if isinstance(velocity, DeviceVelocity):
-        velocity = velocity.window(period_s)
-    found = [one for row in _rows(velocity) for one in _neighbours(row, period_s, delay_ticks)]
+    if isinstance(velocity, Withdrawn):
+        raise StudyError(": ".join(velocity.refusal))
+    found = [one for row in _rows(velocity, period_s) for one in _neighbours(row, period_s, delay_ticks)]
     if not found:
         raise StudyError(
             f"no stable force is known for {1 / period_s:g} ticks per second with {delay_ticks} ticks of delay: "
@@ -122,18 +122,18 @@ def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity | Devic
     return share * SLEW_N * min(dynamics.mass_kg / MEASURED_KG, 1.0) * max(period_s / SLEW_S, 1.0)
 
 
-def _rows(velocity: Velocity) -> tuple[tuple[str, float | None], ...]:
+def _rows(velocity: Velocity | DeviceVelocity, period_s: float) -> tuple[tuple[str, float | None], ...]:
     """Return estimator and parameter of the entries that bound this estimator."""
     if isinstance(velocity, Given):
         velocity = _THESIS
-    kind = NAMED[velocity.kind]
-    if kind.parameter is None:
-        return ((kind.name, None),)
-    value = getattr(velocity, kind.parameter)
-    below = max((it for it in kind.measured if it <= value), default=kind.measured[0])
-    found = (kind.name, below), (kind.name, min(it for it in kind.measured if it >= value))
-    noisier = isinstance(velocity, Foaw) and velocity.tolerance_m < Foaw().tolerance_m
-    return (*found, ("raw", None)) if noisier else found
+    if isinstance(velocity, DeviceVelocity):
+        name, value, measured = "line", float(velocity.line(period_s)), LINES
+    elif isinstance(velocity, Ewma):
+        name, value, measured = velocity.kind, velocity.alpha, NAMED[velocity.kind].measured
+    else:
+        return ((velocity.kind, None),)
+    below = max((it for it in measured if it <= value), default=measured[0])
+    return (name, below), (name, min(it for it in measured if it >= value))
 
 
 def _neighbours(row: tuple[str, float | None], period_s: float, delay_ticks: int) -> list[DampingLimits]:

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from study_app.errors import StudyError
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.estimators.kalman import take_force
+from study_app.haptics.kernels.estimators import take_force
 from study_app.haptics.kernels.safety import guard, new_safety
 from study_app.haptics.kernels.sample_validation import clamp, place
 from study_app.haptics.kernels.tick import step_model, write_sample
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
-from study_app.haptics.model.estimators.device import CODE as DEVICE
-from study_app.haptics.model.estimators.given import CODE as GIVEN
+from study_app.haptics.model.estimators import DEVICE, GIVEN
 from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.motion import Floats, Motion, read
 from study_app.haptics.model.scene import Given, Scene

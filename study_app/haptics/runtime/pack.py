@@ -14,12 +14,12 @@ from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import MOST_DELAY, UNKNOWN, Dynamics
 from study_app.haptics.model.effect import GRAVITY_MPS2, Rows
 from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.estimators import MOST_LAG_TICKS, DeviceVelocity
 from study_app.haptics.model.estimators import NAMED as ESTIMATORS
-from study_app.haptics.model.estimators.device import MOST_LAG_TICKS, DeviceVelocity
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.liquid import Box, Cylinder, Liquid, Region
-from study_app.haptics.model.scene import MAX_LIQUIDS, MAX_WINDOW, STORED_FORCES, Ewma, Given, Kalman, Scene
+from study_app.haptics.model.scene import MAX_LIQUIDS, STORED_FORCES, Ewma, Given, Kalman, Scene, Withdrawn
 from study_app.haptics.model.slope_limits import DampingLimits, handle_limits, slew_limit_n
 
 KINDS: Final[tuple[Rows, ...]] = tuple(rows for effect in EFFECTS for rows in effect.rows)
@@ -100,7 +100,6 @@ class Model(NamedTuple):
     liquids: Any  # (n,) LIQUID
     state: Any  # (1,) STATE
     liquid_states: Any  # (n,) LIQUID_STATE
-    window: Any  # (rows,) WINDOW, the newest samples, of estimators with a window
     forces_n: Any  # (STORED_FORCES, 3) the newest forces [N], if the scene's link delays them; else (0, 3)
     rows: Any  # `EffectRows`: arrays of the effects, with contiguous rows per liquid
 
@@ -113,11 +112,6 @@ class Model(NamedTuple):
 def elements_needed(scene: Scene) -> int:
     """Return the number of wake rows of the scene: 0 if no liquid has a wake."""
     return count_open_ended(rows_needed(resolve(scene)))
-
-
-def window_needed(scene: Scene) -> int:
-    """Return the number of samples that the velocity estimator stores: 0 without a window."""
-    return ESTIMATORS[scene.velocity.kind].samples(scene.velocity)
 
 
 def pack(
@@ -145,7 +139,6 @@ def pack(
         liquids=layout.records(layout.LIQUID, liquids),
         state=layout.records(layout.STATE, 1),
         liquid_states=layout.records(layout.LIQUID_STATE, liquids),
-        window=layout.records(layout.WINDOW, window_needed(scene) if capacity is None else MAX_WINDOW),
         forces_n=np.zeros((STORED_FORCES if capacity is not None or scene.link.acts else 0, 3)),
         rows=EffectRows(
             **{
@@ -175,11 +168,6 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
         raise StudyError(
             f"the scene needs {len(scene.liquids)} liquids; the model was packed with room for {len(model.liquids)}: "
             "pack it with a capacity"
-        )
-    if window_needed(scene) > len(model.window):
-        raise StudyError(
-            f'velocity "{scene.velocity.kind}" looks at {window_needed(scene)} samples; the model was packed with room '
-            f"for {len(model.window)}: pack it with a capacity"
         )
     if scene.link.acts and len(model.forces_n) == 0:
         raise StudyError(
@@ -244,6 +232,8 @@ def _for_device(scene: Scene, dynamics: Dynamics) -> Scene:
     if takes_device_velocity(scene.rate_hz, dynamics) and not isinstance(scene.velocity, Given):
         velocity = DeviceVelocity(lag_s=dynamics.velocity_lag_s or 0.0)
         return resolve(scene).model_copy(update={"velocity": velocity})
+    if isinstance(scene.velocity, Withdrawn):
+        raise StudyError(": ".join(scene.velocity.refusal))
     if isinstance(scene.velocity, Kalman) and dynamics.delay_s is None:
         scene = scene.model_copy(update={"velocity": Ewma()})
     return resolve(scene)
@@ -280,8 +270,7 @@ def _fill_constants(
     parameters.radius_m = scene.body.diameter_m / 2
     parameters.weight_n = scene.body.density_kg_m3 * scene.body.volume_m3 * GRAVITY_MPS2
     parameters.estimator = ESTIMATORS[scene.velocity.kind].code
-    parameters.window_samples = window_needed(scene)
-    ESTIMATORS[scene.velocity.kind].fill(parameters, scene.velocity, scene.scale)
+    ESTIMATORS[scene.velocity.kind].fill(parameters, scene.velocity)
     parameters.knee_law = _KNEES[scene.knee.law]
     parameters.knee_threshold_mps = scene.knee.threshold_mps
     parameters.slope_limit_nspm = [limit.drag_nspm / scene.scale for limit in limits]

@@ -273,8 +273,7 @@ def _listed(every: Sequence[Level], some: Sequence[Level]) -> str:
 def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> float:
     """Return Re V/(jωX), the estimated velocity over the true one in a swing of ``frequency_hz``, sampled evenly.
 
-    Of "ewma" and "lead" from the recursion, of windows from the weights of their least-squares slope at full length, of
-    "kalman" from its lag.
+    Of "ewma" from the recursion, of "kalman" from its lag.
     """
     return NAMED[velocity.kind].passed_share(velocity, 1 / rate_hz, 2 * math.pi * frequency_hz)
 

@@ -18,7 +18,7 @@ from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Floats, Motion
-from study_app.haptics.model.scene import Ewma, Foaw, Kalman, Knee, Lead, Line, Raw, Scene, Velocity
+from study_app.haptics.model.scene import Ewma, Kalman, Knee, Raw, Scene, Velocity
 from study_app.haptics.runtime.offline import samples_along
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
@@ -27,7 +27,7 @@ EXCERPT: Final = Path(__file__).with_name("encoders.npz")
 COUNTS_M: Final = {"spindle": 38e-6, "motor": 38e-6 * 8192 / (4196 * 35)}
 """One count of each encoder [m], in the order of the columns of a recording."""
 FORCE_LIMIT_N: Final = 8.0
-ESTIMATORS: Final[tuple[Velocity, ...]] = (Kalman(), Ewma(), Lead(), Line(), Foaw(), Raw())
+ESTIMATORS: Final[tuple[Velocity, ...]] = (Kalman(), Ewma(), Raw())
 SMOOTHED: Final = 41
 """Samples of the acausal smoother, a cubic that is fitted around each sample: it passes 33 Hz."""
 SETTLED: Final = 500

@@ -169,7 +169,7 @@ def test_a_changed_constant_of_a_kernel_changes_the_digest_and_a_word_elsewhere_
     for file, old, new in (
         ("haptics/kernels/safety.py", '"""', '"""The '),  # its own file
         ("haptics/model/layout.py", "LIMITER_NORM = 1 << 3", "LIMITER_NORM = 1 << 13"),  # imported by it
-        ("haptics/model/estimators/kalman.py", "CODE = ", "CODE = 1 + "),  # imported by what it imports
+        ("haptics/model/effect.py", "INT, FLOAT", "FLOAT, INT"),  # imported by what it imports
     ):
         assert digest_with(package, file, old, new) != digest, file
     assert digest_with(package, "haptics/model/paths.py", '"""', '"""The ') == digest

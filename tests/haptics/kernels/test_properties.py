@@ -6,14 +6,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from study_app.haptics.model.layout import LIMITER_ENERGY, STATUS_NON_FINITE
-from study_app.haptics.model.scene import Ewma, Foaw, Line, Raw
+from study_app.haptics.model.scene import Ewma, Kalman, Raw
 from study_app.haptics.model.slope_limits import SLEW_N
 from tests.haptics.scenes import EVERYTHING, THESIS, TICK_NS, Hand, examples
 
 pytestmark = pytest.mark.slow
 
 ALL = {**THESIS, **EVERYTHING}
-ESTIMATORS = {"ewma": Ewma(), "line": Line(), "foaw": Foaw(), "raw": Raw()}
+ESTIMATORS = {"ewma": Ewma(), "kalman": Kalman(), "raw": Raw()}
 LEAST, MOST = -(2**63), 2**63 - 1
 
 any_bytes = st.binary(min_size=24, max_size=24).map(lambda raw: np.frombuffer(raw, np.float64))

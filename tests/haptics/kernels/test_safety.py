@@ -5,11 +5,11 @@ from study_app.errors import StudyError
 from study_app.evidence.stability.damping_limits import measured_estimators
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.estimators import NAMED
+from study_app.haptics.model.estimators import NAMED, DeviceVelocity
 from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NORM, LIMITER_SLEW, LIMITER_SLOPE
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, Ewma, Foaw, ForceLink, Given, Kalman, Line, Raw
+from study_app.haptics.model.scene import Box, Ewma, ForceLink, Given, Kalman, Raw
 from study_app.haptics.model.slope_limits import (
     KALMAN_SLEW,
     LIGHTER,
@@ -24,7 +24,7 @@ from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack, pack_into
 from tests.haptics.scenes import HONEY, UNBENT, WATER, Hand, liquid, moving, scene, vectors
 
-ESTIMATORS = {"line": Line(), "foaw": Foaw(), "kalman": Kalman(), "raw": Raw()}
+ESTIMATORS = {"kalman": Kalman(), "raw": Raw()}
 TAR = scene(liquid(20_000), scale=30, knee=UNBENT)
 
 
@@ -63,9 +63,12 @@ def test_a_loop_beyond_the_table_is_refused(period_s, delay_ticks):
 
 
 def test_a_faster_line_is_noisier_and_bears_half():
-    assert slope_limit(0.5e-3, 1, Line()) == pytest.approx(slope_limit(1e-3, 1, Line()) / 2, abs=0.1)
-    assert slope_limit(0.25e-3, 1, Line()) == pytest.approx(slope_limit(0.5e-3, 1, Line()) / 2)
-    assert slope_limit(1e-3, 1, Given()) == slope_limit(1e-3, 1, Ewma()) > 4 * slope_limit(1e-3, 1, Line())
+    def limit(period_s):
+        return slope_limit(period_s, 1, DeviceVelocity(lag_s=7 * period_s))  # a line of 15 positions
+
+    assert limit(0.5e-3) == pytest.approx(limit(1e-3) / 2, abs=0.1)
+    assert limit(0.25e-3) == pytest.approx(limit(0.5e-3) / 2)
+    assert slope_limit(1e-3, 1, Given()) == slope_limit(1e-3, 1, Ewma()) > 4 * limit(1e-3)
 
 
 def test_one_that_smooths_more_bears_as_much_as_the_usual_one():
@@ -106,7 +109,7 @@ def test_added_mass_and_history_are_weakened_where_the_loop_bears_less():
     swaying = Motion(t_s, np.column_stack([0.01 * np.sin(20 * t_s), 0 * t_s, 0 * t_s]))
     felt = simulate(inert, swaying)
     assert (felt.device_fx_n == felt.fx_n).all()
-    coarse = scene(*inert.liquids, scale=3, velocity=Line())
+    coarse = scene(*inert.liquids, scale=3, velocity=Raw())
     felt = simulate(coarse, swaying)
     ratio = felt.device_fx_n[100:] / felt.fx_n[100:]
     share = pack(coarse).liquids[0].inertia_share[1]

@@ -2,9 +2,9 @@
 
 import pytest
 
-from study_app.haptics.model.estimators.device import MOST_LAG_TICKS, DeviceVelocity
+from study_app.haptics.model.estimators import MOST_LAG_TICKS, DeviceVelocity
 from study_app.haptics.model.force_rules import VERSIONS
-from study_app.haptics.model.scene import Ewma, Foaw, Given, Lead, Line, Raw
+from study_app.haptics.model.scene import Ewma, Given, Raw
 from study_app.haptics.model.slope_limits import damping_limits, handle_limits, table
 
 
@@ -23,26 +23,17 @@ def limit(velocity):
     return damping_limits(1e-3, 1, velocity).drag_nspm
 
 
-def test_between_two_windows_the_worse_counts():
-    assert limit(Line(samples=12)) == min(entry("line", 11), entry("line", 15))
-    assert limit(Line(samples=4)) == min(entry("line", 3), entry("line", 5)) > entry("line", 15)
-    assert limit(Line(samples=2)) == pytest.approx(limit(Raw()), rel=0.02)
-
-
-def test_a_smaller_tolerance_also_has_the_limit_of_the_raw_difference():
-    assert limit(Foaw(tolerance_m=1e-6)) == min(entry("foaw", 16), entry("raw", None)) < limit(Foaw())
-
-
-def test_a_given_velocity_has_the_limit_of_ewma_and_lead_has_its_own():
+def test_between_two_weights_the_worse_counts_and_a_given_velocity_has_the_limit_of_ewma():
+    assert limit(Ewma(alpha=0.11)) == min(entry("ewma", 0.1), entry("ewma", 0.12))
+    assert limit(Ewma(alpha=0.18)) == min(entry("ewma", 0.15), entry("ewma", 0.2)) > limit(Raw())
     assert limit(Given()) == limit(Ewma()) == 53
-    assert limit(Lead()) == entry("lead", None) < limit(Ewma())
 
 
 def test_velocity_of_a_device_has_the_limits_of_a_line_that_lags_as_much():
-    assert limit(DeviceVelocity(lag_s=2e-3)) == limit(Line(samples=5))
-    assert limit(DeviceVelocity(lag_s=3e-3)) == limit(Line(samples=7)) == min(entry("line", 5), entry("line", 8))
-    assert limit(DeviceVelocity()) == limit(Line(samples=2))
-    assert DeviceVelocity(lag_s=MOST_LAG_TICKS * 1e-3).window(1e-3) == Line(samples=16)
+    assert limit(DeviceVelocity(lag_s=2e-3)) == entry("line", 5) == 25.6
+    assert limit(DeviceVelocity(lag_s=3e-3)) == min(entry("line", 5), entry("line", 8))
+    assert limit(DeviceVelocity()) == entry("line", 2) == pytest.approx(limit(Raw()), rel=0.02)
+    assert limit(DeviceVelocity(lag_s=MOST_LAG_TICKS * 1e-3)) == entry("line", 16)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pydantic import BaseModel
 from study_app.errors import StudyError
 from study_app.haptics.model.effects.current import Channel, Uniform
 from study_app.haptics.model.overrides import override, override_all
-from study_app.haptics.model.scene import Box, Everywhere, Foaw, Line
+from study_app.haptics.model.scene import Box, Everywhere, Kalman, Raw
 from tests.haptics.scenes import HONEY, LIGHT_OIL, POOL, WATER, scene
 
 FULL = scene(POOL)
@@ -56,8 +56,8 @@ def test_override_sets_one_parameter_wherever_it_sits(name, text, where, value):
     "felt",
     [
         FULL,
-        FULL.model_copy(update={"velocity": Line()}),
-        FULL.model_copy(update={"velocity": Foaw()}),
+        FULL.model_copy(update={"velocity": Kalman()}),
+        FULL.model_copy(update={"velocity": Raw()}),
         scene(POOL.model_copy(update={"current": Channel(width_m=1, peak_mps=1), "region": Box(size_m=(1, 2, 3))})),
         scene(POOL.model_copy(update={"current": Uniform(velocity_mps=(1, 2, 3))})),
     ],
@@ -89,8 +89,8 @@ def test_every_parameter_is_reached_by_its_table_and_most_by_their_name_alone(fe
         ("region", '{kind="box", size_m=[1, 2, 3]}', lambda s: s.liquids[0].region, Box(size_m=(1, 2, 3))),
         ("depth_m", "-0.1,0.5", lambda s: s.motion.depth_m, (-0.1, 0.5)),
         ("effects", "auto", lambda s: s.liquids[0].effects, "auto"),
-        ("velocity.kind", "line", lambda s: s.velocity, Line()),
-        ("velocity", '{kind="foaw", samples=9}', lambda s: s.velocity, Foaw(samples=9)),
+        ("velocity.kind", "raw", lambda s: s.velocity, Raw()),
+        ("velocity", '{kind="kalman"}', lambda s: s.velocity, Kalman()),
     ],
 )
 def test_parameters_of_every_effect_can_be_set(name, text, where, value):

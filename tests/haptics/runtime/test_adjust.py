@@ -30,7 +30,7 @@ NUMBERS = {
     "body.drag_coefficient": 1.2, "alpha": 0.5, "threshold_mps": 1.0, "force_limit_n": 2.0, "body.density_kg_m3": 500.0,
 }  # fmt: skip
 OTHERWISE = {
-    "wake.length": 1000, "effects": ("drag",), "knee.law": "none", "velocity": {"kind": "line"}, "scale": 3.0,
+    "wake.length": 1000, "effects": ("drag",), "knee.law": "none", "velocity": {"kind": "raw"}, "scale": 3.0,
     "origin_m": (0.0, 0.1, 0.0), "region": {"kind": "box", "size_m": (9.0, 9.0, 9.0)},
 }  # fmt: skip
 

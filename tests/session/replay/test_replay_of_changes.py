@@ -97,6 +97,17 @@ def test_a_receipt_that_lacks_what_ran_is_one_sentence(rehearsed: Path, tmp_path
         assert "\n" not in str(raised.value)
 
 
+def test_a_session_with_an_estimator_that_left_the_program_is_not_recomputable(rehearsed: Path, tmp_path: Path) -> None:
+    place = copied(rehearsed, tmp_path / "estimator")
+    receipt = json.loads((place / "receipt.json").read_text())
+    receipt["protocol"]["scene"]["velocity"] = {"kind": "line", "samples": 15}
+    (place / "receipt.json").write_text(json.dumps(receipt))
+    found = replay(place)
+    assert (found.recordings, found.differences, found.proved) == (0, (), False)
+    assert all('not recomputable: the velocity estimator "line" left the program' in it for it in found.uncompared)
+    assert len(found.uncompared) == 4
+
+
 def test_missing_samples_are_said_and_not_compared(rehearsed: Path, tmp_path: Path) -> None:
     place = copied(rehearsed, tmp_path / "gap")
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import clear, copy, square
-from study_app.haptics.model.estimators import kalman
+from study_app.haptics.model.estimators import KALMAN
 from study_app.haptics.model.layout import Record
 
 NOTHING_MPS2 = 1e-30
@@ -72,7 +72,7 @@ def storing_square(parameters: Record, local: Record, smoothed_mps2: Any, rate_p
 
     With the other estimators their own stored energy, of a longer lag, covers that of the smoothing.
     """
-    if parameters.estimator != kalman.CODE:
+    if parameters.estimator != KALMAN:
         return float(square(local.motion_mps))
     time_s, square_m2ps2 = (1.0 + parameters.smoothing_lead) / rate_per_s, 0.0
     for axis in range(3):

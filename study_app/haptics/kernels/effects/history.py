@@ -19,7 +19,7 @@ from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.effects.added_mass import stored_square
 from study_app.haptics.kernels.vector import clear, square
 from study_app.haptics.model.effects.history import EXPONENTIALS
-from study_app.haptics.model.estimators import kalman
+from study_app.haptics.model.estimators import KALMAN
 from study_app.haptics.model.layout import Record
 
 TIMES = (0.1, 0.3, 1.0, 3.0, 10.0, 40.0, 190.0, 1000.0, 6500.0, 50000.0)  # t̃_i
@@ -77,7 +77,7 @@ def basset_force(
 @part
 def _storing_square(parameters: Record, local: Record, tracks: Record) -> float:
     """Return v² [m²/s²] of the energy that it stores, with v smoothed as for the added mass."""
-    if parameters.estimator != kalman.CODE:
+    if parameters.estimator != KALMAN:
         return float(square(local.motion_mps))
     square_m2ps2 = 0.0
     for axis in range(3):

@@ -8,7 +8,7 @@ import pytest
 from study_app.evidence.stability.bench import fast_part
 from study_app.evidence.stability.damping_limits import boundary_nspm
 from study_app.evidence.stability.withheld_force import measure
-from study_app.haptics.kernels.estimators import kalman
+from study_app.haptics.kernels import estimators as kalman
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import NAMED

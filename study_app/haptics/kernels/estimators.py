@@ -1,4 +1,6 @@
-"""A Kalman filter of velocity that uses the sent force and estimates the mass that the force moves.
+"""The velocity that the liquids act on, from positions: estimator, then compression of high speeds (knee).
+
+The Kalman filter of velocity uses the sent force and estimates the mass that the force moves.
 
 Per axis the state is position, velocity and acceleration, driven by white jerk of density q that grows with speed and
 acceleration, and where innovations exceed their variance; all axes share one covariance. The force, delayed by the
@@ -16,11 +18,12 @@ again. Their difference then is added and fades out, so that the estimate does n
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 from study_app.haptics.kernels.compiled import part
-from study_app.haptics.kernels.vector import copy, square
-from study_app.haptics.model.layout import Record
+from study_app.haptics.kernels.vector import clear, copy, norm, square
+from study_app.haptics.model import estimators
+from study_app.haptics.model.layout import KNEE_SQRT, KNEE_SQUARE, Record
 
 JERK_M2PS5: Final = 0.5
 JERK_OF_ACCELERATION_PS: Final = 10.0
@@ -50,6 +53,65 @@ QUIET_S: Final = 1.0
 CARRIED_S: Final = 10e-3
 NOTHING: Final = 1e-30
 """Smaller values become 0, since denormal numbers would slow arithmetic down [SI units]."""
+
+
+@part
+def reset_estimator(parameters: Record, state: Record) -> None:
+    """Reset the estimate: the velocity is 0, since one position does not determine it, unless it is measured."""
+    if parameters.estimator not in (estimators.GIVEN, estimators.DEVICE):
+        clear(state.estimate_mps)
+    if parameters.estimator == estimators.KALMAN:
+        begin_filter(parameters, state.kalman)
+
+
+@part
+def estimate_velocity(parameters: Record, state: Record, interval_s: float) -> None:
+    """Bring ``state.estimate_mps`` and ``state.velocity_mps`` to the newest position, Δt after the one before."""
+    if parameters.estimator == estimators.EWMA:
+        _ewma(parameters, state, state.estimate_mps, interval_s)
+    elif parameters.estimator == estimators.KALMAN:
+        _ewma(parameters, state, state.kalman.smoothed_mps, interval_s)
+        filter_velocity(parameters, state, interval_s)
+    elif parameters.estimator == estimators.RAW:
+        for axis in range(3):
+            state.estimate_mps[axis] = (state.position_m[axis] - state.previous_m[axis]) / interval_s
+    _compress_speed(parameters, state)
+
+
+@part
+def _ewma(parameters: Record, state: Record, velocity_mps: Any, interval_s: float) -> None:
+    """Move ``velocity_mps`` (3,) to the newest difference u = Δp/Δt: v ← v + α(Δt)(u − v) (Rek 2024, §4.2).
+
+    α(Δt) = 1 − (1 − α)^(Δt/1 ms) makes it the same filter at any rate; α is recomputed only if Δt changes. At rest the
+    estimate becomes exactly 0: arithmetic on denormal numbers is slow.
+    """
+    if interval_s != state.weighted_s:
+        state.weighted_s = interval_s
+        state.weight = -math.expm1(parameters.log_keep_per_s * interval_s)
+    weight, per_s = state.weight, 1.0 / interval_s
+    for axis in range(3):
+        difference_mps = (state.position_m[axis] - state.previous_m[axis]) * per_s
+        estimate_mps = velocity_mps[axis] + weight * (difference_mps - velocity_mps[axis])
+        velocity_mps[axis] = estimate_mps if abs(estimate_mps) > NOTHING else 0.0
+
+
+@part
+def _compress_speed(parameters: Record, state: Record) -> None:
+    """Lower speeds above the threshold and keep the direction; the estimate itself is unchanged.
+
+    ``sqrt`` has unit slope at the threshold: s' = s0 + √(1 + 2(s − s0)) − 1 with s, s0 in m/s. ``square`` is the
+    literal "squaring the part above" of Rek 2024, which raises any excess over 1 m/s.
+    """
+    share = 1.0
+    if square(state.estimate_mps) > parameters.knee_threshold_mps * parameters.knee_threshold_mps:
+        speed_mps = norm(state.estimate_mps)
+        excess_mps = speed_mps - parameters.knee_threshold_mps
+        if parameters.knee_law == KNEE_SQRT:
+            share = (parameters.knee_threshold_mps + math.sqrt(1.0 + 2.0 * excess_mps) - 1.0) / speed_mps
+        elif parameters.knee_law == KNEE_SQUARE:
+            share = (parameters.knee_threshold_mps + excess_mps * excess_mps) / speed_mps
+    for axis in range(3):
+        state.velocity_mps[axis] = share * state.estimate_mps[axis]
 
 
 @part

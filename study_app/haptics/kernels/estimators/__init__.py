@@ -1,1 +1,0 @@
-"""Velocity estimators, compiled."""
