@@ -21,7 +21,7 @@ from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slew_limit_n
 from study_app.lab.ab_comparison import Side, Workbench, other
-from study_app.lab.limiters import Limiter, LimiterCounts
+from study_app.lab.limiters import LimiterCount, LimiterCounts
 from study_app.lab.programmed_paths import led_to, programme
 from study_app.lab.shadow import Shadow, Trace
 from study_app.lab.wake_tail import Tail
@@ -180,7 +180,7 @@ class Live:
         """Fade the force in after `stop_force`, as slowly as at a start."""
         self.servo.fade_in()
 
-    def limiters(self) -> tuple[Limiter, ...]:
+    def limiters(self) -> tuple[LimiterCount, ...]:
         """Return which limiters acted in the last 10 s."""
         scene = Scene() if self.felt is None else self.felt.in_hand.scene
         limit_n = min(self.device.force_limit_n, scene.force_limit_n)

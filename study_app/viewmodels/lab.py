@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from study_app.haptics.model.effect import Parameter, Value
 from study_app.lab.ab_comparison import Setting, Side, Workbench
-from study_app.lab.limiters import Limiter
+from study_app.lab.limiters import LimiterCount
 from study_app.lab.parameters import sections
 from study_app.lab.presets import Choice
 from study_app.lab.wake_tail import Tail
@@ -140,7 +140,7 @@ class LabView:
     tail_a: Tail | None = None
     tail_b: Tail | None = None
     now: Now | None = None
-    limiters: tuple[Limiter, ...] = ()
+    limiters: tuple[LimiterCount, ...] = ()
     cost: tuple[CostRow, ...] = ()
     tick_ns: float | None = None
     errors: tuple[ErrorRow, ...] = ()

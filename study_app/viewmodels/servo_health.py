@@ -8,8 +8,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_STOP
-from study_app.lab.limiters import WORDS
+from study_app.haptics.model.layout import LIMITERS as ALL_LIMITERS
 from study_app.protocol.model import Protocol
 from study_app.viewmodels.number_words import THIN_SPACE, duration_words, grouped
 
@@ -214,7 +213,7 @@ def _verdict(within: bool) -> Verdict:
 
 STEP_NS = round(TRACE_STEP_S * 1e9)
 ROWS = round(TRACE_WINDOW_S / TRACE_STEP_S) + 2
-LIMITERS = tuple(bit for bit in WORDS if bit not in {LIMITER_FADE, LIMITER_STOP})
+LIMITERS = tuple(limiter for limiter in ALL_LIMITERS if not limiter.expected)
 """Limiters that are counted: fading in and the stop are no sign of anything, and are said elsewhere."""
 FORCE, SIZE, WAKE = slice(0, 3), 3, 4
 
@@ -284,7 +283,7 @@ class Forces:
     def figures(self) -> ForceFigures:
         """Return shares and counts as of now."""
         counted = tuple(
-            (WORDS[bit].lower(), int(count)) for bit, count in zip(LIMITERS, self._limited, strict=True) if count
+            (limiter.label.lower(), int(count)) for limiter, count in zip(LIMITERS, self._limited, strict=True) if count
         )
         permitted_n, withheld_n = self._sums_n
         withheld = float(withheld_n / permitted_n) if permitted_n > 0 else 0.0
@@ -318,7 +317,7 @@ class Forces:
         self._sums_n += samples["permitted_n"][here].sum(), samples["withheld_n"][here].sum()
         acted = samples["limiters"][here]
         if acted.any():
-            self._limited += np.count_nonzero(acted[:, None] & np.array(LIMITERS), axis=0)
+            self._limited += np.count_nonzero(acted[:, None] & np.array([it.bit for it in LIMITERS]), axis=0)
 
 
 LEAST_S: Final = 2.0

@@ -1,7 +1,7 @@
 """The counts of the lab's card of limiters."""
 
 from study_app.haptics.model import layout
-from study_app.lab.limiters import WORDS, LimiterCounts
+from study_app.lab.limiters import LimiterCounts
 
 
 def test_a_limiter_acts_only_now_and_is_counted_for_ten_seconds() -> None:
@@ -9,7 +9,7 @@ def test_a_limiter_acts_only_now_and_is_counted_for_ten_seconds() -> None:
 
     def states() -> dict[str, tuple[int, bool]]:
         rows = counts.rows(8.0, 1.5)
-        assert [row.name.partition(",")[0] for row in rows] == list(WORDS.values())
+        assert [row.name.partition(",")[0] for row in rows] == [it.label for it in layout.LIMITERS]
         return {row.name: (row.ticks, row.acting) for row in rows if row.ticks}
 
     def add(seconds: float, *limiters: int) -> None:

@@ -20,7 +20,7 @@ from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import Array, quartiles
 from study_app.analysis.data.study_tables import Study
 from study_app.errors import StoreError
-from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.store.recordings import read_samples
 from study_app.store.sites.merged import session_in
 
@@ -155,8 +155,6 @@ TRIAL_DEFINITIONS: Final = {
     "at_limit_percent": "share of the trial's ticks in which the force was cut to the force limit",
 }
 
-GLITCH: Final = 1 << LIMITER_NAMES.index("glitch")
-
 
 @dataclass(frozen=True, slots=True)
 class Moved:
@@ -271,7 +269,7 @@ def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached 
     except StoreError:
         return "recording is damaged (liquid-study verify says which)"
     if len(samples):
-        samples = samples[(samples["scene"] == samples["scene"][-1]) & (samples["limiters"] & GLITCH == 0)]
+        samples = samples[(samples["scene"] == samples["scene"][-1]) & (samples["limiters"] & LIMITER_GLITCH == 0)]
     if len(samples):
         end_ns = samples["time_ns"][0] + round(float(row["duration_s"]) * 1e9)
         samples = samples[samples["time_ns"] <= end_ns]

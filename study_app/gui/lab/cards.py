@@ -20,7 +20,7 @@ from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_in
 from study_app.gui.widgets.live_plots import Plot, draw_quickly, number
 from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.haptics.model.scene import Scene
-from study_app.lab.limiters import Limiter
+from study_app.lab.limiters import LimiterCount
 from study_app.lab.steady_curves import RATES_PER_S, SPEEDS_MPS, SteadyCurves, has_flow_curve, steady_curves
 from study_app.viewmodels.lab import OFF, PARAMETERS, Choices, CostRow, ErrorRow, EstimateRow, Floats, LabView
 from study_app.viewmodels.number_words import grouped
@@ -197,7 +197,7 @@ class LimiterLine(Themed, QWidget):
         hbox((self.name, 1), self.word, self.count, spacing=6, margins=(34, 0, 10, 0), parent=self)
         self.setFixedHeight(LINE + 2)
 
-    def show_limiter(self, limiter: Limiter) -> None:
+    def show_limiter(self, limiter: LimiterCount) -> None:
         state: LimiterState = "acting" if limiter.acting else "acted" if limiter.ticks else "quiet"
         self.name.show_text(limiter.name)
         self.count.setText(grouped(limiter.ticks))

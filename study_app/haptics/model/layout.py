@@ -4,7 +4,7 @@ Records are rows of ``np.recarray``: plain structs in compiled code, objects wit
 (``NUMBA_DISABLE_JIT=1``). Positions and forces are float64; unless a name says otherwise, m, m/s, N, s.
 """
 
-from typing import Any, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -35,10 +35,50 @@ LIMITER_STOP = 1 << 8
 LIMITER_ESTIMATOR = 1 << 9  # the velocity is EWMA's: the Kalman filter had a fault within the last second
 LIMITER_SATURATED = 1 << 10  # the device's motors saturated: its force was between 0 and ``device_force_n``
 
-LIMITER_NAMES = (
-    *("slope", "non_finite", "energy", "norm", "slew", "fade", "stale", "glitch", "stop", "estimator"),
-    "saturated",
+
+class Limiter(NamedTuple):
+    """A limiter: its bit, the ending of its column, its name in windows, and what its column counts ticks of.
+
+    Sessions of the first releases lack the column of a ``later`` one; an ``expected`` one does not concern an operator.
+    """
+
+    bit: int
+    name: str
+    label: str
+    meaning: str
+    later: bool = False
+    expected: bool = False
+
+
+LIMITERS: Final = (
+    Limiter(LIMITER_SLEW, "slew", "Slew", "the change of force was slowed"),
+    Limiter(LIMITER_FADE, "fade", "Fade", "the force was fading in or out", expected=True),
+    Limiter(LIMITER_SLOPE, "slope", "Slope", "the slope limit bounded the change of force with speed"),
+    Limiter(LIMITER_NORM, "norm", "Force", "the force was cut to the force limit"),
+    Limiter(LIMITER_ENERGY, "energy", "Passivity controller", "the passivity controller changed the force"),
+    Limiter(LIMITER_STALE, "stale", "Stale sample", "the device had no new sample in time"),
+    Limiter(LIMITER_GLITCH, "glitch", "Rejected sample", "a sample was rejected as implausible"),
+    Limiter(LIMITER_NON_FINITE, "non_finite", "Non-finite force", "a force that was not finite was replaced by zero"),
+    Limiter(LIMITER_STOP, "stop", "Force stopped", "the force was stopped", expected=True),
+    Limiter(
+        LIMITER_ESTIMATOR,
+        "estimator",
+        "Velocity filter",
+        "EWMA gave the velocity, because the Kalman filter's innovations were too large or the delay changed",
+        later=True,
+    ),
+    Limiter(
+        LIMITER_SATURATED,
+        "saturated",
+        "Saturated motors",
+        "the device's motors saturated: its force was between zero and the recorded one",
+        later=True,
+    ),
 )
+"""Every limiter, in the order in which windows show them."""
+
+LIMITER_NAMES: Final = tuple(limiter.name for limiter in sorted(LIMITERS))
+"""Their names in the order of their bits, which is that of columns."""
 
 # Status of the servo, in Sample.status; the owner turns a fault into ServoFault.
 STATUS_OK = 0

@@ -7,7 +7,7 @@ name mean the same in every table.
 from dataclasses import replace
 from typing import Any, Final, Literal
 
-from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.haptics.model.layout import LIMITERS
 from study_app.store.tables.csv_files import Column, optional
 
 STUDY = Column("study", "text", "Short name of the study, from its protocol.")
@@ -35,19 +35,6 @@ SESSION_COLUMNS = (STUDY, PARTICIPANT, SESSION, SIMULATED, PILOT)
 """Which session a row is about."""
 TRIAL_COLUMNS = (TRIAL, ATTEMPT, BLOCK, PHASE, PART, INDEX)
 """Which trial of it."""
-_LIMITERS = {
-    "slope": "the slope limit bounded the change of force with speed",
-    "non_finite": "a force that was not finite was replaced by zero",
-    "energy": "the passivity controller changed the force",
-    "norm": "the force was cut to the force limit",
-    "slew": "the change of force was slowed",
-    "fade": "the force was fading in or out",
-    "stale": "the device had no new sample in time",
-    "glitch": "a sample was rejected as implausible",
-    "stop": "the force was stopped",
-    "estimator": "EWMA gave the velocity, because the Kalman filter's innovations were too large or the delay changed",
-    "saturated": "the device's motors saturated: its force was between zero and the recorded one",
-}
 _INVALID = (
     "invalid",
     "an interval was not delivered as requested: nothing was asked, and the trial was presented again",
@@ -224,12 +211,12 @@ TRIALS: tuple[Column, ...] = (
     _count("loop_delay_changes", "How often that delay changed during the task.", later=True),
     *(
         _count(
-            f"limiter_{name}",
-            f"Ticks of the servo in which {_LIMITERS[name]}.",
+            f"limiter_{limiter.name}",
+            f"Ticks of the servo in which {limiter.meaning}.",
             sealed=True,
-            later=name in {"estimator", "saturated"},
+            later=limiter.later,
         )
-        for name in LIMITER_NAMES
+        for limiter in sorted(LIMITERS)
     ),
     _count("frames", "Frames shown to the participant.", sealed=True),
     _count("frames_late", "Frames whose delay exceeded the requested delay by more than the limit.", sealed=True),
