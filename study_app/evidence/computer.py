@@ -1,6 +1,6 @@
-"""A description of the computer on which times were measured.
+"""The computer on which times are measured: its description, and what else it does meanwhile.
 
-What else the machine does while the loops are timed; windows are lent by ``app.delay_session``.
+Windows are lent by ``app.delay_session``.
 """
 
 import os

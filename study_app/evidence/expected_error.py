@@ -13,11 +13,16 @@ import numpy as np
 
 from study_app.evidence import reference_solutions
 from study_app.evidence.cost import measure
-from study_app.evidence.non_newtonian_law import non_newtonian_n
-from study_app.evidence.reference_model import local_wakes, lowered, resistance_nspm, respond
+from study_app.evidence.reference_model import (
+    local_wakes,
+    lowered,
+    non_newtonian_n,
+    resistance_nspm,
+    respond,
+    unsteady_n,
+)
 from study_app.evidence.reference_solutions import COUNT_M, CYCLES, ROUNDING, Case, Truth, error_of, stroke
 from study_app.evidence.scene_variants import with_effects
-from study_app.evidence.unsteady_law import unsteady_n
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, Dynamics
 from study_app.haptics.model.effect import GRAVITY_MPS2
 from study_app.haptics.model.effects.local_wake import LocalWake

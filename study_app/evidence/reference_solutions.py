@@ -1,12 +1,8 @@
-"""Motions of a hand with exact velocities, for measuring models along.
-
-References for models of a liquid: motions with their forces.
+"""References for models of a liquid: motions with their forces, and the errors of a force against them.
 
 There are two kinds. *Numerical*: the definition of the model itself, summed without rounding errors. *Physical*: the
 known forces on a real sphere: measured steady drag and the exact forces of creeping flow. None shares code with
 ``haptics.kernels.effects``.
-
-The error of a force against a reference solution.
 """
 
 import math
@@ -18,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from study_app.evidence.reference_model import respond
-from study_app.evidence.unsteady_law import Constants
+from study_app.evidence.reference_model import Constants, respond
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.lab.identify.measured_force import vectors_x

@@ -124,11 +124,6 @@ def take_turns(
     """Run each arm once a round, so that other load on the machine affects all alike; return what each gave.
 
     An arm is called with the number of the round; ``alternating``: every second round is in reverse order.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        ``ending`` was set.
     """
     found: dict[Arm, list[Found]] = {arm: [] for arm in arms}
     for number in range(rounds):

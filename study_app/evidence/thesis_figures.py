@@ -1,9 +1,8 @@
-"""Figures 3 to 8 of the thesis as programmed motions through the default liquid of its evaluation.
+"""Figures 3 to 8 of the thesis drawn anew: force over time per axis, by the servo's own tick.
 
-Rek 2024, §5.1: density 1000 kg/m³, a ball of 68 mm, N = S = 5000, y = 1, λ = 0.999975, breaking angle 45° between
-neighbouring elements; motions at 1 m/s with their exact velocity.
-
-The thesis' Figs 3 to 8 drawn anew: force over time per axis, by the servo's own tick.
+They are programmed motions through the default liquid of its evaluation (Rek 2024, §5.1): density 1000 kg/m³, a ball of
+68 mm, N = S = 5000, y = 1, λ = 0.999975, breaking angle 45° between neighbouring elements; motions at 1 m/s with their
+exact velocity.
 """
 
 import textwrap

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
 
-from study_app.evidence.appraisal import Costs, Errors
-from study_app.evidence.appraisal_worker import AppraisalClient, Question
+from study_app.evidence.appraisal import AppraisalClient, Costs, Errors, Question
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting
 from study_app.lab.presets import Choice, liquids_at_hand, liquids_of, preset_text, save, spoken

@@ -11,8 +11,7 @@ from PySide6.QtGui import QScreen
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
-from study_app.evidence.appraisal import Costs, Errors
-from study_app.evidence.appraisal_worker import Question, start_appraisal_worker
+from study_app.evidence.appraisal import Costs, Errors, Question, start_appraisal_worker
 from study_app.gui.display.screens import place
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.theme.theme import Theme

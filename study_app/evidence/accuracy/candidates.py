@@ -11,9 +11,9 @@ from typing import Any, ClassVar, Final, Literal, TypeAlias
 
 import numpy as np
 
+from study_app.evidence.reference_model import unsteady_n
 from study_app.evidence.reference_solutions import COUNT_M, Truth
 from study_app.evidence.scene_variants import _only, with_effects, with_wake
-from study_app.evidence.unsteady_law import unsteady_n
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.effects.drag import resistance
 from study_app.haptics.kernels.effects.wake import REST_MPS, response

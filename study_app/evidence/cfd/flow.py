@@ -68,13 +68,7 @@ def library() -> Any:
 
 
 class Flow:
-    """The liquid around the ball on one grid; ``unknowns`` is how many numbers describe it.
-
-    Raises
-    ------
-    StudyError
-        NGSolve is not installed.
-    """
+    """The liquid around the ball on one grid; ``unknowns`` is how many numbers describe it."""
 
     def __init__(self, grid: Grid) -> None:
         self._ng = ng = library()

@@ -15,8 +15,8 @@ from scipy.optimize import least_squares
 from study_app.errors import StudyError
 from study_app.evidence.cfd.fits import MODELS, judge
 from study_app.evidence.cfd.stored_flows import LEFT_OUT, LEFT_OUT_FILE, Table
+from study_app.evidence.reference_model import CONSTANTS, Constants, late_mps
 from study_app.evidence.table import Evidence
-from study_app.evidence.unsteady_law import CONSTANTS, Constants, late_mps
 from study_app.haptics.model.motion import Floats
 from study_app.store.tables.csv_files import csv_text_of
 
@@ -120,13 +120,7 @@ def _as_run(table: Table) -> tuple[float, float]:
 
 
 def fit_constants(tables: Sequence[Table]) -> Constants:
-    """Return the constants by all tables, each of equal weight.
-
-    Raises
-    ------
-    StudyError
-        The search does not end.
-    """
+    """Return the constants by all tables, each of equal weight."""
     return _fit([_Solved(it) for it in tables], BEGIN)
 
 

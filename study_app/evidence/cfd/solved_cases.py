@@ -1,8 +1,6 @@
-"""How the speed of a solved ball changes with time, and the exact force of creeping flow along it.
+"""The solved cases: a ball in liquids of a shipped protocol, its speed over time, and the exact force of creeping flow.
 
-Numbers are in ball diameters D, speeds U and liquid densities: times in D/U, forces in ρU²D².
-
-The solved cases: a ball in liquids of a shipped protocol that starts and stops, and motions for fitting a law.
+Numbers of profiles are in ball diameters D, speeds U and liquid densities: times in D/U, forces in ρU²D².
 """
 
 import itertools

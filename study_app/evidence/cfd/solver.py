@@ -87,13 +87,7 @@ def flow_of(grid: Grid) -> Flow:
 
 
 def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = STEP) -> bytes:
-    """Return the file of one case, with a row for every `STEP` or ``step``, whichever is longer.
-
-    Raises
-    ------
-    StudyError
-        The solution differs too much from the coarse one or, without convection, from the exact one.
-    """
+    """Return the file of one case, with a row for every `STEP` or ``step``, whichever is longer."""
     profile = case.profile
     times, rough = profile.moments(step), profile.moments(2 * step)
 
@@ -129,13 +123,7 @@ def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = STEP) -> by
 
 
 def steady_table() -> bytes:
-    """Return the file of steady drag.
-
-    Raises
-    ------
-    StudyError
-        No steady flow was found.
-    """
+    """Return the file of steady drag."""
     solved = [Flow(it) for it in (WIDE, WIDE_COARSE, GRID)]
     columns = [flow.steady(REYNOLDS) for flow in solved]
     method = "; ".join(

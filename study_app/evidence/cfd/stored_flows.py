@@ -1,7 +1,4 @@
-"""Solved flows as CSV files, with comment lines ``# name: value`` on what made them; read without the solver.
-
-The solved flows as references for models of a liquid.
-"""
+"""Solved flows as CSV files, with comment lines ``# name: value`` on what made them; read without the solver."""
 
 import csv
 import math
@@ -16,8 +13,8 @@ import numpy as np
 from study_app.errors import StudyError
 from study_app.evidence.cfd.solved_cases import PROFILES, STOPPING
 from study_app.evidence.cfd.solved_cases import Case as SolvedCase
+from study_app.evidence.reference_model import Constants
 from study_app.evidence.reference_solutions import Case, Truth, along_x
-from study_app.evidence.unsteady_law import Constants
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Scene
 from study_app.lab.identify.measured_force import vectors_x
@@ -176,13 +173,7 @@ def read(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> 
 
 
 def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Truth, ...]:
-    """Return the fluid solver's results for the scene's liquid and body, at the scene's rate; often none.
-
-    Raises
-    ------
-    StudyError
-        There are no tables, or one cannot be understood.
-    """
+    """Return the fluid solver's results for the scene's liquid and body, at the scene's rate; often none."""
     liquid = scene.liquids[0]
     ours = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
     more = (*training(), *held_out()) if folder is None else ()

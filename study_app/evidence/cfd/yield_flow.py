@@ -50,13 +50,7 @@ class YieldFlow(Flow):
     """Creeping flow of a Herschel–Bulkley liquid around the ball."""
 
     def drags(self, flow_index: float, bingham: Sequence[float]) -> Iterator[tuple[float, float]]:
-        """Yield the drag at rising Bingham numbers, with the least ε and with the one before.
-
-        Raises
-        ------
-        StudyError
-            No steady flow was found.
-        """
+        """Yield the drag at rising Bingham numbers, with the least ε and with the one before."""
         ng = self._ng
         flow, residual = ng.GridFunction(self._space), self._zeros()
         flow.vec.data = self._stream

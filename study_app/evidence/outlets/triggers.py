@@ -40,13 +40,7 @@ class TriggerDelays:
 
 
 class VirtualPort:
-    """A pair of virtual ports: one with an ``address`` to send to, and another whose bytes another process reads.
-
-    Raises
-    ------
-    StudyError
-        This system has none.
-    """
+    """A pair of virtual ports: one with an ``address`` to send to, and another whose bytes another process reads."""
 
     def __init__(self) -> None:
         if not hasattr(os, "openpty"):

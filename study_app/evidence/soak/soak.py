@@ -381,13 +381,7 @@ def _size(vector: Floats) -> float:
 
 
 def ticks_of(hours: float, rate_hz: float) -> int:
-    """Return how many ticks a soak takes.
-
-    Raises
-    ------
-    StudyError
-        So long or so short a soak makes no sense.
-    """
+    """Return how many ticks a soak takes."""
     fewest = FEWEST_TICKS / rate_hz / 3600
     if not fewest <= hours <= MOST_HOURS:
         raise StudyError(f"a soak lasts {fewest:.2g} to {MOST_HOURS:g} hours, not {hours:g}")

@@ -10,7 +10,6 @@ A loop counts as unstable by the criteria of `stability.verdict`: not finite, li
 above 40 Hz that exceeds that of the loop with either fixed setting by more than 0.05 N.
 """
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,9 +28,9 @@ from study_app.evidence.stability.verdict import (
     REASONS,
     RESTLESS_N,
     SETTLES_S,
-    SLOW_HZ,
     SWING_MPS,
-    TIRED,
+    reasons_of,
+    resting_swing,
 )
 from study_app.evidence.table import Evidence
 from study_app.haptics.model.scene import Scene
@@ -213,14 +212,12 @@ def _reasons(run: _Run, case: Case, calm_n: Sequence[Floats]) -> tuple[str, ...]
     balance_j, strongest_n, longest_m = lowest_balance(trace)
     permitted_j = -ALLOWANCE_J - (1 + case.delay) * strongest_n * longest_m
     restless = bool((_fast_n(trace, case) > np.max(calm_n, axis=0) + RESTLESS_N).any())
-    found = (
-        False,
+    return reasons_of(
         np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N * (1 + 1e-9),
         balance_j < permitted_j,
-        _swing_mps(trace, case) > SWING_MPS,
+        resting_swing(trace, case, LASTS_S) > SWING_MPS,
         restless,
     )
-    return tuple(reason for reason, holds in zip(REASONS, found, strict=True) if holds)
 
 
 def _fast_n(trace: Any, case: Case) -> Floats:
@@ -228,15 +225,6 @@ def _fast_n(trace: Any, case: Case) -> Floats:
     spans_s = ((SETTLES_S, MOVING_S), (MOVING_S + SETTLES_S, LASTS_S))
     rows = [np.searchsorted(trace.t_s, span_s) for span_s in spans_s]
     return np.array([fast_part(trace.sent_n, case.rate_hz, FAST_HZ, first, last, ONCE_S) for first, last in rows])
-
-
-def _swing_mps(trace: Any, case: Case) -> float:
-    """Return the least oscillation [m/s] over the last 0.4 s if it does not decay."""
-    rows = np.searchsorted(trace.t_s, np.linspace(LASTS_S - 0.4, LASTS_S, 5))
-    found = [
-        fast_part(trace.velocity_mps, case.rate_hz, SLOW_HZ, first, last) for first, last in itertools.pairwise(rows)
-    ]
-    return min(found) if found[-1] > TIRED * found[0] else 0.0
 
 
 def _with_drag(scene: Scene, drag_coefficient: float) -> Scene:

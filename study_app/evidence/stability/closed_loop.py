@@ -1,8 +1,7 @@
-"""The velocity that a device measures itself, compiled: the handle's, filtered with a lag, with noise and counts.
+"""A closed loop, compiled: the hand moves the handle, the servo's own tick answers, the motors act on the handle.
 
-A second plant besides ``haptics.kernels.plant``: an arm that holds the handle through the tissue of its fingers.
-
-::
+The handle is that of ``haptics.kernels.plant``, or of a second plant: an arm that holds it through the tissue of its
+fingers ::
 
     m_a dv_a/dt = K_a (r - x_a) + B_a (dr/dt - v_a) - f_t
     m_h dv_h/dt = F + f_t - b v_h - f_c v_h / sqrt(|v_h|² + v_s²),    f_t = K_t (x_a - x_h) + B_t (v_a - v_h)
@@ -12,18 +11,12 @@ tissue, 0 once the handle is let go; b and f_c the friction of the device, smoot
 five-parameter model of Speich, Shao & Goldfarb (2005, Mechatronics 15:1127), which adds a spring and a damper for the
 grip to the arm's mass, spring and damper. The arm is that of van Beek et al. (2015, Sci. Rep. 5:18004) or a heavier
 one; stiffness and damping of the grip rise with its force (Hasser & Cutkosky 2002) and lie in the range of 50 to
-1000 N/m and 2 to 30 N·s/m that is known of hands. [choice]
+1000 N/m and 2 to 30 N·s/m that is known of hands. [choice] It shares no code with the first plant: implicit midpoint
+rule (which conserves the energy of springs) in steps of at most 25 µs instead of backward Euler in steps of 50 µs,
+smooth friction instead of a proximal step, and its own queue of forces.
 
-It shares no code with the first plant: implicit midpoint rule (which conserves the energy of springs) in steps of
-at most 25 µs instead of backward Euler in steps of 50 µs, smooth friction instead of a proximal step, and its own queue
-of forces.
-
-A closed loop, compiled: the hand moves the handle, the servo's own tick answers, the motors act on the handle.
-
-The handle is that of ``haptics.kernels.plant``, or of the second plant, `arm`. The same motion can be played to the
-tick again without the force acting on anything. All sizes are at the hand.
-
-What belongs to a device's own delay acts after the force link of the scene.
+The same motion can be played to the tick again without the force acting on anything. All sizes are at the hand. What
+belongs to a device's own delay acts after the force link of the scene.
 """
 
 import math

@@ -11,7 +11,6 @@ of the case. Samples, encoders and delay are those of the Falcon. What is judged
 """
 
 import dataclasses
-import math
 import threading
 from typing import Any, Final
 
@@ -27,11 +26,12 @@ from study_app.evidence.stability.verdict import (
     ALLOWANCE_J,
     FAST_HZ,
     ONCE_S,
-    REASONS,
     RESTLESS_N,
     SWING_MPS,
     Verdict,
     acted,
+    not_finite,
+    reasons_of,
     swing,
     windows,
 )
@@ -94,7 +94,7 @@ def judge_driven(case: Case) -> Verdict:
     dynamics = falcon.dynamics
     trace = falcon_trace(case, falcon)
     if not (np.isfinite(trace.sent_n).all() and np.isfinite(trace.position_m).all()):
-        return Verdict(case, True, ("not finite",), math.nan, math.nan, math.nan, math.nan, math.nan, acted(trace))
+        return not_finite(case, trace, safe=True)
     others = scripted_traces(case, dynamics)
     balance_j, strongest_n, longest_m = lowest_balance(trace)
     permitted_j = -ALLOWANCE_J - (1 + DELAY) * strongest_n * longest_m
@@ -109,14 +109,12 @@ def judge_driven(case: Case) -> Verdict:
                 permitted_j = min(permitted_j, -BEYOND_SCRIPTED_J - given_j)
     swing_mps = swing(trace, case)
     fast_n, scripted_n = _restlessness(case, trace, others)
-    found = (
-        False,
+    reasons = reasons_of(
         np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N + MOTOR_STEP_N,
         lacks or balance_j < permitted_j,
         swing_mps > SWING_MPS,
         fast_n - scripted_n > RESTLESS_N,
     )
-    reasons = tuple(reason for reason, holds in zip(REASONS, found, strict=True) if holds)
     return Verdict(case, True, reasons, balance_j, permitted_j, swing_mps, fast_n, scripted_n, acted(trace))
 
 

@@ -90,6 +90,16 @@ class Verdict:
         return not self.reasons
 
 
+def not_finite(case: Case, trace: Any, *, safe: bool) -> Verdict:
+    """Return the verdict on a loop that blew up."""
+    return Verdict(case, safe, REASONS[:1], *(math.nan,) * 5, acted(trace))
+
+
+def reasons_of(*found: bool) -> tuple[str, ...]:
+    """Return the names of the reasons after the first, in their order, that were found."""
+    return tuple(reason for reason, holds in zip(REASONS[1:], found, strict=True) if holds)
+
+
 def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Verdict:
     """Run a case, with the safety layer or without, and say whether it is stable.
 
@@ -105,7 +115,7 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
         before.append((row, bench.copy()))
     trace = trace[: bench.run(trace, row, lasts_s(case))]
     if bench.loop.broken:
-        return Verdict(case, safe, ("not finite",), math.nan, math.nan, math.nan, math.nan, math.nan, acted(trace))
+        return not_finite(case, trace, safe=safe)
     balance_j, strongest_n, longest_m = lowest_balance(trace)
     linked = bool(case.force_delay_ms or case.force_jitter_ms or case.force_loss)
     permitted_j = -ALLOWANCE_J - (1 + max(case.delay, case.slows_to)) * strongest_n * longest_m
@@ -115,14 +125,12 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
         permitted_j = min(permitted_j, -MISJUDGED_ALLOWANCE_J)
     swing_mps = swing(trace, case)
     fast_n, played_n = _restlessness(case, trace, before, limits)
-    found = (
-        False,
+    reasons = reasons_of(
         safe and np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N * (1.0 + 1e-9),
         balance_j < permitted_j,
         swing_mps > (LATE_SWING_MPS if linked else SWING_MPS),
         fast_n - played_n > (max(RESTLESS_N, LATE_SHARE * played_n) if linked else RESTLESS_N),
     )
-    reasons = tuple(reason for reason, holds in zip(REASONS, found, strict=True) if holds)
     return Verdict(case, safe, reasons, balance_j, permitted_j, swing_mps, fast_n, played_n, acted(trace))
 
 
@@ -141,19 +149,22 @@ def windows(case: Case) -> Iterator[tuple[float, float]]:
 
 def swing(trace: Any, case: Case) -> float:
     """Return the least swing [m/s] over the last 0.4 s if it does not tire, or over a second of the motion before."""
+    moving = swing_between(trace, case, FAST_HZ, np.linspace(SETTLES_S, SETTLES_S + 1.0, 6))
+    return max(resting_swing(trace, case, lasts_s(case)), moving)
 
-    def swings(corner_hz: float, times_s: Any) -> float:
-        rows = np.searchsorted(trace.t_s, times_s)
-        found = [
-            fast_part(trace.velocity_mps, case.rate_hz, corner_hz, first, last)
-            for first, last in itertools.pairwise(rows)
-        ]
-        return min(found) if found[-1] > TIRED * found[0] else 0.0
 
-    return max(
-        swings(SLOW_HZ, np.linspace(lasts_s(case) - 0.4, lasts_s(case), 5)),
-        swings(FAST_HZ, np.linspace(SETTLES_S, SETTLES_S + 1.0, 6)),
-    )
+def resting_swing(trace: Any, case: Case, end_s: float) -> float:
+    """Return the least swing [m/s] over the 0.4 s before a time [s] if it does not tire."""
+    return swing_between(trace, case, SLOW_HZ, np.linspace(end_s - 0.4, end_s, 5))
+
+
+def swing_between(trace: Any, case: Case, corner_hz: float, times_s: Any) -> float:
+    """Return the least swing above a frequency [m/s] over the stretches between times [s]; 0 if it tires."""
+    rows = np.searchsorted(trace.t_s, times_s)
+    found = [
+        fast_part(trace.velocity_mps, case.rate_hz, corner_hz, first, last) for first, last in itertools.pairwise(rows)
+    ]
+    return min(found) if found[-1] > TIRED * found[0] else 0.0
 
 
 def _restlessness(

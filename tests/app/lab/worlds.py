@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from study_app.app.lab.controller import LabController
-from study_app.evidence.appraisal import Costs, EffectCost, Errors
-from study_app.evidence.appraisal_worker import Question
+from study_app.evidence.appraisal import Costs, EffectCost, Errors, Question
 from study_app.haptics.model.scene import Scene
 
 OPENS_MS = 120_000  # the first time it compiles

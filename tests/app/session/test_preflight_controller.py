@@ -16,8 +16,7 @@ from study_app.app.session import preflight_controller
 from study_app.app.session.live_session import LiveSession
 from study_app.app.session.preflight_controller import Appraisal, Preflight
 from study_app.errors import DeviceLost, DisplayError
-from study_app.evidence.appraisal import Costs, Errors
-from study_app.evidence.appraisal_worker import Question
+from study_app.evidence.appraisal import Costs, Errors, Question
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.clocks.grants import NO_THREAD

@@ -9,7 +9,7 @@ from study_app.errors import StudyError
 from study_app.evidence.cfd import fits, law_fit, stored_flows
 from study_app.evidence.cfd.solved_cases import HELD_OUT, TRAINING
 from study_app.evidence.cfd.stored_flows import MOTION, Table
-from study_app.evidence.unsteady_law import CONSTANTS, Constants, unsteady_n
+from study_app.evidence.reference_model import CONSTANTS, Constants, unsteady_n
 from study_app.haptics.kernels.effects import unsteady_drag
 from study_app.haptics.model.scene import Liquid, Scene
 from tests.haptics.scenes import COMPILED

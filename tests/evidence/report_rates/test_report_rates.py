@@ -9,13 +9,16 @@ from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptio
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer
 from study_app.analysis.planning.simulated_studies import Plan, plan
-from study_app.evidence.report_rates import known_effects as studies
-from study_app.evidence.report_rates.known_effects import EXTENTS, GENERATORS, Generator, answers
+from study_app.evidence.report_rates import simulation as studies
 from study_app.evidence.report_rates.simulation import (
     CLAIMED,
+    EXTENTS,
+    GENERATORS,
     LOST,
     PRINTED,
     Cell,
+    Generator,
+    answers,
     count_single,
     count_studies,
     evidence,

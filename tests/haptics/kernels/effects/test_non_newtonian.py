@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study_app.evidence.non_newtonian_law import non_newtonian_n
+from study_app.evidence.reference_model import non_newtonian_n
 from study_app.haptics.model.effects.non_newtonian import steady_n
 from study_app.haptics.model.laws import rheology
 from study_app.haptics.model.laws.rheology import Carreau, HerschelBulkley, Maxwell, ShearThickening

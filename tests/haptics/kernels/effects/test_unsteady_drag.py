@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from study_app.evidence.cfd import fits, stored_flows
+from study_app.evidence.reference_model import unsteady_n
 from study_app.evidence.reference_solutions import oscillation, start
 from study_app.evidence.stability.stability_cases import parse
 from study_app.evidence.stability.verdict import judge
-from study_app.evidence.unsteady_law import unsteady_n
 from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS_RPS
 from study_app.haptics.model.laws.drag_laws import finite_reynolds
 from study_app.haptics.model.motion import Motion
