@@ -8,10 +8,9 @@ from study_app import errors
 from study_app.app.designer.play.playable import NotPlayableError
 from study_app.authoring.edited_study import Refused
 from study_app.authoring.versions.contents import ChangedOutsideError
-from study_app.devices.failure_table import DeviceFailure, DeviceFailureNotFound
+from study_app.devices.doctor import DeviceFailure, DeviceFailureNotFound
 from study_app.devices.falcon.boot import BootFailure
-from study_app.devices.falcon.failures import FalconFailure, FalconLost, FalconNotFound, ProgramMissing, UsbFailure
-from study_app.devices.falcon.homing import NotHomed
+from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure
 from study_app.errors import Problem, ProtocolError, StudyError
 from study_app.workers.server import Stopped
 
@@ -27,10 +26,8 @@ EXAMPLES = [
         if kind is not ProtocolError
     ),
     PROTOCOL,
-    *(kind(kind.__name__, USB.facts) for kind in (FalconFailure, ProgramMissing)),
     *(kind("busy", "opening it", -6) for kind in (UsbFailure, FalconNotFound, FalconLost)),
-    BootFailure("echo", 2, "nothing came back", silent=True),
-    NotHomed("limp"),
+    BootFailure("echo", 2, "nothing came back"),
     *(kind("silent", "it stopped answering") for kind in (DeviceFailure, DeviceFailureNotFound)),
 ]
 

@@ -24,8 +24,8 @@ from study_app.app.failures import ended_from_outside
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.session_windows import connect_windows, make_cockpit, make_participant_window, show_windows
 from study_app.app.session.timing import collecting_here
+from study_app.devices.hand import hand_of
 from study_app.devices.rig import open_rig, study_settings
-from study_app.devices.simulated.hand_commands import hand_of
 from study_app.errors import SessionError, StudyError
 from study_app.evidence.computer import LoadName, busy_cores
 from study_app.evidence.computer import machine as machine_here

@@ -15,7 +15,7 @@ import click
 
 from study_app import __version__
 from study_app.cli import data, model, power, study
-from study_app.cli.devices import devices, emulate_falcon, outlets
+from study_app.cli.devices import devices, outlets
 from study_app.cli.evidence import accuracy, stability, timing, validation
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands
 from study_app.errors import StudyError, naming_the_extra
@@ -47,7 +47,7 @@ for module in (study, data, power, model, accuracy, stability, timing, validatio
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)
-for command in (devices, emulate_falcon, outlets):  # what else their module holds belongs to the group devices
+for command in (devices, outlets):  # what else their module holds belongs to the group devices
     commands.add_command(command)
 
 

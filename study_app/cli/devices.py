@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import queue
-import signal
 import sys
 import threading
 from collections.abc import Callable
@@ -12,7 +11,6 @@ from contextlib import suppress
 from datetime import date
 from math import degrees
 from pathlib import Path
-from random import Random
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -24,10 +22,9 @@ from study_app.errors import DeviceError
 if TYPE_CHECKING:
     from study_app.devices.bench.procedure import Ask as AskOperator
     from study_app.devices.bench.procedure import Found
+    from study_app.devices.emulators.falcon_emulator import Emulator
+    from study_app.devices.falcon.calibration import Ask, Calibration, Notes
     from study_app.devices.falcon.device import FalconDevice
-    from study_app.devices.falcon.doctor.weighing import Ask, Notes
-    from study_app.devices.falcon.emulator.emulator import Emulator
-    from study_app.devices.falcon.mechanics.calibration import Calibration
 
 _WIDTH = 100
 _PREPARING = "Preparing …"
@@ -68,13 +65,13 @@ def list_devices() -> None:
 def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: dict[str, str | Path]) -> None:
     """Examine a device: find, open and run it without force; report each fault with its cause and remedy.
 
-    NAME is a device that can be examined: falcon, falcon:SERIAL, falcon-emulated, falcon-socket:PATH, inverse3,
+    NAME is a device that can be examined: falcon, falcon:SERIAL, falcon-emulated, inverse3,
     inverse3:HOST:PORT, inverse3-emulated, force-dimension, force-dimension:SERIAL or force-dimension-emulated. Exit
     code 3 if something is wrong. The zip file contains this report, versions, settings, log and last error, but no
     participant IDs, answers or liquids.
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
-    from study_app.devices.doctor_report import lines
+    from study_app.devices.doctor import lines
     from study_app.devices.registry import check_options, doctor_of
 
     check_options(name, device_options)
@@ -104,17 +101,16 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     if scale == (grams is not None):
         raise click.UsageError("calibrate needs either --grams G (a weight to hang on the grip) or --scale")
     click.echo(_PREPARING)
-    from study_app.devices.falcon.doctor import weighing
-    from study_app.devices.falcon.mechanics import calibration
-    from study_app.devices.falcon.mechanics.geometry import DEFAULT_GEOMETRY, geometry_named
+    from study_app.devices.falcon import calibration
+    from study_app.devices.falcon.mechanics import DEFAULT_GEOMETRY, geometry_named
 
     measures = geometry_named(geometry or DEFAULT_GEOMETRY)
     device, emulator = _falcon(name, firmware, grams)
     with device:
-        grip = weighing.Grip(device, virtual=emulator is not None)
-        weight_n = (grams or 0.0) / 1000 * weighing.GRAVITY_MPS2
+        grip = calibration.Grip(device, virtual=emulator is not None)
+        weight_n = (grams or 0.0) / 1000 * calibration.GRAVITY_MPS2
         ask = Terminal(sys.stdin.fileno()).ask if emulator is None else _ask_emulator(emulator, weight_n)
-        notes = weighing.pull(grip, ask) if grams is None else weighing.hang(grip, weight_n, ask)
+        notes = calibration.pull(grip, ask) if grams is None else calibration.hang(grip, weight_n, ask)
         serial = device.describe()["serial"]
     found = calibration.fit(measures, notes.counts, notes.forces_n, notes.units)
     for line in _calibrated(found, notes):
@@ -123,10 +119,7 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
         unexplained = f"More than {calibration.MOST_RESIDUAL_N} N is unexplained"
         click.echo(f"{unexplained}, so nothing was saved. Repeat the calibration.")
         end_if(True)
-    if name.startswith("falcon-socket"):
-        click.echo("A device at a socket is not calibrated permanently: nothing was saved.")
-    else:
-        click.echo(f"Saved in {calibration.save(serial or '', found)}.")
+    click.echo(f"Saved in {calibration.save(serial or '', found)}.")
 
 
 @devices.command(cls=TakesDeviceOptions)
@@ -200,16 +193,19 @@ def _keep_bench(found: Found, folder: Path, *, simulated: bool) -> None:
 
 def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:
     """Return the Falcon, not yet open, and the emulator behind it, if there is one."""
+    from study_app.devices.descriptor import OpenRequest
+    from study_app.devices.driver import framed_device
+    from study_app.devices.emulators.falcon import EmulatedFalcon
+    from study_app.devices.emulators.falcon_emulator import Emulator
     from study_app.devices.falcon.device import FalconDevice
-    from study_app.devices.falcon.emulated import EmulatedFalcon
-    from study_app.devices.falcon.emulator.emulator import Emulator
-    from study_app.devices.registry import descriptor_of
 
-    kind = descriptor_of(name).name
-    if not kind.startswith("falcon"):
+    options = {} if firmware is None else {"firmware": firmware}
+    request = OpenRequest(argument=name.partition(":")[2], options=options, progress=click.echo)
+    device = framed_device(name, request)
+    if not isinstance(device, FalconDevice):
         raise DeviceError(f"'{name}' has no motors to calibrate: only a Falcon has motors")
-    if kind != "falcon-emulated":
-        return FalconDevice(name, firmware=firmware, progress=click.echo), None
+    if not isinstance(device, EmulatedFalcon):
+        return device, None
     if grams is None:
         raise DeviceError("an emulated Falcon cannot be pulled with a scale: use a weight with --grams")
     # A serial number of its own: no rehearsal shall find this calibration.
@@ -218,7 +214,7 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
 
 
 def _calibrated(found: Calibration, notes: Notes) -> list[str]:
-    from study_app.devices.falcon.mechanics.calibration import UNCALIBRATED_UNITS_PER_NM, left_over
+    from study_app.devices.falcon.calibration import UNCALIBRATED_UNITS_PER_NM, left_over
 
     lines = ["", "rest  load [N]  unexplained x, y, z [N]"]
     for number, (load, left) in enumerate(
@@ -286,64 +282,6 @@ def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
         return lambda: ""
 
     return ask
-
-
-@click.command("emulate-falcon")
-@click.option("--socket", required=True, type=click.Path(path_type=Path), metavar="PATH", help="Unix socket to serve.")
-@click.option("--fault", "faults", multiple=True, metavar="NAME", help="frozen, drop=0.01 …; repeatable.")
-@click.option("--running", is_flag=True, help="Start with the firmware already loaded.")
-@click.option("--geometry", metavar="NAME", help="libnifalcon (default), zm-redux or martin-hillier.")
-@click.option("--serial", default="EMULATED", show_default=True, metavar="TEXT", help="Serial number of the bridge.")
-@click.option("--seed", default=0, show_default=True, metavar="N", help="Seed of tremor and faults.")
-def emulate_falcon(
-    socket: Path, faults: tuple[str, ...], running: bool, geometry: str | None, serial: str, seed: int
-) -> None:
-    """Serve an emulated Falcon to other programs, in real time, until Ctrl-C.
-
-    It emulates the USB bridge, from the boot loader on, with the frames that
-    study_app/devices/falcon/transport/socket_frames.py describes; --device falcon-socket:PATH connects our own driver.
-    Lights, homing and torques are printed as they change, on a terminal only.
-    """
-    from study_app.devices.falcon.emulator.emulator import Emulator
-    from study_app.devices.falcon.emulator.socket_server import EmulatorServer
-    from study_app.devices.falcon.mechanics.geometry import DEFAULT_GEOMETRY
-
-    random = Random(seed)  # noqa: S311 - tremor and faults keep no secrets
-    emulator = Emulator(random, geometry=geometry or DEFAULT_GEOMETRY, running=running, serial=serial)
-    for fault in faults:
-        emulator.take(fault)
-    server = EmulatorServer(emulator, socket)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: server.stop())
-    click.echo(f"An emulated Falcon at {socket}; press Ctrl-C to end it.")
-    server.serve(_state_reporter(emulator) if sys.stdout.isatty() else None)
-
-
-def _state_reporter(emulator: Emulator) -> Callable[[], None]:
-    printed = ""
-
-    def report_state() -> None:
-        nonlocal printed
-        state = state_of(emulator)
-        if state != printed:
-            printed = state
-            click.echo(state)
-
-    return report_state
-
-
-def state_of(emulator: Emulator) -> str:
-    """Return lights, homing and torques in a line."""
-    from study_app.devices.falcon.wire import constants
-
-    names = {constants.FLAG_RED: "red", constants.FLAG_GREEN: "green", constants.FLAG_BLUE: "blue"}
-    lights = ", ".join(name for flag, name in names.items() if emulator.lights & flag) or "none"
-    torques = ", ".join(str(torque) for torque in emulator.torques)
-    if not emulator.powered:
-        return "no power"
-    if not emulator.running:
-        return f"no program yet, {emulator.loaded} bytes of it"
-    return f"lights {lights} | arms homed {emulator.homed.bit_count()} of 3 | torques {torques}"
 
 
 @click.command()

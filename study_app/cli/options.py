@@ -22,8 +22,9 @@ GROUPS: Final = {
     "Data": "export plot report unblind exclude include withdraw merge verify rebuild reproduce replay",
     "Model": "scene simulate identify estimate figures",
     "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds",
-    "Devices": "devices outlets emulate-falcon",
+    "Devices": "devices outlets",
 }
+REMOVED: Final = {"emulate-falcon": "--device falcon-emulated runs the Falcon's driver on an emulated Falcon"}
 LONGEST: Final = 150
 """Characters of a command's first sentence in ``--help``, which wraps it."""
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -38,6 +39,12 @@ EXIT_CANCELLED: Final = 130
 
 class GroupedCommands(click.Group):
     """Commands that ``--help`` lists under the headings of `GROUPS`."""
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """Return a command by its name."""
+        if args and args[0] in REMOVED:
+            ctx.fail(f"'{args[0]}' is no longer a command: {REMOVED[args[0]]}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands by group."""

@@ -1,4 +1,6 @@
-"""The descriptor of a device, as a value.
+"""How devices may be named, and the name of the default device.
+
+The descriptor of a device, as a value.
 
 Loads neither compiler nor driver; only `DeviceDescriptor.open`, ``probe`` and ``doctor`` do.
 """
@@ -8,17 +10,19 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from pkgutil import resolve_name
 from random import Random
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, TypeVar, get_args
 
-from study_app.devices.names import NAME_PATTERN
+from study_app.devices import NAME_PATTERN
 from study_app.errors import DeviceError
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
-    from study_app.devices.doctor_report import Finding, Report
+    from study_app.devices.doctor import Finding, Report
+
 
 Kind: TypeAlias = Literal["felt", "seen", "simulated"]
 """With force; visual only, without force; not used by participants."""
@@ -78,7 +82,8 @@ class OpenRequest:
     force_limit_n : the greatest force that may be commanded [N]
     random : random numbers for the tremor of a simulated device
     progress : receives instructions while it is opened, one line at a time
-    cancelled : returns whether to stop opening it options : values of its options, by name
+    cancelled : returns whether to stop opening it
+    options : values of its options, by name
     """
 
     argument: str = ""
@@ -108,20 +113,6 @@ class Doctor:
     examine: Callable[..., Report]
 
 
-def doctor_at(findings: str, examine: str) -> Doctor:
-    """Return the doctor of two functions, each ``package.module:name``: a module is loaded by the call."""
-
-    def load_findings() -> tuple[Finding, ...]:
-        found: tuple[Finding, ...] = resolve_name(findings)()
-        return found
-
-    def load_and_examine(name: str, **request: Any) -> Report:
-        report: Report = resolve_name(examine)(name, **request)
-        return report
-
-    return Doctor(findings=load_findings, examine=load_and_examine)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceDescriptor:
     """The properties of a device that the program uses outside its driver.
@@ -129,14 +120,20 @@ class DeviceDescriptor:
     Attributes
     ----------
     name : for ``--device``, receipts and folders: small letters, digits and hyphens
-    title : displayed name icon : of the theme kind : with force, visual only, or not used by participants
-    degrees_of_freedom : of the motion it measures open : returns the device, open probe : returns all connections to
-    it, without opening it
-    argument : permitted text after its name and a colon, such as "SERIAL"; "" if none argument_required : its name
-    alone does not open it moves_by_itself : the program moves its handle by a simulated hand; rehearsals may use it
-    pointer : the window's pointer moves it; it then has ``point_to`` and ``press`` motion_shows_force : its recorded
-    position shows the force, so that motion is hidden while a study is blinded options : its options when it is opened
+    title : displayed name
+    icon : of the theme
+    kind : with force, visual only, or not used by participants
+    degrees_of_freedom : of the motion it measures
+    open : returns the device, open
+    probe : returns all connections to it, without opening it
+    argument : permitted text after its name and a colon, such as "SERIAL"; "" if none
+    argument_required : its name alone does not open it
+    moves_by_itself : the program moves its handle by a simulated hand; rehearsals may use it
+    pointer : the window's pointer moves it; it then has ``point_to`` and ``press``
+    motion_shows_force : its recorded position shows the force, so that motion is hidden while a study is blinded
+    options : its options when it is opened
     doctor : its diagnosis; None without one
+    driver : ``module:Class`` of its `driver.FramedDevice`; "" if its driver is another one
     """
 
     name: str
@@ -153,6 +150,7 @@ class DeviceDescriptor:
     motion_shows_force: bool = True
     options: tuple[DeviceOption, ...] = ()
     doctor: Doctor | None = None
+    driver: str = ""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(NAME_PATTERN, self.name):
@@ -192,3 +190,38 @@ def opened(device: Opened) -> Opened:
     """Open a device and return it."""
     device.open()
     return device
+
+
+def later(function: str) -> Callable[..., Any]:
+    """Return a function that loads ``module:name`` when it is called."""
+
+    def call(*values: Any, **request: Any) -> Any:
+        return resolve_name(function)(*values, **request)
+
+    return call
+
+
+def _open_by_driver(driver: str, request: OpenRequest) -> Any:
+    """Return the device of a ``driver.FramedDevice`` class, ``module:Class``, open."""
+    return opened(resolve_name(driver).of(request))
+
+
+def framed(name: str, title: str, driver: str, failures: str, **more: Any) -> DeviceDescriptor:
+    """Return the descriptor of a device whose driver is a ``driver.FramedDevice``.
+
+    Parameters
+    ----------
+    driver : ``module:Class`` of it
+    failures : ``module:name`` of its `doctor.FailureTable`, which loads no compiler
+    more : further fields of the descriptor
+    """
+    return DeviceDescriptor(
+        name=name,
+        title=title,
+        degrees_of_freedom=3,
+        open=partial(_open_by_driver, driver),
+        motion_shows_force=False,
+        driver=driver,
+        doctor=Doctor(findings=later(f"{failures}.findings"), examine=later("study_app.devices.driver:examine")),
+        **more,
+    )

@@ -1,27 +1,27 @@
-"""The devices by name: found in the folder ``descriptors`` and at entry points, described, probed, and opened.
+"""The devices by name: the program's own and those at entry points, described, probed, and opened.
 
 Naming and probing the devices loads no compiler, and drivers only as far as probing needs them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, Final
 
-from study_app.devices import descriptors as folder
+from study_app.devices import DEFAULT_DEVICE
 from study_app.devices.descriptor import NOT_AVAILABLE, Backend, DeviceDescriptor, Doctor, OpenRequest
-from study_app.devices.names import DEFAULT_DEVICE
+from study_app.devices.descriptors import DEVICES
 from study_app.errors import DeviceError, DeviceNotFound
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
 
 ENTRY_POINTS: Final = "liquid_study.devices"
+REMOVED: Final = {"falcon-socket": "falcon-emulated, or falcon"}
+"""Devices of earlier versions, and what to use in their place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Discovery:
 @cache
 def discover() -> Discovery:
     """Import every descriptor, once."""
-    found = {device.name: device for device in _shipped()}
+    found = {device.name: device for device in DEVICES}
     broken = []
     for point in entry_points(group=ENTRY_POINTS):
         try:
@@ -56,11 +56,6 @@ def discover() -> Discovery:
             broken.append(BrokenEntryPoint(point.name, package, reason))
     devices = sorted(found.values(), key=lambda device: (device.name != DEFAULT_DEVICE, device.simulated))
     return Discovery(tuple(devices), tuple(broken))
-
-
-def _shipped() -> Iterator[DeviceDescriptor]:
-    for module in iter_modules(folder.__path__):
-        yield from import_module(f"{folder.__name__}.{module.name}").DEVICES
 
 
 def _load(point: EntryPoint, known: Container[str]) -> DeviceDescriptor:
@@ -88,6 +83,8 @@ def descriptor_of(name: str) -> DeviceDescriptor:
     """
     kind, _, argument = name.partition(":")
     found = {device.name: device for device in discover().devices}.get(kind)
+    if found is None and kind in REMOVED:
+        raise DeviceNotFound(f"device '{name}' was removed: choose {REMOVED[kind]}")
     if found is None or (argument and not found.argument):
         known = ", ".join(device.usage for device in discover().devices)
         raise DeviceNotFound(f"device '{name}' is not known; choose one of: {known}")

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from study_app.devices.hand import hand_of
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, RigSettings, open_rig
-from study_app.devices.simulated.hand_commands import hand_of
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slew_limit_n

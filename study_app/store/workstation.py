@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from study_app.devices.names import DEFAULT_DEVICE, NAME_PATTERN
+from study_app.devices import DEFAULT_DEVICE, NAME_PATTERN
 from study_app.errors import StoreError
 from study_app.outlets.session_outlets import SampleChoice
 from study_app.protocol.source.problems import faults_of

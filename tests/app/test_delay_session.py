@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
 from study_app.app import delay_session as held
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo

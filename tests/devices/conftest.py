@@ -1,6 +1,7 @@
 """Settings of their own, the built template, and the stand-in for Force Dimension's library."""
 
 import importlib.util
+import os
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,22 @@ import pytest
 from study_app.devices.registry import discover
 from tests.devices.force_dimension.standin import COMPILER, StandIn, build
 from tests.devices.packages import TEMPLATE, install_metadata
+
+
+@pytest.fixture
+def falcon_socket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Install the Falcon behind a socket as another package's device, for this and for other processes."""
+    site = tmp_path / "packages"
+    site.mkdir()
+    points = {"falcon-socket": "tests.devices.falcon.served.device:FALCON_SOCKET"}
+    install_metadata(site, "liquid_study_socket", "1.0", points)
+    monkeypatch.syspath_prepend(site)
+    monkeypatch.setenv(
+        "PYTHONPATH", os.pathsep.join((str(site), str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")))
+    )
+    discover.cache_clear()
+    yield
+    discover.cache_clear()
 
 
 @pytest.fixture(autouse=True)

@@ -7,11 +7,11 @@ import pytest
 
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY
 from study_app.devices.falcon.failures import UsbFailure
-from study_app.devices.falcon.probe import probe as probe_falcon
-from study_app.devices.falcon.probe import probe_ftdi
+from study_app.devices.falcon.transport import probe as probe_falcon
+from study_app.devices.falcon.transport import probe_ftdi
 from study_app.devices.registry import backends, list_devices
+from study_app.devices.spacemouse.hid import MODELS
 from study_app.devices.spacemouse.hid import probe as probe_spacemouse
-from study_app.devices.spacemouse.reports import MODELS
 
 
 def hid(*models):
@@ -20,7 +20,7 @@ def hid(*models):
 
 
 def bus(*emulators):
-    from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
+    from study_app.devices.emulators.falcon import EmulatedBackend
 
     return EmulatedBackend(*emulators)
 
@@ -36,7 +36,7 @@ pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="the emulated b
 
 def test_every_device_that_can_be_opened_is_listed():
     named = {name.partition(":")[0] for name, _ in by_name()}
-    assert named == {*list_devices(), "falcon-socket"}
+    assert named == set(list_devices())
 
 
 def test_without_hardware_each_says_what_is_missing():
@@ -48,7 +48,7 @@ def test_without_hardware_each_says_what_is_missing():
 
 
 def test_what_is_connected_is_named():
-    from study_app.devices.falcon.emulator.emulator import Emulator
+    from study_app.devices.emulators.falcon_emulator import Emulator
 
     listed = by_name(usb=bus(Emulator(serial="FT1"), Emulator(serial="FT2")), spacemice=hid(MODELS[1], MODELS[1]))
     assert listed["falcon", "libusb"].state == "connected: FT1, FT2"
@@ -60,7 +60,7 @@ def test_what_is_connected_is_named():
     ("platform", "words"), [("linux", "this account"), ("win32", "driver"), ("darwin", "FTDI driver")]
 )
 def test_one_that_does_not_tell_its_number_says_why_that_may_be(platform, words):
-    from study_app.devices.falcon.emulator.emulator import Emulator
+    from study_app.devices.emulators.falcon_emulator import Emulator
 
     emulator = Emulator()
     emulator.faults.on("access_denied")
@@ -77,7 +77,7 @@ def test_ftdis_driver_is_for_windows(monkeypatch):
     def missing():
         raise UsbFailure("no-ftd2xx", "loading FTDI's driver library")
 
-    monkeypatch.setattr("study_app.devices.falcon.transport.ftdi.load_d2xx", missing)
+    monkeypatch.setattr("study_app.devices.falcon.transport.load_d2xx", missing)
     assert "install FTDI's D2XX driver" in by_name(platform="win32")["falcon", "ftd2xx"].why
 
 

@@ -11,9 +11,9 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.devices.bench import measurements, procedure
-from study_app.devices.bench.kept import dynamics_of
 from study_app.devices.bench.measurements import gain_of
 from study_app.devices.bench.procedure import as_json, as_markdown, kept
+from study_app.devices.driver import dynamics_of
 from study_app.devices.registry import descriptor_of, open_device
 from study_app.errors import DeviceError, DeviceLost
 from study_app.haptics.model.device_dynamics import Dynamics

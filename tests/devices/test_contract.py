@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.devices import call_gate
-from study_app.devices.failure_table import DeviceFailure
-from study_app.devices.force_dimension.failures import FAILURES as FORCE_DIMENSION
-from study_app.devices.force_dimension.failures import OPTION
-from study_app.devices.inverse3.failures import FAILURES as INVERSE3
+from study_app.devices import driver
+from study_app.devices.doctor import DeviceFailure
+from study_app.devices.falcon.failures import FAILURES as FALCON
+from study_app.devices.force_dimension.library import FAILURES as FORCE_DIMENSION
+from study_app.devices.force_dimension.library import OPTION
+from study_app.devices.inverse3.service import FAILURES as INVERSE3
 from study_app.devices.registry import descriptor_of, doctor_of, list_devices, open_device
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound, ServoFault
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
@@ -203,11 +204,7 @@ STREAM = [
 
 def words_of(made: Callable[..., Subject], mode: str) -> tuple[str, str]:
     """Return cause and cure of a mode of failure."""
-    from study_app.devices.falcon.failures import BY_ID
-
-    if made is falcon:
-        return BY_ID[mode].cause, BY_ID[mode].cure(sys.platform)
-    known = (INVERSE3 if made is inverse3 else FORCE_DIMENSION).mode(mode)
+    known = {falcon: FALCON, inverse3: INVERSE3}.get(made, FORCE_DIMENSION).mode(mode)
     return known.symptom, known.cure
 
 
@@ -249,8 +246,8 @@ def test_a_fault_in_a_stroke_ends_in_its_message_zero_force_and_silence(
 def refused(made: Callable[..., Subject], fault: str, request: pytest.FixtureRequest) -> DeviceError:
     """Open a device with a fault; return how it is refused, without any force and with nothing left open."""
     if made is inverse3:
-        from study_app.devices.inverse3.doctor import EmulatedInverse3
-        from study_app.devices.inverse3.emulator.service import Service
+        from study_app.devices.emulators.inverse3 import EmulatedInverse3
+        from study_app.devices.emulators.inverse3_service import Service
 
         service = Service()
         service.take(fault)
@@ -307,8 +304,8 @@ def test_a_fault_of_opening_is_refused_with_cause_and_cure_and_without_force(
 
 
 def test_the_tables_of_faults_are_complete() -> None:
-    from study_app.devices.force_dimension.emulated import FAULTS as EMULATED
-    from study_app.devices.inverse3.emulator.documents import FAULTS as SERVICE
+    from study_app.devices.emulators.force_dimension import FAULTS as EMULATED
+    from study_app.devices.emulators.inverse3_service import FAULTS as SERVICE
     from tests.devices.force_dimension.standin import FAULTS as STANDIN
 
     tried = {made: {fault for one, fault, _ in (*STREAM, *OPENING) if one is made} for made in MOVING}
@@ -319,10 +316,10 @@ def test_the_tables_of_faults_are_complete() -> None:
 
 
 def _hang_falcon(device: Any, until_released: Callable[[], None]) -> Any:
-    from study_app.devices.falcon.wire.constants import ENDPOINT_IN, ERROR_TIMEOUT
+    from study_app.devices.falcon.constants import ENDPOINT_IN, ERROR_TIMEOUT
     from tests.devices.falcon.support.scripted_bridge import BULK_CALL
 
-    bridge = BULK_CALL(int(device.falcon.transfer))
+    bridge = BULK_CALL(int(device.exchange.transfer))
 
     def transfer(handle: int, endpoint: int, *rest: int) -> int:
         if endpoint != ENDPOINT_IN:
@@ -331,7 +328,7 @@ def _hang_falcon(device: Any, until_released: Callable[[], None]) -> Any:
         return int(ERROR_TIMEOUT)
 
     hanging = BULK_CALL(transfer)
-    device.falcon.transfer = ctypes.cast(hanging, ctypes.c_void_p).value
+    device.exchange.transfer = ctypes.cast(hanging, ctypes.c_void_p).value
     return hanging
 
 
@@ -368,7 +365,7 @@ def _hang_force_dimension(device: Any, until_released: Callable[[], None]) -> An
 def test_a_call_that_outlasts_closing_ends_the_force_when_it_returns(
     subject: Subject, hang: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(call_gate, "LEAVE_S", 0.05)
+    monkeypatch.setattr(driver, "LEAVE_S", 0.05)
     ticks = subject.push()
     entered, release = threading.Event(), threading.Event()
 
@@ -408,10 +405,13 @@ while True:
 
 
 @contextmanager
-def _served_falcon(tmp_path: Path, _request: Any) -> Iterator[tuple[str, dict[str, str], Callable[[], Any]]]:
-    from study_app.devices.falcon.emulator.emulator import Emulator
-    from study_app.devices.falcon.emulator.socket_server import EmulatorServer
+def _served_falcon(
+    tmp_path: Path, request: pytest.FixtureRequest
+) -> Iterator[tuple[str, dict[str, str], Callable[[], Any]]]:
+    from study_app.devices.emulators.falcon_emulator import Emulator
+    from tests.devices.falcon.served.server import EmulatorServer
 
+    request.getfixturevalue("falcon_socket")
     with EmulatorServer(Emulator(running=True), tmp_path / "falcon") as server:
         yield f"falcon-socket:{server.path}", {}, lambda: server.emulator.force_n
         assert server.emulator.homed == 0b111
@@ -419,8 +419,8 @@ def _served_falcon(tmp_path: Path, _request: Any) -> Iterator[tuple[str, dict[st
 
 @contextmanager
 def _served_inverse3(_tmp_path: Path, _request: Any) -> Iterator[tuple[str, dict[str, str], Callable[[], Any]]]:
-    from study_app.devices.inverse3.emulator.server import ServiceServer
-    from study_app.devices.inverse3.emulator.service import Service
+    from study_app.devices.emulators.inverse3_service import Service
+    from tests.devices.inverse3.server import ServiceServer
 
     service = Service(tremor_m=0.0)
     with ServiceServer(service) as server:
@@ -462,7 +462,6 @@ def test_a_program_that_is_killed_while_it_pushes_leaves_no_force(
         ("falcon", ["firmware"], True, False, False, None),
         ("falcon:FT1", ["firmware"], True, False, False, None),
         ("falcon-emulated", ["firmware"], True, True, True, None),
-        ("falcon-socket:/x", ["firmware"], True, False, True, None),
         ("inverse3", [], True, False, False, False),
         ("inverse3:lab:10001:049D", [], True, False, False, False),
         ("inverse3-emulated", [], True, True, True, False),

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 DESCRIPTOR = """
     from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, DeviceOption, Doctor, opened
-    from study_app.devices.doctor_report import Finding, Report
+    from study_app.devices.doctor import Finding, Report
 
 
     def open_toy(request):
@@ -57,7 +57,7 @@ DESCRIPTOR = """
     )
 """
 DRIVER = """
-    from study_app.devices.simulated.simulated_device import SimulatedDevice
+    from study_app.devices.simulated import SimulatedDevice
     from study_app.haptics.kernels.plant import new_handle
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices.simulated.simulated_device import MouseDevice
+from study_app.devices.simulated import MouseDevice
 from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.haptics.runtime.clocks.clock import VirtualClock

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices.scripted import QUANTUM_M, TREMOR_M, ScriptedDevice
-from study_app.devices.simulated.hand import wave
+from study_app.devices.hand import wave
+from study_app.devices.simulated import QUANTUM_M, TREMOR_M, ScriptedDevice
 from study_app.errors import DeviceError
 from tests.devices.subjects import Ticks
 

@@ -12,8 +12,8 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
-from study_app.devices import scripted
-from study_app.devices.simulated.hand_commands import HandOrders
+from study_app.devices import simulated as scripted
+from study_app.devices.hand import HandOrders
 from study_app.errors import SessionError
 from study_app.haptics.model.layout import LIMITER_GLITCH, STATUS_OK
 from study_app.haptics.model.slope_limits import slew_limit_n
@@ -231,8 +231,8 @@ def felt(device: Any, scene: Any, lasting_s: float, given_n: list[Any] | None = 
 
 
 def emulated_falcon(**options: Any) -> Any:
-    from study_app.devices.falcon.emulated import EmulatedFalcon
-    from study_app.devices.falcon.emulator.emulator import Emulator
+    from study_app.devices.emulators.falcon import EmulatedFalcon
+    from study_app.devices.emulators.falcon_emulator import Emulator
 
     return EmulatedFalcon(emulator=Emulator(running=True, workspace_m=HALF_M, **options))
 

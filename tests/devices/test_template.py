@@ -33,6 +33,7 @@ OFFSETS = """
 int main(void) {{
     printf("{{\\"reading\\": {{"); {reading}
     printf("}}, \\"command\\": {{"); {command}
+    printf("}}, \\"exchange\\": {{"); {exchange}
     printf("}}, \\"sizes\\": [%zu, %zu]", sizeof(liquid_study_reading), sizeof(liquid_study_command));
     printf(", \\"constants\\": {{");
     {constants}
@@ -57,7 +58,12 @@ def test_header_and_numpy_records_have_the_same_offsets_sizes_and_constants(tmp_
         "BUTTON_STOP": layout.BUTTON_STOP,
         **{name: value for name, value in vars(layout).items() if name.startswith("MEASURED_")},
     }
-    records = {"reading": layout.READING, "command": layout.COMMAND}
+    from study_app.devices import driver
+
+    names = {"RUNS", "RELEASED", "FINISHED"}
+    constants |= {"LOST": driver.FIRST_CAUSE, **{name: getattr(driver, name) for name in sorted(names)}}
+    exchange = np.dtype(driver.COMMON, align=True)
+    records = {"reading": layout.READING, "command": layout.COMMAND, "exchange": exchange}
     text = OFFSETS.format(
         **{name: printed(dtype.names, f"liquid_study_{name}") for name, dtype in records.items()},
         constants=' printf(", "); '.join(f'printf("\\"{name}\\": %d", LIQUID_STUDY_{name});' for name in constants),
@@ -75,6 +81,11 @@ def test_header_and_numpy_records_have_the_same_offsets_sizes_and_constants(tmp_
         }
     assert found["sizes"] == [layout.READING.itemsize, layout.COMMAND.itemsize]
     assert found["constants"] == constants
+
+
+def test_a_device_takes_few_lines_of_python_beside_its_c_functions() -> None:
+    modules = (TEMPLATE / SOURCES).glob("*.py")
+    assert sum(len(module.read_text().splitlines()) for module in modules) <= 150
 
 
 def maker_force_n(loaded: ctypes.CDLL) -> list[float]:

@@ -1,8 +1,7 @@
-"""What each device says of itself and answers tick by tick, what is found by the facts of a Falcon, and descriptors."""
+"""What each device says of itself and answers tick by tick, what can go wrong with a Falcon, and descriptors."""
 
 import pickle
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -10,17 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.devices.doctor_report import Report, lines
-from study_app.devices.falcon.doctor.failure_report import findings_of
-from study_app.devices.falcon.failures import (
-    LARGEST_STEP_N,
-    LEAST_HZ,
-    LONGEST_ROUND_TRIP_S,
-    MOST_BROKEN,
-    OPEN,
-    Facts,
-    sentence,
-)
+from study_app.devices.doctor import Report, lines
+from study_app.devices.falcon.failures import failures_on
 from study_app.devices.registry import discover
 from tests.compiled import needs_servo
 from tests.devices.subjects import Subject, falcon, force_dimension, inverse3, mouse, over, scripted
@@ -28,50 +18,18 @@ from tests.golden import compare
 from tests.golden_values import value_lines
 
 GOLDEN = Path(__file__).parent / "golden"
-USB = ("access", "busy", "not-supported", "not-found", "no-device", "kernel-driver", "no-backend", "no-ftd2xx", "io",
-       "timeout", "overflow", "pipe", OPEN)  # fmt: skip
-VALUES: dict[str, tuple[Any, ...]] = {
-    "usb": USB,
-    "listed": (True, False),
-    "ftdi_sees": (True, False),
-    "program": ("running", "loaded", "needed", "refused"),
-    "boot_step": ("ping", "autobaud", "echo", "start"),
-    "replies": (True, False),
-    "homed": (0, 0b101, 0b111),
-    "moved": (True, False),
-    "pulled_out": (True, False),
-    "round_trip_s": (0.99 * LONGEST_ROUND_TRIP_S, LONGEST_ROUND_TRIP_S),
-    "broken_share": (MOST_BROKEN, 1.01 * MOST_BROKEN),
-    "rate_hz": (LEAST_HZ, 0.99 * LEAST_HZ),
-    "step_n": (LARGEST_STEP_N, 1.01 * LARGEST_STEP_N),
-}
-MARKS = {"ok": ".", "found": "F", "not checked": "?"}
 
 
-def rows(base: Facts) -> Iterator[str]:
-    for name, values in VALUES.items():
-        for value in values:
-            facts = replace(base, **{name: value})
-            states = "".join(MARKS[one.state] for one in findings_of(facts))
-            yield f"{base.platform} {name} {value}: {states} {sentence(facts)[:60]}"
-    for first in USB[:5]:
-        for listed, sees in ((True, True), (True, False), (False, False)):
-            facts = replace(base, usb=first, listed=listed, ftdi_sees=sees)
-            yield f"{base.platform} {first} {listed} {sees}: {''.join(MARKS[one.state] for one in findings_of(facts))}"
-
-
-def test_findings_of_a_falcon(pytestconfig: pytest.Config) -> None:
-    found = list[str]()
+def test_what_can_go_wrong_with_a_falcon(pytestconfig: pytest.Config) -> None:
+    told = list[str]()
     for platform in ("linux", "win32", "darwin"):
-        found += rows(Facts(platform=platform))
-        worst = Facts(
-            platform=platform, usb="access", boot_step="echo", replies=False, moved=False, homed=0, step_n=1.0
-        )
-        for facts in (worst, replace(worst, usb="busy", program="refused"), Facts(platform=platform, usb=OPEN)):
-            assert pickle.loads(pickle.dumps(findings_of(facts))) == findings_of(facts)  # noqa: S301 - of the worker
-            report = Report(("a Falcon",), findings_of(facts), sentence(facts) or None)
-            found += [*lines(report), f"{report.well} {report.conclusion}", *(one.id for one in report.found)]
-    compare(GOLDEN / "falcon_findings.txt", found, pytestconfig)
+        table = failures_on(platform)
+        ids = [mode.id for mode in table.modes]
+        reports = [Report((), table.findings({mode}, table.before(mode)), table.sentence(mode)) for mode in ids]
+        told += [f"{platform}: {' '.join(ids)}", *(line for one in reports[::4] for line in lines(one))]
+        assert pickle.loads(pickle.dumps(reports)) == reports  # noqa: S301 - of the worker
+        told += lines(Report(("a Falcon",), table.findings(ids, ids), None))
+    compare(GOLDEN / "falcon_failures.txt", told, pytestconfig)
 
 
 def test_descriptors(pytestconfig: pytest.Config) -> None:

@@ -14,7 +14,7 @@ import pytest
 from study_app import workspace
 from study_app.analysis.planning import preregistration
 from study_app.authoring import drafts
-from study_app.devices.falcon.mechanics import calibration
+from study_app.devices.falcon import calibration
 from study_app.errors import StudyError
 from study_app.store import workstation
 from study_app.store.blinded.allocation import claims

@@ -12,10 +12,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.computer_check import ComputerCheck
 from study_app.devices.descriptor import Backend
-from study_app.devices.doctor_report import Report
-from study_app.devices.falcon.doctor.failure_report import findings_of
-from study_app.devices.falcon.failures import OPEN
-from study_app.devices.falcon.failures import Facts as FalconFacts
+from study_app.devices.doctor import Report
+from study_app.devices.falcon.failures import failures_on
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.home.dialogs import NewSessionDialog
 from study_app.gui.home.startup_window import OpeningWindow
@@ -58,8 +56,11 @@ class Examined:
         self.closed = True
 
 
-REFUSED = Report(("opened",), findings_of(FalconFacts(platform="linux", usb="access")), "this account may not open it")
-FALCON_WELL = Report(("opened", "homed"), findings_of(FalconFacts(platform="linux", usb=OPEN)), None)
+FALCON = failures_on("linux")
+REFUSED = Report(
+    ("opened",), FALCON.findings({"permission"}, FALCON.before("permission")), "this account may not open it"
+)
+FALCON_WELL = Report(("opened", "homed"), FALCON.findings(passed=FALCON.before("unplugged")), None)
 
 
 def diagnosis(qtbot: Any) -> DiagnosisDialog:
@@ -105,7 +106,7 @@ def of_devices(*found: Backend, preferred: str = "falcon") -> Callable[[Any], No
 DEVICES: Actions = {
     "connected": of_devices(Backend("falcon", "other", "connected: FT1", "felt, up to 8 N")),
     "to be checked": of_devices(Backend("falcon", "other", "connected: FT1", "felt, up to 8 N", "home it")),
-    "another preferred": of_devices(preferred="falcon-socket:/run/falcon"),
+    "another preferred": of_devices(preferred="falcon-emulated"),
     "looking": lambda place: place.show_looking(True),
     "firmware": lambda place: (place.show_looking(False), place.show_options({"firmware": Path("/there/f.bin")})),
     "benches": lambda place: place.show_benches(

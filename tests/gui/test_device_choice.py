@@ -24,7 +24,6 @@ CHOSEN = NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, Path("n
         ("falcon:FT123", "demo"),
         ("scripted", "demo-scripted"),
         ("falcon-emulated", "demo-falcon-emulated"),
-        ("falcon-socket:/run/falcon", "demo-falcon-socket"),
     ],
 )
 def test_what_nobody_felt_is_kept_apart(tmp_path, device, folder):
@@ -37,8 +36,8 @@ def test_firmware_is_for_falcons_alone(tmp_path):
     with pytest.raises(DeviceError, match="device 'mouse' takes no firmware; only these do: Novint Falcon,"):
         check(chosen, study)
     check(replace(chosen, device="falcon"), study)
-    with pytest.raises(DeviceNotFound, match="falcon-socket:PATH"):
-        check(replace(chosen, device="falcon-socket"), study)
+    with pytest.raises(DeviceNotFound, match="'falcon-socket:/run/f' was removed: choose falcon-emulated, or falcon"):
+        check(replace(chosen, device="falcon-socket:/run/f"), study)
 
 
 @pytest.fixture

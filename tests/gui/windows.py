@@ -45,7 +45,7 @@ FOUND = [
     Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug it in"),
     Backend("falcon", "ftd2xx", NOT_AVAILABLE, "the same", "for Windows alone"),
     Backend("falcon-emulated", "the program", READY, "moves by itself"),
-    Backend("falcon-socket:PATH", "a Unix socket", READY, "another program's"),
+    Backend("falcon-emulated", "the program", READY, "another program's"),
 ]
 SCREENS = (
     ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0),

@@ -8,7 +8,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
 from study_app.devices.rig import Rig
-from study_app.devices.simulated.simulated_device import MouseDevice
+from study_app.devices.simulated import MouseDevice
 from study_app.errors import ServoFault, StudyError
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE
 from study_app.haptics.runtime.clocks.clock import VirtualClock

@@ -40,7 +40,7 @@ def test_its_start_is_the_commands() -> None:
 def test_its_start_runs_modules_and_code_as_python_does() -> None:
     """A guard is `sys.executable -P -m`, the load of a timing `-S -c`."""
     guard = "study_app.devices.guard"
-    words = ("falcon", "study_app.devices.falcon.transport.transport:end_torque", "falcon-socket:/nowhere")
+    words = ("falcon", "study_app.devices.falcon.transport:end_torque", "falcon:NOWHERE")
     assert started("-P", "-m", guard, *words, send=b"done\n") == "ready\n"
     assert started("-S", "-c", "import sys; print(sys.argv[1:], __name__)", "a") == "['a'] __main__\n"
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StoreError
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.clocks.clock import VirtualClock

@@ -20,7 +20,7 @@ from study_app.app.failures import Patience, UncaughtExceptions, guarded
 from study_app.app.lab.jobs import LabOpening, LabSaving, Prices
 from study_app.app.lab.lab_estimation import LabEstimation
 from study_app.app.lab.view_values import lab_view
-from study_app.devices.names import DEFAULT_DEVICE
+from study_app.devices import DEFAULT_DEVICE
 from study_app.errors import StudyError
 from study_app.evidence.appraisal import AppraisalClient, start_appraisal_worker
 from study_app.gui.home.startup_window import LONG_AFTER_S

@@ -9,7 +9,7 @@ from PySide6.QtCore import QEventLoop, QTimer
 from study_app.app.failures import ended_from_outside
 from study_app.app.session.live_session import LiveSession
 from study_app.app.session.timing import collecting_here
-from study_app.devices.names import DEFAULT_DEVICE
+from study_app.devices import DEFAULT_DEVICE
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import LIGHT

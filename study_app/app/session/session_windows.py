@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.operator import Parts
+from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
-from study_app.devices.simulated.hand_commands import HandOrders, hand_of
 from study_app.errors import DisplayError
 from study_app.gui.display.screens import has_card, place
 from study_app.gui.operator import OperatorWindow

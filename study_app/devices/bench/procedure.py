@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from study_app import __version__
 from study_app.devices.base import Device
-from study_app.devices.bench.excitation import ENDED, OSCILLATES, Excitation
+from study_app.devices.bench.excitation import ENDED, OSCILLATES, RATE_HZ, Excitation, Stand
 from study_app.devices.bench.measurements import (
     GRAVITY_MPS2,
     Gain,
@@ -24,7 +24,6 @@ from study_app.devices.bench.measurements import (
     noise,
     regularity,
 )
-from study_app.devices.bench.stand import RATE_HZ, Stand
 from study_app.errors import DeviceError
 from study_app.haptics.runtime.clocks.clock import Clock
 

@@ -1,21 +1,132 @@
-"""Boot of a Falcon after power-up: ping, speed, upload with its echo, first reply.
+"""The Falcon's firmware file, looked at before a byte of it is sent: a boot stream of TI's loader, whole and no more.
+
+None comes with this software: the owner of a Falcon has it. The stream is little-endian words: the key 0x08AA, eight
+zeros, the entry point, then blocks of (count, destination, words) and a count of 0; addresses are two words, the high
+one first (TI SPRUI33, boot data stream of 8 bits).
+
+
+Boot of a Falcon after power-up: ping, speed, upload with its echo, first reply.
 
 Each step reads its answer as a stream, independent of the bridge's packets. A step that fails ends the attempt; the
 next one begins with reopening the bridge, which succeeds according to owners of a Falcon.
 """
 
+import hashlib
+import re
+import struct
 from collections.abc import Callable
+from dataclasses import dataclass
 from statistics import median
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices.falcon.failures import BY_ID, OPEN, Facts, FalconFailure, UsbFailure
-from study_app.devices.falcon.firmware import Firmware, check
-from study_app.devices.falcon.transport.transport import Transport
-from study_app.devices.falcon.wire import constants
-from study_app.devices.falcon.wire.packets import PARSER, STATUS, feed, strip
+from study_app.devices.doctor import DeviceFailure
+from study_app.devices.falcon import constants
+from study_app.devices.falcon.constants import BOOT_KEY
+from study_app.devices.falcon.failures import FAILURES, UsbFailure
+from study_app.devices.falcon.replies import PARSER, STATUS, feed, strip
+from study_app.devices.falcon.transport import Transport
 from study_app.haptics.model.layout import records
+
+_RESERVED_WORDS: Final = 8
+_HEADER_BYTES: Final = 2 * (1 + _RESERVED_WORDS + 2)
+_BLOCK_HEAD: Final = struct.Struct("<HHH")
+
+KNOWN: Final = {
+    ("1119e39c39fab1f3", "09b896a1"): "nvent_firmware.bin",
+    ("b2700d5cd5ca217e", "84856c6a"): "test_firmware.bin",
+    ("ae838730af34b582", "27ea64a4"): "novint_T0.bin",
+    ("e0ae3598670fa1c8", "7ff4e816"): "novint_T2.bin",
+}
+"""First 16 and last 8 digits of SHA-256 -> under which name it is known."""
+
+_HEX_DUMP: Final = re.compile(rb"[0-9A-Fa-f\s:|.,x]{32,}")
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """``words`` 16-bit words for ``destination``."""
+
+    destination: int
+    words: int
+
+
+@dataclass(frozen=True, slots=True)
+class Firmware:
+    """What a file holds: its size in bytes, its hash, where it begins to run, and its blocks.
+
+    ``name`` is that of a file which is known to work, None for others.
+    """
+
+    size: int
+    sha256: str
+    entry: int
+    blocks: tuple[Block, ...]
+    name: str | None
+
+
+def check(data: bytes) -> Firmware:
+    """Return what ``data`` holds."""
+    _refuse_other_files(data)
+    _refuse_wrong_header(data)
+    high, low = struct.unpack_from("<HH", data, _HEADER_BYTES - 4)
+    digest = hashlib.sha256(data).hexdigest()
+    name = KNOWN.get((digest[:16], digest[-8:]))
+    return Firmware(len(data), digest, high << 16 | low, _blocks(data), name)
+
+
+def _refuse_other_files(data: bytes) -> None:
+    begin = data[:200].lstrip().lower()
+    if not data:
+        raise _refusal("it is empty")
+    if begin.startswith((b"<!doctype", b"<html", b"<?xml")):
+        raise _refusal("it is a web page: what was saved is the page about the file, or an error, not the file")
+    if begin.startswith(b"version https://git-lfs"):
+        raise _refusal("it is a Git LFS pointer, a note about the file: fetch the file itself with 'git lfs pull'")
+    if begin.startswith(b":") or _HEX_DUMP.fullmatch(data):
+        raise _refusal("it is a hex dump, the bytes as text: use the binary file")
+
+
+def _refuse_wrong_header(data: bytes) -> None:
+    if len(data) < _HEADER_BYTES:
+        raise _refusal(f"it is cut short: {len(data)} bytes are less than its header of {_HEADER_BYTES}")
+    key, *reserved = struct.unpack_from(f"<{1 + _RESERVED_WORDS}H", data)
+    if key == int.from_bytes(BOOT_KEY.to_bytes(2, "little"), "big"):
+        raise _refusal("the two bytes of each of its words are swapped")
+    if key != BOOT_KEY:
+        raise _refusal(f"it begins with the key 0x{key:04X}, not 0x{BOOT_KEY:04X}")
+    if any(reserved):
+        raise _refusal("its header has numbers where zeros belong")
+
+
+def _blocks(data: bytes) -> tuple[Block, ...]:
+    blocks: list[Block] = []
+    at = _HEADER_BYTES
+    while True:
+        number = len(blocks) + 1
+        if len(data) < at + 2:
+            raise _refusal(f"it is cut short: after {len(blocks)} blocks, at byte {len(data)}, there is no end mark")
+        (words,) = struct.unpack_from("<H", data, at)
+        if words == 0:
+            break
+        end = at + _BLOCK_HEAD.size + 2 * words
+        if len(data) < end:
+            raise _refusal(f"it is cut short in block {number}: {len(data)} bytes, of which block {number} needs {end}")
+        _, high, low = _BLOCK_HEAD.unpack_from(data, at)
+        blocks.append(Block(high << 16 | low, words))
+        at = end
+    if not blocks:
+        raise _refusal("it has no block: there is nothing in it to load")
+    extra = len(data) - at - 2
+    if extra:
+        raise _refusal(f"{extra} bytes follow its end mark at byte {at}")
+    return tuple(blocks)
+
+
+def _refusal(reason: str) -> DeviceFailure:
+    return FAILURES.failure("not-firmware", reason)
+
 
 ATTEMPTS: Final = 10
 PINGS: Final = 20
@@ -28,32 +139,25 @@ PROBE_S: Final = 0.05
 _BETWEEN_ATTEMPTS_S: Final = 0.2
 
 
-class BootFailure(FalconFailure):
+class BootFailure(DeviceFailure):
     """The firmware could not be loaded.
 
     ``step`` is where the last attempt ended: "ping", "autobaud", "echo" or "start"; ``attempt`` its number; ``reason``
-    the observation there, ``silent`` whether there was no answer.
+    the observation there.
     """
 
-    def __init__(self, step: str, attempt: int, reason: str, *, silent: bool) -> None:
-        self.step = step
-        self.attempt = attempt
-        self.reason = reason
+    def __init__(self, step: str, attempt: int, reason: str) -> None:
+        self.step, self.attempt, self.reason = step, attempt, reason
         attempts = "1 attempt" if attempt == 1 else f"{attempt} attempts"
-        facts = Facts(usb=OPEN, boot_step=step, replies=False if silent else None)
-        cure = BY_ID["upload"].cure(facts.platform)
-        if step == "start":
-            cure = f"check that the file is a Falcon's firmware, and {cure}"
-        super().__init__(f"the Falcon's firmware could not be loaded in {attempts}: {reason}; {cure}", facts)
+        check_file = "; check that the file is a Falcon's firmware" if step == "start" else ""
+        super().__init__("upload", str(FAILURES.failure("upload", f"in {attempts}: {reason}{check_file}")))
 
 
 class _Ended(Exception):
     """A step of an attempt did not complete."""
 
-    def __init__(self, step: str, reason: str, *, silent: bool = False) -> None:
-        self.step = step
-        self.reason = reason
-        self.silent = silent
+    def __init__(self, step: str, reason: str) -> None:
+        self.step, self.reason = step, reason
         super().__init__(reason)
 
 
@@ -123,6 +227,25 @@ def measure_round_trip(transport: Transport) -> float:
     return median(_round_trip_s(transport) for _ in range(ROUND_TRIPS))
 
 
+def choose_event_character(transport: Transport) -> tuple[float, dict[str, Any]]:
+    """Measure the round trip with and without the bridge's event character, and use the faster setting.
+
+    Returns
+    -------
+    round_trip_s : the shorter one [s]
+    described : what the receipt says of it
+    """
+    taken_s = {}
+    for on in (False, True):
+        set_event_character(transport, on)
+        taken_s[on] = measure_round_trip(transport)
+    better = taken_s[True] < taken_s[False]
+    if not better:
+        set_event_character(transport, on=False)
+    trips = {"with": round(1000 * taken_s[True], 3), "without": round(1000 * taken_s[False], 3)}
+    return min(taken_s.values()), {"event_character": better, "round_trip_ms": trips}
+
+
 def _round_trip_s(transport: Transport) -> float:
     began_s = transport.now_s()
     if _Line(transport).answers(PROBE_S):
@@ -149,7 +272,7 @@ def boot(
             _attempt(transport, firmware)
         except _Ended as ended:
             if attempt == attempts:
-                raise BootFailure(ended.step, attempt, ended.reason, silent=ended.silent) from None
+                raise BootFailure(ended.step, attempt, ended.reason) from None
             if progress is not None:
                 progress(f"Loading the firmware, attempt {attempt} of {attempts}: {ended.reason}; trying again.")
             transport.reopen()
@@ -184,7 +307,7 @@ def _ping(transport: Transport) -> None:
         if constants.PONG in came:
             return
     heard = f"answers with {came[:8].hex(' ')}" if came else "does not answer"
-    raise _Ended("ping", f"its boot loader {heard}", silent=not came)
+    raise _Ended("ping", f"its boot loader {heard}")
 
 
 def _time(transport: Transport) -> None:

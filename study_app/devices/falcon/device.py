@@ -1,15 +1,20 @@
-"""The Falcon as a device: opened with its program loaded, homed and guarded; closed without torque."""
+"""The Falcon's driver: opened with its firmware loaded, homed with instructions, and guarded; closed without torque.
 
-import sys
-from collections.abc import Callable
+Arms find their index while the grip is pushed in; before that the encoder counts have no known origin, so no force is
+sent. The out-stroke afterwards confirms the positions, and that the hand is where the force fades in.
+"""
+
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final, Self
 
 import numpy as np
 
-from study_app.devices.base import Device
-from study_app.devices.call_gate import FINISHED, RUNS, check_left, let_go
-from study_app.devices.falcon import boot
+from study_app.devices.descriptor import OpenRequest
+from study_app.devices.driver import RUNS, AtClose, FramedDevice
+from study_app.devices.falcon import boot, calibration
+from study_app.devices.falcon.bulk import BulkCalls
+from study_app.devices.falcon.constants import ERROR_NO_DEVICE
 from study_app.devices.falcon.exchange import (
     BRIDGE_LOST,
     COUNTERS,
@@ -18,32 +23,39 @@ from study_app.devices.falcon.exchange import (
     exchange_functions,
     new_exchange,
 )
-from study_app.devices.falcon.failures import BY_ID, OPEN, Facts, ProgramMissing, sentence, usb_failure
-from study_app.devices.falcon.firmware import check
-from study_app.devices.falcon.homing import PATIENCE_S, home
-from study_app.devices.falcon.mechanics import calibration
-from study_app.devices.falcon.mechanics.geometry import DEFAULT_GEOMETRY, WORKSPACE_M, geometry_named
-from study_app.devices.falcon.mechanics.kinematics import REACHED, count_at, inverse, new_mechanism
-from study_app.devices.falcon.transport.bulk_calls import BulkCalls
-from study_app.devices.falcon.transport.transport import Transport, end_torque, open_transport, quiet
-from study_app.devices.falcon.wire.constants import ERROR_NO_DEVICE
-from study_app.devices.guard import DIED, Guard
-from study_app.errors import DeviceError, DeviceLost
+from study_app.devices.falcon.failures import FAILURES, LONGEST_ROUND_TRIP_S, MOST_BROKEN, usb_failure
+from study_app.devices.falcon.mechanics import (
+    DEFAULT_GEOMETRY,
+    REACHED,
+    WORKSPACE_M,
+    count_at,
+    geometry_named,
+    inverse,
+    new_mechanism,
+)
+from study_app.devices.falcon.replies import ALL_HOMED
+from study_app.devices.falcon.transport import Transport, end_torque, open_transport, quiet
+from study_app.errors import DeviceError
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading
 
-ENDS_TORQUE: Final = f"{end_torque.__module__}:{end_torque.__name__}"
-_SILENT_TICKS: Final = 40  # after 50 ms without a new position the servo ends the force
+PATIENCE_S: Final = 120.0
+ADVICES: Final = 6  # number of advice lines in that time
+MOVED: Final = 60  # counts of an arm that show motion of the grip: two degrees
+STROKES: Final = "Homing (red light): pull the grip of the Falcon all the way out, then push it all the way in."
+PULL_OUT: Final = "Homed (blue light): now pull the grip all the way out once more."
+READY: Final = "The Falcon is ready (green light)."
 _FARTHEST = 1700  # counts, slightly more than are used in practice
-_CLOSED = BulkCalls(0, 0)
+_STILL_M = 5e-6  # a third of the least effect of one encoder count
+_BEGIN = 100  # samples until positions are those of the grip
 
 
-class FalconDevice(Device):
-    """A Novint Falcon, or an emulated one, behind a bridge.
+class FalconDevice(FramedDevice):
+    """A Novint Falcon, or an emulated one.
 
     Parameters
     ----------
-    bridge : the argument of ``transport.open_transport``
+    serial : of its bridge; "": the first one
     firmware : file of its program, which it needs after it was switched on
     workspace_m : half extents of the grip's required workspace [m]
     force_limit_n : the greatest force that may be commanded [N]
@@ -54,11 +66,13 @@ class FalconDevice(Device):
     """
 
     name = "falcon"
-    guarded = True
+    failures, counted, silent, running = FAILURES, COUNTERS, "power", "unplugged"
+    causes: ClassVar[Mapping[int, str]] = {BRIDGE_LOST: "unplugged"}
+    ends_force: str | None = f"{end_torque.__module__}:{end_torque.__name__}"
 
     def __init__(
         self,
-        bridge: str = "falcon",
+        serial: str = "",
         *,
         firmware: str | Path | None = None,
         workspace_m: tuple[float, float, float] = WORKSPACE_M,
@@ -68,143 +82,108 @@ class FalconDevice(Device):
         cancelled: Callable[[], bool] | None = None,
         patience_s: float = PATIENCE_S,
     ) -> None:
-        self.bridge = bridge
-        self.name = bridge.partition(":")[0]
-        self.workspace_m = workspace_m
-        self.force_limit_n = force_limit_n
-        self._firmware = firmware
-        self._published = self._geometry = geometry_named(geometry)
-        self._progress = progress if progress is not None else _say_nothing
+        self._serial, self._firmware, self._patience_s = serial, firmware, patience_s
+        self._geometry = geometry_named(geometry)
+        self._progress = progress if progress is not None else str
         self._cancelled = cancelled
-        self._patience_s = patience_s
-        self.transport: Transport | None = None
-        self.guard: Guard | None = None
-        self._left_guard: Guard | None = None  # of a link that was lost
-        self._calibration: calibration.Calibration | None = None
-        self._guard_died = False
-        self._found: dict[str, Any] = {}
         self.reading, self._command = new_reading(), new_command()
-        self._round_trip_s: float | None = None
         mechanism = new_mechanism(self._geometry, calibration.UNCALIBRATED_UNITS_PER_NM)
-        self._count_m = count_at(mechanism, self._geometry.centre_m)
+        memory = new_exchange(BulkCalls(0, 0), mechanism, self._geometry, force_limit_n)
+        super().__init__(memory, workspace_m, force_limit_n, exchange_functions())
+        self._dynamics = Dynamics(None, count_at(mechanism, self._geometry.centre_m), LEAST_MASS_KG)
         self._check_reach(mechanism)
-        self.memory = new_exchange(_CLOSED, mechanism, self._geometry, force_limit_n)
-        self.falcon = self.memory[0]
-        self.falcon.ended = FINISHED
-        self.context = int(self.memory.ctypes.data)
-        self.read, self.write = exchange_functions()
 
-    def open(self) -> None:
-        """Open the bridge, load the program if needed, and home it with instructions; then start its guard.
+    @classmethod
+    def of(cls, request: OpenRequest) -> Self:
+        """Return the device of a request, closed."""
+        return cls(request.argument, **cls._given(request))
 
-        Raises
-        ------
-        DeviceError
-            It is not there, cannot be opened, needs its program, or was not homed.
-        """
-        if self.transport is not None:
-            if self.falcon.ended == RUNS:
-                return
-            self.close()
-        check_left(self.falcon, self.name)
-        transport = self._open_bridge()
-        self._guard_died = False
-        try:
-            self._found = {"serial": transport.serial, "firmware": self._run_program(transport)}
-            self._found |= self._hasten(transport)
-            self._calibrate(transport.serial)
-            self.transport = transport
-            if self.guarded:
-                self.guard = Guard(self.name, ENDS_TORQUE, transport.name, died=self._lose_guard)
-                self.guard.start()
-            if self._left_guard is not None:
-                self._left_guard.recall()
-                self._left_guard = None
-            self._home(transport)
-        except BaseException:
-            self.transport = transport
-            self.close()
-            raise
+    @staticmethod
+    def _given(request: OpenRequest) -> dict[str, Any]:
+        firmware = request.options.get("firmware")
+        return {"firmware": firmware, "progress": request.progress, "cancelled": request.cancelled, **request.limits}
 
-    def close(self) -> None:
-        """Send zero torque several times and release the device; a second call does nothing.
+    def _connect(self) -> Transport:
+        return open_transport(self._serial)
 
-        While a servo's loop hangs in a call of the bridge, the device stays open and guarded, so that the loop can end
-        the force when the call returns; a later call of ``close`` closes it.
-        """
-        if not let_go(self.falcon):
-            return
-        used, gone = bool(self.falcon.handle), self.falcon.ended == BRIDGE_LOST
-        transport, self.transport = self.transport, None
-        guard, self.guard = self.guard, None
-        pushing = gone and bool(self.falcon.units.any())
-        self.falcon.handle, self.falcon.transfer = _CLOSED
-        if transport is None:
-            return
-        quieted = not used
-        try:
-            quieted = quieted or quiet(transport) > 0
-            self.falcon.sent_n = 0.0 if quieted else self.falcon.sent_n
-        finally:  # an interrupt prevents neither its release nor its guard
-            try:
-                transport.close()
-            finally:
-                if guard is not None:
-                    self._left_guard = guard if pushing else None
-                    (guard.leave if pushing else guard.stand_down if quieted or gone else guard.release)()
+    def _prepare(self, connection: Transport) -> dict[str, Any]:
+        """Load the firmware if needed, measure the round trip, start the guard, and home it with instructions."""
+        serial = connection.serial
+        found: dict[str, Any] = {"serial": serial, "firmware": self._run_firmware(connection)}
+        round_trip_s, event_character = boot.choose_event_character(connection)
+        used = calibration.load(serial) if serial else None
+        geometry = self._geometry if used is None else geometry_named(used.geometry)
+        gain = calibration.UNCALIBRATED_UNITS_PER_NM if used is None else used.units_per_nm
+        mechanism = new_mechanism(geometry, gain, 0.0 if used is None else used.arm_offset_rad)
+        self._dynamics = Dynamics(round_trip_s, count_at(mechanism, geometry.centre_m), LEAST_MASS_KG)
+        self.memory[:] = new_exchange(connection.calls(), mechanism, geometry, self.force_limit_n)
+        self._start_guard(connection.name)
+        self._home(connection)
+        self._begin_anew()
+        calibrated = "none" if used is None else used.describe()
+        found |= {"geometry": geometry.name, "calibration": calibrated, "units_per_nm": gain}
+        return found | event_character
+
+    def _finish(self, connection: Transport) -> AtClose:
+        """Send zero torque several times, if it was used."""
+        falcon = self.exchange
+        gone = falcon.ended == BRIDGE_LOST
+        pushing = gone and bool(falcon.units.any())
+        used, falcon.handle = bool(falcon.handle), 0
+        quieted = not used or quiet(connection) > 0
+        if quieted:
+            falcon.sent_n = 0.0
+        return "leave" if pushing else "stand_down" if quieted or gone else "release"
 
     @property
-    def dynamics(self) -> Dynamics:
-        """The round trip that was measured when it was opened, an encoder's count at the grip, and its least mass."""
-        return Dynamics(self._round_trip_s, self._count_m, LEAST_MASS_KG)
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """Numbers of ticks, packets and errors since it was homed: see ``exchange.FALCON``."""
-        return {name: int(self.falcon[name]) for name in COUNTERS}
+    def failure_mode(self) -> str | None:
+        """The id of what ended the exchange; without positions it is told from homed bits and errors of transfers."""
+        mode, state = super().failure_mode, self.exchange
+        if mode != self.silent:
+            return mode
+        if state.unhomed:
+            return "unhomed"
+        return "transfer" if 2 * (state.read_errors + state.write_errors) > state.apart else mode
 
     @property
     def held(self) -> tuple[Any, Any]:
         """The encoder counts of its last reply and its last torque command in motor units, each (3,)."""
-        return self.falcon.status.encoders.copy(), self.falcon.units.copy()
-
-    def check(self) -> None:
-        """Raise ``DeviceLost`` if its guard has died: no force is sent any more, and its reads say that it is lost."""
-        if self._guard_died:
-            raise DeviceLost(DIED)
-
-    @property
-    def failure(self) -> str | None:
-        """Cause and cure of what ended the exchange, in a sentence; None while nothing did."""
-        state = self.falcon
-        if self._guard_died:
-            return DIED
-        if state.ended == BRIDGE_LOST:
-            return sentence(Facts(usb="no-device"))
-        if state.ended != RUNS or state.apart <= _SILENT_TICKS:
-            return None
-        if state.unhomed:
-            return f"it is no longer homed: {BY_ID['power'].cure(sys.platform)}"
-        failed = 2 * (state.read_errors + state.write_errors) > state.apart
-        return sentence(Facts(usb="io") if failed else Facts(replies=False))
+        return self.exchange.status.encoders.copy(), self.exchange.units.copy()
 
     def describe(self) -> dict[str, Any]:
         """Return its record for the receipt."""
-        used = self._calibration
-        return {
-            "name": self.name,
-            "workspace_m": list(self.workspace_m),
-            "force_limit_n": self.force_limit_n,
-            "geometry": self._geometry.name,
-            "calibration": "none" if used is None else used.describe(),
-            "units_per_nm": float(self.falcon.mechanism.units_per_nm),
-            "dynamics": self.dynamics.describe(),
-            "delay_ticks": int(self.falcon.delay),
-            **self._found,
-        }
+        return super().describe() | {"delay_ticks": int(self.exchange.delay)}
 
-    def _open_bridge(self) -> Transport:
-        return open_transport(self.bridge)
+    def observed(self) -> tuple[str, ...]:
+        """Return what the doctor prints about it."""
+        found, serial = self.found, self.found["serial"]
+        used = found["calibration"]
+        return (
+            f"opened, serial number {serial}" if serial else "opened",
+            f"program: {found['firmware']}",
+            f"round trip {min(found['round_trip_ms'].values()):.2f} ms; event character "
+            f"{'kept' if found['event_character'] else 'of no use'}",
+            f"calibration: {used['measured'] if isinstance(used, dict) else 'none'}",
+            f"incomplete replies: {self._broken_share:.2%}",
+        )
+
+    def appeared(self, samples: Any) -> set[str]:
+        """Return the modes of failure that a run at rest shows in its samples."""
+        if self.failure_mode is not None:
+            return {self.failure_mode}
+        moved_m = np.ptp(samples["position_m"][_BEGIN:], axis=0).max()
+        shown = {
+            "frozen": moved_m <= _STILL_M,
+            "broken-packets": self._broken_share > MOST_BROKEN,
+            "slow": min(self.found["round_trip_ms"].values()) >= 1000 * LONGEST_ROUND_TRIP_S,
+        }
+        return {mode for mode, seen in shown.items() if seen}
+
+    @property
+    def _broken_share(self) -> float:
+        """The share of packets without a complete reply."""
+        requests, replies = self.counters["requests"], self.counters["replies"]
+        return max(requests - replies - 1, 0) / max(requests, 1)
 
     def _check_reach(self, mechanism: Any) -> None:
         """Refuse a workspace that the arms do not reach."""
@@ -220,81 +199,65 @@ class FalconDevice(Device):
                     "protocol's workspace_mm smaller"
                 )
 
-    def _run_program(self, transport: Transport) -> str:
-        """Load its program if it does not run; return which one runs."""
+    def _run_firmware(self, transport: Transport) -> str:
+        """Load the firmware if it does not run; return which one runs."""
         boot.configure(transport)
         if boot.is_running(transport):
             return "already running"
         if self._firmware is None:
-            facts = Facts(usb=OPEN, program="needed")
-            raise ProgramMissing(f"the Falcon cannot be used: {sentence(facts)}", facts)
+            raise FAILURES.failure("firmware-file")
         try:
-            program = Path(self._firmware).read_bytes()
+            data = Path(self._firmware).read_bytes()
         except OSError as error:
-            raise ProgramMissing(
-                f"the firmware {self._firmware} cannot be read: {error.strerror}", Facts(usb=OPEN, program="refused")
-            ) from error
-        found = check(program)
+            raise FAILURES.failure("firmware-file", f"{self._firmware} cannot be read: {error.strerror}") from error
+        found = boot.check(data)
         unknown = f"SHA-256 {found.sha256[:16]}…, which is none of those that are known to work"
         self._progress(f"Loading the Falcon's firmware, {found.name or unknown}.")
-        return boot.boot(transport, program, progress=self._progress).sha256
-
-    def _hasten(self, transport: Transport) -> dict[str, Any]:
-        """Measure the round trip with and without the bridge's event character, and use the faster setting."""
-        boot.set_event_character(transport, on=False)
-        plain_s = boot.measure_round_trip(transport)
-        boot.set_event_character(transport, on=True)
-        hastened_s = boot.measure_round_trip(transport)
-        better = hastened_s < plain_s
-        self._round_trip_s = min(plain_s, hastened_s)
-        if not better:
-            boot.set_event_character(transport, on=False)
-        return {
-            "event_character": better,
-            "round_trip_ms": {"with": round(1000 * hastened_s, 3), "without": round(1000 * plain_s, 3)},
-        }
-
-    def _calibrate(self, serial: str | None) -> None:
-        """Use the calibration of this Falcon, not that of another opened before."""
-        self._calibration = used = calibration.load(serial) if serial else None
-        self._geometry = self._published if used is None else geometry_named(used.geometry)
-        gain = calibration.UNCALIBRATED_UNITS_PER_NM if used is None else used.units_per_nm
-        self.falcon.mechanism = new_mechanism(self._geometry, gain, 0.0 if used is None else used.arm_offset_rad)
-        self._count_m = count_at(self.falcon.mechanism, self._geometry.centre_m)
+        return boot.boot(transport, data, progress=self._progress).sha256
 
     def _home(self, transport: Transport) -> None:
-        mechanism = self.falcon.mechanism.copy()
-        self.memory[:] = new_exchange(transport.calls(), mechanism, self._geometry, self.force_limit_n)
-        self.falcon.unguarded = int(self._guard_died)
-        home(self.falcon, self._tick, transport.now_s, self._progress, patience_s=self._patience_s)
-        self._begin_anew()
-
-    def _lose_guard(self) -> None:
-        """Block every force from now on; called by the guard's thread."""
-        self._guard_died = True
-        self.falcon.unguarded = 1
+        """Run ticks without force until all arms are homed and the grip was pulled out once more."""
+        falcon = self.exchange
+        began_s = advised_s = transport.now_s()
+        lowest, highest = np.zeros(3), np.zeros(3)
+        announced = False
+        self._progress(STROKES)
+        while not falcon.pulled_out:
+            self._tick()
+            counts = falcon.status.encoders
+            if falcon.status.count <= 1:
+                lowest, highest = counts.copy(), counts.copy()
+            elif falcon.status.homed != ALL_HOMED:  # the origin jumps when an arm is homed: that is not motion
+                lowest, highest = np.minimum(lowest, counts), np.maximum(highest, counts)
+            if falcon.homed and not announced:
+                announced = True
+                self._progress(PULL_OUT)
+            moved = (highest - lowest).max() > MOVED
+            mode = "power" if falcon.status.count == 0 else "stroke-in" if moved else "frozen"
+            if falcon.homed:
+                mode = "stroke-out"
+            if transport.now_s() - began_s > self._patience_s:
+                raise FAILURES.failure(mode)
+            if transport.now_s() - advised_s > self._patience_s / ADVICES:
+                advised_s = transport.now_s()
+                self._progress(f"Still homing: {FAILURES.sentence(mode)}.")
+        self._progress(READY)
 
     def _begin_anew(self) -> None:
         """Fade the force in over half a second from the next tick on, and reset the counters."""
-        self.falcon.share = 0.0
-        self.falcon.started = 0
+        self.exchange.share = 0.0
+        self.exchange.started = 0
         for name in COUNTERS:
-            self.falcon[name] = 0
+            self.exchange[name] = 0
 
     def _tick(self) -> None:
         """Run a tick without force."""
-        transport = self.transport
-        assert transport is not None  # noqa: S101 - it is being opened
-        now_ns = round(1e9 * transport.now_s())
+        now_ns = round(1e9 * self.connection.now_s())
         self.read.ctypes(self.context, now_ns, int(self.reading.ctypes.data))
         self.write.ctypes(self.context, int(self._command.ctypes.data))
-        self.check()
-        if self.falcon.ended != RUNS:
+        if self.exchange.ended != RUNS:
             raise usb_failure(ERROR_NO_DEVICE, "homing it")
+        self.check()
         if self._cancelled is not None and self._cancelled():
             raise DeviceError("homing the Falcon was cancelled")
-        transport.pause(0.001)
-
-
-def _say_nothing(_line: str) -> None:
-    """Report nothing."""
+        self.connection.pause(0.001)

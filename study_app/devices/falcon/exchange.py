@@ -1,4 +1,12 @@
-"""The Falcon's compiled tick: read the reply to the last packet, return the grip's position, send the next torques.
+"""Converts the servo's force to motor units, and these back to the force that the motors exert.
+
+The servo limits the change of its force, except when its passivity controller reduces force or adds damping. So does
+the driver: after packets that were not sent, or for a caller without such a limit, a force grows by at most the servo's
+slew limit per tick; reductions, and forces that take energy from the moving grip, pass at once. The functions work on
+the exchange's record (``exchange.FALCON``), in the Falcon's frame.
+
+
+The Falcon's compiled tick: read the reply to the last packet, return the grip's position, send the next torques.
 
 The device answers each packet with one, so `_read` collects the reply to the last tick's packet, and `_write` sends the
 force as soon as it is known; a position is one tick old. Of several replies the newest counts; without one there is no
@@ -6,17 +14,15 @@ new position, and none is returned twice. Force is enabled after all arms are ho
 and then fades in over half a second. ``replies`` decides which replies are accepted.
 """
 
+import math
 from functools import cache
 from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices.call_gate import FIRST_CAUSE, GATE, RUNS, enter, leave, outlasted
-from study_app.devices.falcon.mechanics.geometry import OUT_STROKE_M, Geometry
-from study_app.devices.falcon.mechanics.kinematics import MECHANISM, REACHED, START_M, angles, forward
-from study_app.devices.falcon.sending import may_wait, push
-from study_app.devices.falcon.transport.bulk_calls import BULK, BulkCalls
-from study_app.devices.falcon.wire.constants import (
+from study_app.devices.driver import COMMON, FIRST_CAUSE, RUNS, enter, leave, outlasted
+from study_app.devices.falcon.bulk import BULK, BulkCalls
+from study_app.devices.falcon.constants import (
     ENDPOINT_IN,
     ENDPOINT_OUT,
     ERROR_NO_DEVICE,
@@ -29,8 +35,29 @@ from study_app.devices.falcon.wire.constants import (
     SUCCESS,
     USB_PACKET,
 )
-from study_app.devices.falcon.wire.packets import PARSER, STATUS, feed, pack, strip
-from study_app.devices.falcon.wire.replies import believe, give_up_measurement, settle, trust
+from study_app.devices.falcon.mechanics import (
+    MECHANISM,
+    OUT_STROKE_M,
+    REACHED,
+    START_M,
+    Geometry,
+    angles,
+    forward,
+    jacobian,
+    motor_units,
+    torques,
+)
+from study_app.devices.falcon.replies import (
+    PARSER,
+    STATUS,
+    believe,
+    feed,
+    give_up_measurement,
+    pack,
+    settle,
+    strip,
+    trust,
+)
 from study_app.haptics.kernels.c_functions import (
     READ,
     READ_LOST,
@@ -42,10 +69,93 @@ from study_app.haptics.kernels.c_functions import (
     record_at,
 )
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.vector import clear, copy, square
+from study_app.haptics.kernels.passivity import SURE_MPS
+from study_app.haptics.kernels.vector import clear, copy, dot, square, square_distance
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import COMMAND, READING, records
 from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n
+
+MOST_WAITING_N: Final = 0.5
+"""Greatest difference between a force and the motors' present force at which a delay measurement may omit it."""
+
+SHORTEST_TICK_S: Final = 1e-3
+LONGEST_TICK_S: Final = 4e-3
+"""Time that limits the growth of a force in a tick, even if the tick is late."""
+
+
+@kernel
+def push(falcon: Any) -> None:
+    """Turn ``force_n``, as much of it as passes the gate, into ``units`` for the motors.
+
+    ``held_n`` is then the force of the motors until the next command, where the grip is now, and ``sent_n`` the force
+    after it [N].
+    """
+    jacobian(falcon.mechanism, falcon.theta, falcon.position_m, falcon.rates)
+    _motor_force(falcon, falcon.held_n)
+    _choose_units(falcon)
+    _motor_force(falcon, falcon.sent_n)
+
+
+@kernel
+def may_wait(falcon: Any) -> bool:
+    """Return whether the motors may keep their force for a tick: it is close to the wanted one, and not 0."""
+    near: bool = square_distance(falcon.sent_n, falcon.held_n) <= MOST_WAITING_N * MOST_WAITING_N
+    return near and (square(falcon.sent_n) > 0.0 or square(falcon.held_n) == 0.0)
+
+
+@kernel
+def _motor_force(falcon: Any, force_n: Any) -> None:
+    """Write the force of ``units`` at the grip into ``force_n`` (3,) [N]: ``F = J^T tau``; 0 if they are 0."""
+    units = falcon.units
+    for axis in range(3):
+        force_n[axis] = 0.0
+        for i in range(3):
+            if units[i] != 0:
+                force_n[axis] -= units[i] / falcon.mechanism.units_per_nm * falcon.rates[i, axis]
+
+
+@kernel
+def _choose_units(falcon: Any) -> None:
+    for axis in range(3):
+        falcon.force_n[axis] *= falcon.share
+    none = square(falcon.force_n) == 0.0
+    if none or falcon.homed == 0 or falcon.unguarded != 0:
+        for i in range(3):
+            falcon.units[i] = 0
+        return
+    limit_growth(falcon)
+    torques(falcon.rates, falcon.force_n, falcon.torque_nm)
+    falcon.shortened += motor_units(falcon.mechanism, falcon.torque_nm, falcon.units)
+
+
+@kernel
+def limit_growth(falcon: Any) -> None:
+    """Limit the part of the force that is new and does not brake the grip to the servo's slew limit.
+
+    New is the way from the nearest force that is a share (0 to 1) of the one held, so that a force that turns round
+    falls at once and grows by steps. A grip slower than ``SURE_MPS`` may be a count of an encoder, and is not braked.
+    """
+    held_n, force_n, v_mps = falcon.held_n, falcon.force_n, falcon.velocity_mps
+    kept = 0.0
+    if square(held_n) > 0.0:
+        kept = min(max(dot(force_n, held_n) / square(held_n), 0.0), 1.0)
+    braking = 0.0  # [N s/m]
+    if square(v_mps) > SURE_MPS * SURE_MPS:
+        braking = min((dot(force_n, v_mps) - kept * dot(held_n, v_mps)) / square(v_mps), 0.0)
+    square_n2 = 0.0
+    for axis in range(3):
+        square_n2 += (force_n[axis] - kept * held_n[axis] - braking * v_mps[axis]) ** 2
+    asked_n2 = square(force_n)
+    most_n = falcon.slew_n_per_s * min(max(falcon.tick_s, SHORTEST_TICK_S), LONGEST_TICK_S)
+    if square_n2 > most_n * most_n:
+        share = most_n / math.sqrt(square_n2)
+        for axis in range(3):
+            given_n = kept * held_n[axis] + braking * v_mps[axis]
+            force_n[axis] = given_n + share * (force_n[axis] - given_n)
+        shorter = math.sqrt(min(asked_n2 / max(square(force_n), asked_n2), 1.0))
+        for axis in range(3):  # the force held may be longer, or what brakes may point elsewhere
+            force_n[axis] *= shorter
+
 
 FORCE_LIMIT_N: Final = 8.0
 LEAST_MASS_KG: Final = 0.1
@@ -65,13 +175,12 @@ _DATA = 4 * USB_PACKET
 
 FALCON = np.dtype(
     [
-        ("now_ns", np.int64),  # time of the tick; stays first: an emulator reads it here
+        *COMMON,  # the force sent: at the grip's place at the last command
         ("handle", np.intp),  # of the bridge, and
         ("transfer", np.intp),  # address of its function (``bulk.BULK``)
         ("mechanism", MECHANISM),
         ("centre_m", np.float64),  # z of the hand's origin in the Falcon's frame
         ("started", np.int64),  # 1 after the first tick
-        *GATE,  # its force: at the grip's place at the last command
         # the stream
         ("data", np.uint8, (_DATA,)),
         ("packet", np.uint8, (PACKET,)),
@@ -87,7 +196,6 @@ FALCON = np.dtype(
         ("previous_m", np.float64, (3,)),  # the pose before
         ("velocity_mps", np.float64, (3,)),
         ("tick_s", np.float64),  # how long the last one was
-        ("force_limit_n", np.float64),
         ("slew_n_per_s", np.float64),  # growth rate of a force that does not brake the grip
         ("force_n", np.float64, (3,)),  # as it passed the gate
         ("held_n", np.float64, (3,)),  # force of the motors by the command before
@@ -107,7 +215,6 @@ FALCON = np.dtype(
         ("beyond", np.int64),  # positions in a row at the end of the out-stroke
         ("pulled_out", np.int64),  # 1 after it
         ("share", np.float64),  # of the force that passes
-        ("unguarded", np.int64),  # 1: its guard has died: no force passes, and the exchange ends
         ("buttons", np.int64),  # as in two packets in a row
         ("seen_buttons", np.int64),  # as in the last one
         # replies owed
@@ -120,8 +227,6 @@ FALCON = np.dtype(
         ("unsure", np.int64),  # 1: the delay has to be measured
         ("retest", np.int64),  # ticks until it may be
         # counters
-        ("ticks", np.int64),
-        ("fresh", np.int64),  # ticks that gave a position
         ("missing", np.int64),  # ticks without a reply
         ("late", np.int64),  # ticks whose reply was too old, or may have been
         ("refused", np.int64),  # ticks whose reply was not a pose of a homed Falcon, or is in doubt
@@ -253,6 +358,7 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
     if out.size_bytes >= _READING_BYTES:
         out.delay_ticks = falcon.delay
     falcon.fresh += 1
+    falcon.fresh_ns = now_ns
     return READ_NEW
 
 

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numba import types
 
-from study_app.devices.call_gate import FINISHED, FIRST_CAUSE, GATE, enter, leave, outlasted
+from study_app.devices.driver import COMMON, FIRST_CAUSE, enter, leave, outlasted
 from study_app.devices.force_dimension.library import FORCE, FORCE_OFF_CAUSE, STATUS_WORDS
 from study_app.haptics.kernels.c_functions import (
     READ,
@@ -63,7 +63,7 @@ ERROR, BAD_NUMBER, FORCE_OFF, UNGUARDED = range(FIRST_CAUSE, FIRST_CAUSE + 4)  #
 
 FORCE_DIMENSION = np.dtype(
     [
-        ("now_ns", np.int64),  # time of the tick; stays first: an emulator reads it here
+        *COMMON,
         ("id", np.intp),  # of the device, for every function
         ("get_position", np.intp),  # addresses of the functions
         ("get_velocity", np.intp),
@@ -77,10 +77,7 @@ FORCE_DIMENSION = np.dtype(
         ("wrist", np.int64),  # 1 where it measures orientation
         ("gripper", np.int64),  # 1 where it has a gripper
         ("active", np.int64),  # 1 where wrist or gripper have motors, whose torque and force are kept at 0
-        *GATE,
         ("off_cause", np.int64),  # what the device stated where its force is off
-        ("force_limit_n", np.float64),
-        ("unguarded", np.int64),  # 1: its guard has died: no force passes, and the exchange ends
         ("pushes", np.int64),  # 1 where neither zero force nor ``dhdStop`` was accepted at the end
         # what the library fills in
         ("position_m", np.float64, (3,)),
@@ -88,10 +85,7 @@ FORCE_DIMENSION = np.dtype(
         ("rotation", np.float64, (3, 3)),
         ("gap_m", np.float64),
         ("status", np.int32, (STATUS_WORDS,)),
-        ("fresh_ns", np.int64),  # time of the last tick with a new position
         # counters
-        ("ticks", np.int64),
-        ("fresh", np.int64),  # ticks with a new position
         ("guarded", np.int64),  # ticks without, because of the library's time guard
         ("saturated", np.int64),  # forces that the library said the motors could not give
     ],
@@ -125,7 +119,6 @@ _POSITION, _VELOCITY, _ROTATION, _GAP, _STATUS = (
 def new_exchange(force_limit_n: float) -> Any:
     """Return the memory of an exchange, shape (1,), without a device: its address is the device's ``context``."""
     memory = records(FORCE_DIMENSION, 1)
-    memory[0].ended = FINISHED
     memory[0].force_limit_n = force_limit_n
     return memory
 

@@ -12,11 +12,127 @@ import time
 from collections.abc import Sequence
 from ctypes import POINTER, c_bool, c_byte, c_char_p, c_double, c_int, c_ubyte, c_uint, c_ushort, c_void_p
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
-from study_app.devices.failure_table import DeviceFailure
-from study_app.devices.force_dimension.failures import CAUSES, FAILURES, VARIABLE
+from study_app.devices.doctor import DeviceFailure, FailureMode, FailureTable
+
+VARIABLE: Final = "LIQUID_STUDY_DHD_LIBRARY"
+OPTION: Final = "dhd-library"
+
+FAILURES: Final = FailureTable(
+    "the Force Dimension device",
+    (
+        FailureMode(
+            "no-library",
+            "the maker's library is installed",
+            "Force Dimension's library cannot be loaded",
+            "the Force Dimension SDK is not installed, is for another processor, or is at an unusual place",
+            f"install it from forcedimension.com, or give the path of libdrd or drd64.dll by --{OPTION} or {VARIABLE}",
+            "the operating system's loader finds no library",
+        ),
+        FailureMode(
+            "old-library",
+            "the library has every function that is used",
+            "Force Dimension's library lacks functions",
+            "it is older than SDK 3.17, or it is libdhd, which is a part of libdrd only",
+            f"install SDK 3.17.5 or later, and give the path of libdrd or drd64.dll by --{OPTION} or {VARIABLE}",
+            "symbols that the loaded library does not export",
+        ),
+        FailureMode(
+            "no-device",
+            "a device is connected and can be opened",
+            "the library opens no such device",
+            "none is connected, it has no power, another program uses it, or the user may not access USB",
+            "connect cable and power, close other programs, check the serial number, on Linux install the maker's udev "
+            "rules",
+            "dhdOpen or dhdOpenSerial returns -1",
+        ),
+        FailureMode(
+            "uncalibrated",
+            "the device is calibrated",
+            "the device is not calibrated",
+            "it was not calibrated since it was turned on",
+            "put the handle's calibration pole into its pit (or at its rest position) until the light stops blinking",
+            "drdIsInitialized, or the device's status RESET",
+        ),
+        FailureMode(
+            "safety",
+            "the controller's own safety functions are on",
+            "a safety function of the controller is off",
+            "another program turned it off",
+            "turn the device off and on, and calibrate it",
+            "dhdGetVelocityThreshold returns an error or 0, or dhdSetTimeGuard returns an error",
+        ),
+        FailureMode(
+            "max-force",
+            "the library permits the force limit of the study",
+            "the library limits the force to less than the study needs",
+            "another program set the limit, or the device is weaker",
+            "turn the device off and on, or lower force_limit_n in the protocol",
+            "dhdGetMaxForce",
+        ),
+        FailureMode(
+            "force-off",
+            "the device's force is enabled",
+            "the device turned its force off",
+            "its force button, its velocity threshold, its watchdog or a USB error ended the force",
+            "let the handle rest, press the device's force button, close other programs, and connect again",
+            "status FORCE is 0; the device states the cause",
+        ),
+        FailureMode(
+            "error",
+            "every call of the library succeeds",
+            "the library reports an error",
+            "the device was disconnected or lost power, or USB failed",
+            "check cable and power, and connect again",
+            "a negative result of dhdGetPosition, dhdSetForce or dhdGetStatus",
+        ),
+        FailureMode(
+            "not-finite",
+            "every position is a finite number",
+            "the library gave a position that is not a finite number",
+            "the device lost its calibration, or an encoder failed",
+            "turn the device off and on, and calibrate it",
+            "dhdGetPosition",
+        ),
+        FailureMode(
+            "unguarded",
+            "the guard process of a device without a watchdog runs",
+            "the guard process has died, so the force was turned off",
+            "another program ended it",
+            "start this program again",
+            "the guard process ends before it is dismissed",
+        ),
+        FailureMode(
+            "hangs",
+            "every call of the library returns",
+            "a call of the library does not return",
+            "the USB connection is disturbed, or the device stopped responding",
+            "turn the device off, and start this program again",
+            "a call that lasts longer than half a second",
+        ),
+        FailureMode(
+            "rate",
+            "the device keeps up with 1 kHz",
+            "the device gives fewer than 900 new positions per second",
+            "the USB connection or the computer is too slow, or the library's time guard refuses most readings",
+            "connect the device directly to the computer, and close other programs",
+            "new positions per second while it runs",
+        ),
+    ),
+    frozenset({"no-library", "no-device"}),
+)
+CAUSES: Final = {
+    1: "force button",
+    2: "velocity threshold",
+    3: "watchdog",
+    4: "software",
+    5: "USB disconnected",
+    6: "dead-man switch",
+}
+"""Of status FORCE_OFF_CAUSE: dhdc.h 3.17.5, lines 199 to 206."""
+
 
 _OUT: Final = POINTER(c_double)
 SIGNATURES: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
@@ -87,6 +203,8 @@ class Library:
     path : of the library; None: as the environment variable states, else the usual names
     """
 
+    id = -1  # of the open device
+
     def __init__(self, path: str | Path | None = None) -> None:
         self._functions = _load(path)
         missing = [name for name in SIGNATURES if not hasattr(self._functions, name)]
@@ -112,20 +230,21 @@ class Library:
         """Return where a function is, for compiled code."""
         return int(ctypes.cast(getattr(self._functions, name), c_void_p).value or 0)
 
-    def open(self, serial: int | None) -> int:
-        """Open the device with this serial number, or the first one; return its id.
+    def open(self, serial: str) -> Self:
+        """Open the device with this serial number; "": the first one.
 
         Raises
         ------
         DeviceFailure
             There is none that can be opened.
         """
-        found = self._functions.dhdOpen() if serial is None else self._functions.dhdOpenSerial(serial)
+        found = self._functions.dhdOpenSerial(int(serial)) if serial else self._functions.dhdOpen()
         if found < 0:
             raise FAILURES.failure("no-device", self._last_error())
-        return int(found)
+        self.id = int(found)
+        return self
 
-    def prepare(self, device: int, force_limit_n: float) -> dict[str, Any]:
+    def prepare(self, force_limit_n: float) -> dict[str, Any]:
         """Check an open device, keep its safety functions on, and enable its force; return what the receipt records.
 
         Raises
@@ -133,15 +252,15 @@ class Library:
         DeviceFailure
             It is not calibrated, not safe, or its force cannot be enabled.
         """
-        call = self._functions
-        if not call.drdIsInitialized(device) or self._status(device)[RESET]:
+        call, device = self._functions, self.id
+        if not call.drdIsInitialized(device) or self._status()[RESET]:
             raise FAILURES.failure("uncalibrated")
         most_n = float(call.dhdGetMaxForce(device))
         if 0.0 <= most_n < force_limit_n:
             raise FAILURES.failure("max-force", f"{most_n:g} N instead of {force_limit_n:g} N")
-        safety = self._keep_safe(device)
+        safety = self._keep_safe()
         call.dhdSetGravityCompensation(1, device)
-        self._enable_force(device)
+        self._enable_force()
         serial, mass = c_ushort(), c_double()
         has_serial = call.dhdGetSerialNumber(serial, device) >= 0
         has_mass = call.dhdGetEffectorMass(mass, device) >= 0 and math.isfinite(mass.value)
@@ -158,22 +277,18 @@ class Library:
             "effector_mass_kg": mass.value if has_mass else None,
             "max_force_n": most_n if most_n >= 0.0 else None,
             **safety,
-            **self._dynamics(device),
+            **self._dynamics(),
         }
 
-    def close(self, device: int) -> None:
-        """Close a device; the force was ended before."""
-        self._functions.dhdClose(device)
-
-    def abandon(self, device: int) -> bool:
-        """End the force and close a device that could not be prepared; return whether it accepted the end."""
-        answers = self._functions.dhdSetForce(0.0, 0.0, 0.0, device), self._functions.dhdStop(device)
-        self._functions.dhdClose(device)
+    def close(self) -> bool:
+        """End the force and close the device; return whether it accepted the end."""
+        answers = self._functions.dhdSetForce(0.0, 0.0, 0.0, self.id), self._functions.dhdStop(self.id)
+        self._functions.dhdClose(self.id)
         return any(answer >= 0 for answer in answers)
 
-    def _keep_safe(self, device: int) -> dict[str, Any]:
+    def _keep_safe(self) -> dict[str, Any]:
         """Keep the safety functions on and return them; a watchdog, if there is one, is set to its longest: 32 ms."""
-        call, threshold, watchdog = self._functions, c_uint(), c_ubyte()
+        call, device, threshold, watchdog = self._functions, self.id, c_uint(), c_ubyte()
         call.dhdEnableExpertMode()
         try:
             if call.dhdSetTimeGuard(DEFAULT_TIME_GUARD, device) < 0:
@@ -189,22 +304,23 @@ class Library:
             "watchdog_s": watchdog.value * WATCHDOG_S if watched and watchdog.value else None,
         }
 
-    def _dynamics(self, device: int) -> dict[str, Any]:
+    def _dynamics(self) -> dict[str, Any]:
         """Return delay [s], encoder count [m] and least mass [kg] at the handle; None for what the library lacks."""
-        mode = int(self._functions.dhdGetComMode(device))
-        round_trip_s = self._round_trip_s(device)
+        mode = int(self._functions.dhdGetComMode(self.id))
+        round_trip_s = self._round_trip_s()
         self._functions.dhdEnableExpertMode()
         try:
-            count_m, mass_kg = self._in_the_middle(device)
+            count_m, mass_kg = self._in_the_middle()
         finally:
             self._functions.dhdDisableExpertMode()
         # In other modes than SYNC the next exchange begins while one is under way: a position may be that much older.
         delay_s = round_trip_s if round_trip_s is None or mode == SYNC else 2 * round_trip_s
         return {"com_mode": mode, "delay_s": delay_s, "count_m": count_m, "mass_kg": mass_kg}
 
-    def _round_trip_s(self, device: int) -> float | None:
+    def _round_trip_s(self) -> float | None:
         """Return the 90th percentile of the time that a zero force and a new position take [s]."""
-        call, place, taken = self._functions, [c_double() for _ in range(3)], []
+        call, device, taken = self._functions, self.id, []
+        place = [c_double() for _ in range(3)]
         for _ in range(ROUND_TRIPS):
             time.sleep(0.001)  # the time guard answers earlier readings from memory
             began_s = time.perf_counter()
@@ -216,7 +332,7 @@ class Library:
                 taken.append(time.perf_counter() - began_s)
         return sorted(taken)[int(0.9 * len(taken))] if taken else None
 
-    def _in_the_middle(self, device: int) -> tuple[float | None, float | None]:
+    def _in_the_middle(self) -> tuple[float | None, float | None]:
         """Return the longest motion within an encoder count [m] and the least mass [kg] in the workspace's middle.
 
         The maker's kinematics and inertia matrix compute both for the model and its calibration: no document states
@@ -224,7 +340,7 @@ class Library:
         """
         import numpy as np  # noqa: PLC0415 - the guard, which loads this module, needs no arrays
 
-        call, encoders = self._functions, [c_int() for _ in range(3)]
+        call, device, encoders = self._functions, self.id, [c_int() for _ in range(3)]
         if call.dhdDeltaPositionToEncoder(0.0, 0.0, 0.0, *encoders, device) < 0:
             return None, None
         counts = [encoder.value for encoder in encoders]
@@ -251,24 +367,24 @@ class Library:
             least_kg = float(np.linalg.eigvalsh(linear - coupled @ np.linalg.pinv(turning) @ coupled.T).min())
         return _within(longest_m, COUNT_M), _within(least_kg, MASS_KG)
 
-    def _enable_force(self, device: int) -> None:
+    def _enable_force(self) -> None:
         """Enable the force at zero, and wait until the device says that it is."""
-        call = self._functions
+        call, device = self._functions, self.id
         if call.dhdEnableForce(1, device) < 0:
             raise FAILURES.failure("force-off", self._last_error())
         patience = time.monotonic() + _ENABLE_S
         while True:
             call.dhdSetForce(0.0, 0.0, 0.0, device)
-            status = self._status(device)
+            status = self._status()
             if status[FORCE]:
                 return
             if time.monotonic() > patience:
                 raise FAILURES.failure("force-off", CAUSES.get(status[FORCE_OFF_CAUSE], ""))
             time.sleep(0.01)
 
-    def _status(self, device: int) -> list[int]:
+    def _status(self) -> list[int]:
         words = (c_int * STATUS_WORDS)()
-        if self._functions.dhdGetStatus(words, device) < 0:
+        if self._functions.dhdGetStatus(words, self.id) < 0:
             raise FAILURES.failure("error", f"dhdGetStatus: {self._last_error()}")
         return list(words)
 
@@ -278,8 +394,7 @@ class Library:
 
 def end_force(path: str, serial: str) -> None:
     """Open the device with this serial number ("": the first one), and end its force: what a guard does."""
-    library = Library(path or None)
-    if not library.abandon(library.open(int(serial) if serial else None)):
+    if not Library(path or None).open(serial).close():
         raise FAILURES.failure("error")
 
 

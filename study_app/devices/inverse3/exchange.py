@@ -14,35 +14,34 @@ from typing import Any, Final
 import numpy as np
 from numba import types
 
-from study_app.devices.call_gate import FINISHED, FIRST_CAUSE, GATE, RUNS, enter, leave, outlasted
-from study_app.devices.inverse3.frames import (
-    CLOSE,
-    INCOMPLETE,
-    LONGEST_CONTROL,
-    PING,
-    PONG,
-    TEXT,
-    VIOLATION,
-    build_frame,
-    next_key,
-    parse_header,
-)
-from study_app.devices.inverse3.json_scan import (
+from study_app.devices.driver import COMMON, FIRST_CAUSE, RUNS, enter, leave, outlasted
+from study_app.devices.inverse3.wire import (
     BUTTON,
     BUTTONS,
     CALIBRATED,
+    CLOSE,
+    INCOMPLETE,
+    LONGEST_CONTROL,
     NO_DEVICE,
     NOT_FINITE,
     NOT_JSON,
+    PING,
+    PONG,
     POSITION,
     POWER,
     READY,
     SCAN,
+    TEXT,
     UNDERSTOOD,
     VELOCITY,
+    VIOLATION,
+    build_frame,
+    next_key,
+    parse_header,
+    put_fixed,
+    put_text,
     scan,
 )
-from study_app.devices.inverse3.number_text import put_fixed, put_text
 from study_app.haptics.kernels.c_functions import (
     READ,
     READ_LOST,
@@ -79,12 +78,10 @@ CLOSED, BROKE_PROTOCOL, NOT_A_STATE, DEVICE_GONE, NO_POSITION, BAD_NUMBER, NOT_R
 
 INVERSE3 = np.dtype(
     [
-        ("now_ns", np.int64),  # time of the tick; stays first: an emulator reads it here
+        *COMMON,
         ("handle", np.intp),  # of the connection, and
         ("send", np.intp),  # addresses of its functions (``TRANSFER``)
         ("receive", np.intp),
-        *GATE,
-        ("force_limit_n", np.float64),
         # what comes
         ("inbox", np.uint8, (INBOX,)),
         ("filled", np.int64),
@@ -103,12 +100,9 @@ INVERSE3 = np.dtype(
         ("answered", np.int64),  # replies
         ("sent_ns", np.int64, (_LOG,)),
         ("sent_tick", np.int64, (_LOG,)),
-        ("fresh_ns", np.int64),  # time of the last tick that gave a position
         ("age_ns", np.int64),  # since the command whose reply was used last was sent
         ("buttons", np.int64),
         # counters
-        ("ticks", np.int64),
-        ("fresh", np.int64),  # ticks that gave a position
         ("missing", np.int64),  # ticks without a reply
         ("late", np.int64),  # ticks whose reply was too old
         ("skipped", np.int64),  # forces that were not sent because replies stayed out
@@ -135,7 +129,6 @@ def new_exchange(device_id: str, force_limit_n: float, seed: int) -> Any:
     """Return the memory of an exchange, shape (1,), not connected yet: its address is the device's ``context``."""
     memory = records(INVERSE3, 1)
     device = memory[0]
-    device.ended = FINISHED
     device.force_limit_n = force_limit_n
     device.key[0] = seed | 1
     prefix = f'{{"inverse3":[{{"device_id":"{device_id}","commands":{{"set_cursor_force":{{"vector":{{"x":'.encode()

@@ -10,9 +10,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from study_app.devices.simulated.simulated_device import PointedDevice
-from study_app.devices.spacemouse.hid import choose, find_space_mice, load_hid, opened
-from study_app.devices.spacemouse.reports import (
+from study_app.devices.simulated import PointedDevice
+from study_app.devices.spacemouse.hid import (
     DEAD_DEFLECTION,
     FULL_DEFLECTION,
     FULL_SPEED_MPS,
@@ -20,6 +19,10 @@ from study_app.devices.spacemouse.reports import (
     Buttons,
     Displacement,
     Model,
+    choose,
+    find_space_mice,
+    load_hid,
+    opened,
     parse,
     program_buttons,
     velocity_mps,

@@ -22,7 +22,7 @@ from typing import Final, Literal, NamedTuple, Self, TypeAlias
 import numpy as np
 import psutil
 
-from study_app.devices.scripted import TREMOR_M, ScriptedDevice
+from study_app.devices.simulated import TREMOR_M, ScriptedDevice
 from study_app.errors import DeviceLost, ServoFault, StudyError
 from study_app.evidence.soak import ledger, sample_audit
 from study_app.evidence.soak.faulty_device import (

@@ -16,9 +16,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator.emulator import Emulator
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.emulators.falcon import EmulatedFalcon
+from study_app.devices.emulators.falcon_emulator import Emulator
+from study_app.devices.simulated import ScriptedDevice
 from study_app.evidence.stability.bench import FORCE_LIMIT_N, Bench, fast_part, given_out_j, lasts_s, lowest_balance
 from study_app.evidence.stability.closed_loop import TRACE, place
 from study_app.evidence.stability.stability_cases import GRIPS, LETS_GO, Case, scene_of

@@ -13,8 +13,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.devices.hand import hand_of
 from study_app.devices.registry import discover, open_device
-from study_app.devices.simulated.hand_commands import hand_of
 from study_app.evidence.table import TURN_S, Evidence, check_seconds, take_turns
 from study_app.evidence.timing.measurement import PERIOD_NS, ServoLoop, granted
 

@@ -14,7 +14,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.devices.simulated.hand_commands import HandOrders
+from study_app.devices.hand import HandOrders
 from study_app.protocol.orders.schedule import shuffle, stream
 from study_app.protocol.questions import ItemView, Value, shown
 from study_app.protocol.simulated import Rater, TrialFeatures, judgements

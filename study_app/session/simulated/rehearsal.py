@@ -21,9 +21,9 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
+from study_app.devices.hand import hand_of
 from study_app.devices.registry import descriptor_of, discover
 from study_app.devices.rig import Rig, open_rig, study_settings
-from study_app.devices.simulated.hand_commands import hand_of
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.blocks import Block

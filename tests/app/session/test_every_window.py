@@ -182,7 +182,7 @@ class Real(World):
 
 @pytest.fixture
 def real() -> Iterator[Real]:
-    from study_app.devices.scripted import ScriptedDevice
+    from study_app.devices.simulated import ScriptedDevice
     from study_app.haptics.runtime.clocks.clock import VirtualClock
     from study_app.haptics.runtime.servo import Servo
 

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from study_app.devices.emulators.force_dimension import EmulatedForceDimension
 from study_app.devices.force_dimension.device import ForceDimensionDevice
-from study_app.devices.force_dimension.emulated import EmulatedForceDimension
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import ScriptedDevice
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 

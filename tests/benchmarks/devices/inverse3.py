@@ -16,12 +16,11 @@ from typing import Any
 import numpy as np
 from numba import types
 
+from study_app.devices.emulators.inverse3 import EmulatedInverse3
+from study_app.devices.emulators.inverse3_service import Service
 from study_app.devices.inverse3.device import Inverse3Device
-from study_app.devices.inverse3.doctor import EmulatedInverse3
-from study_app.devices.inverse3.emulator.server import ServiceServer
-from study_app.devices.inverse3.emulator.service import Service
 from study_app.devices.inverse3.exchange import INVERSE3
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.kernels.c_functions import (
     NOW,
@@ -41,6 +40,7 @@ from study_app.haptics.model.layout import COMMAND, READING, new_command, new_re
 from study_app.haptics.runtime.clocks.clock import SystemClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
+from tests.devices.inverse3.server import ServiceServer
 
 EXCHANGES = 4000
 ECHO = 1024

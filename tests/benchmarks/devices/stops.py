@@ -21,15 +21,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from study_app.devices.base import Device
-from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator.emulator import Emulator
-from study_app.devices.force_dimension.emulated import EmulatedForceDimension
+from study_app.devices.emulators.falcon import EmulatedFalcon
+from study_app.devices.emulators.falcon_emulator import Emulator
+from study_app.devices.emulators.force_dimension import EmulatedForceDimension
+from study_app.devices.emulators.inverse3_service import Service
+from study_app.devices.hand import HandOrders
 from study_app.devices.inverse3.device import Inverse3Device
-from study_app.devices.inverse3.emulator.server import ServiceServer
-from study_app.devices.inverse3.emulator.service import Service
-from study_app.devices.simulated.hand_commands import HandOrders
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
+from tests.devices.inverse3.server import ServiceServer
 
 IN_FORCE_S = 0.05
 WATCHED_S = 0.15

@@ -21,7 +21,7 @@ import numpy as np
 from PySide6.QtCore import QEventLoop, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
-from study_app.devices.simulated.simulated_device import MouseDevice
+from study_app.devices.simulated import MouseDevice
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load_scene

@@ -6,7 +6,10 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("emulators are C functions", allow_module_level=True)
 
+from study_app.devices.emulators.falcon import EmulatedBackend
+from study_app.devices.emulators.falcon_emulator import ALL_HOMED, Emulator
 from study_app.devices.falcon import boot as booting
+from study_app.devices.falcon import constants
 from study_app.devices.falcon.boot import (
     ATTEMPTS,
     PINGS,
@@ -17,11 +20,8 @@ from study_app.devices.falcon.boot import (
     measure_round_trip,
     set_event_character,
 )
-from study_app.devices.falcon.emulator.emulator import ALL_HOMED, Emulator
-from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure, usb_failure
-from study_app.devices.falcon.transport.usb import PyUsbTransport
-from study_app.devices.falcon.wire import constants
+from study_app.devices.falcon.transport import PyUsbTransport
 from tests.devices.falcon.support.firmware_stream import stream
 
 

@@ -9,9 +9,9 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("the exchange is made of C functions", allow_module_level=True)
 
-from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator.emulator import Emulator
-from study_app.devices.falcon.wire.replies import FASTER_READS, GIVEN_UP_READS, RETEST_TICKS, SLOWER_READS
+from study_app.devices.emulators.falcon import EmulatedFalcon
+from study_app.devices.emulators.falcon_emulator import Emulator
+from study_app.devices.falcon.replies import FASTER_READS, GIVEN_UP_READS, RETEST_TICKS, SLOWER_READS
 from study_app.haptics.kernels.c_functions import READ_NEW
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo

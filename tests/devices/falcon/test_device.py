@@ -12,20 +12,17 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
+from study_app.devices.doctor import DeviceFailure
+from study_app.devices.emulators.falcon import EmulatedFalcon
+from study_app.devices.emulators.falcon_emulator import Emulator
+from study_app.devices.falcon import boot, calibration, constants
 from study_app.devices.falcon import device as driver
-from study_app.devices.falcon import firmware
-from study_app.devices.falcon.doctor.weighing import Grip
-from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator.emulator import Emulator
+from study_app.devices.falcon.calibration import Calibration, Grip
+from study_app.devices.falcon.device import PULL_OUT, READY, STROKES, FalconDevice
 from study_app.devices.falcon.failures import FalconLost, UsbFailure
-from study_app.devices.falcon.homing import PULL_OUT, READY, STROKES, NotHomed
-from study_app.devices.falcon.mechanics import calibration
-from study_app.devices.falcon.mechanics.calibration import Calibration
-from study_app.devices.falcon.mechanics.geometry import GEOMETRIES, SAFE_BOX_M
-from study_app.devices.falcon.mechanics.kinematics import REACHED, inverse, new_mechanism
-from study_app.devices.falcon.wire import constants
+from study_app.devices.falcon.mechanics import GEOMETRIES, REACHED, SAFE_BOX_M, inverse, new_mechanism
 from study_app.devices.registry import open_device
-from study_app.devices.scripted import STIFFNESS_NPM
+from study_app.devices.simulated import STIFFNESS_NPM
 from study_app.errors import DeviceError, DeviceLost
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
 from study_app.haptics.model.layout import BUTTON_STOP
@@ -83,7 +80,7 @@ class TestOpening:
         digest = hashlib.sha256(stream()).hexdigest()
         for name in (None, "nvent_firmware.bin"):
             if name is not None:
-                monkeypatch.setitem(firmware.KNOWN, (digest[:16], digest[-8:]), name)
+                monkeypatch.setitem(boot.KNOWN, (digest[:16], digest[-8:]), name)
             with open_device("falcon-emulated", options={"firmware": file}, progress=told.append) as device:
                 assert (device.hand.running, device.hand.homed) == (True, 0b111)
                 described = json.dumps(device.describe())
@@ -123,14 +120,14 @@ class TestOpening:
         with pytest.raises(DeviceError, match=r"200 x 60 x 60 mm is more than a Falcon reaches; 100 x 60 x 60 mm"):
             EmulatedFalcon(workspace_m=(0.1, 0.03, 0.03))
 
-    @pytest.mark.parametrize(("fault", "kind"), [("never_homes", "not-pushed-in"), ("frozen", "limp")])
-    def test_homing_does_not_wait_for_ever(self, fault, kind, told):
+    @pytest.mark.parametrize(("fault", "mode"), [("never_homes", "stroke-in"), ("frozen", "frozen")])
+    def test_homing_does_not_wait_for_ever(self, fault, mode, told):
         emulator = still()
         emulator.faults.on(fault)
         device = EmulatedFalcon(emulator=emulator, progress=told.append, patience_s=3.0)
-        with pytest.raises(NotHomed) as caught:
+        with pytest.raises(DeviceFailure) as caught:
             device.open()
-        assert caught.value.kind == kind
+        assert caught.value.mode == mode
         assert sum(line.startswith("Still homing") for line in told) >= 4
         emulator.faults.off(fault)
         with device:  # it was let go of, and can be homed
@@ -139,8 +136,8 @@ class TestOpening:
     @pytest.mark.parametrize(
         ("at", "happens", "error", "words"),
         [
-            (PULL_OUT, lambda emulator: emulator.hold(0.0, 0.0, 0.0), NotHomed, "pull it fully out"),
-            (STROKES, lambda emulator: emulator.power(False), NotHomed, "power adapter"),
+            (PULL_OUT, lambda emulator: emulator.hold(0.0, 0.0, 0.0), "pull it fully out"),
+            (STROKES, lambda emulator: emulator.power(False), "power adapter"),
             (PULL_OUT, lambda emulator: emulator.faults.on("unplugged"), UsbFailure, "no longer there"),
         ],
     )
@@ -201,7 +198,7 @@ class TestForce:
     @pytest.mark.parametrize("interrupted", ["quiet", "close"])
     def test_an_end_that_is_interrupted_leaves_the_rest_to_the_guard(self, opened, monkeypatch, interrupted):
         guard = opened.guard = Guard()
-        transport, close = opened.transport, opened.transport.close
+        transport, close = opened.connection, opened.connection.close
         ticks = Ticks(opened)
         ticks.after(600, (1.0, 1.0, 1.0))
 
@@ -287,7 +284,7 @@ class TestGuard:
 
     def test_without_its_guard_it_does_not_push(self):
         device = EmulatedFalcon(emulator=still())
-        device.guarded = True
+        device.ends_force = FalconDevice.ends_force
         with device:
             ticks = Ticks(device)
             assert ticks.after(600, (1.0, 1.0, 1.0)) == READ_NEW
@@ -309,7 +306,7 @@ class TestGuard:
 
     def test_a_guard_that_dies_while_it_is_homed_ends_that(self):
         device = EmulatedFalcon(emulator=still(), progress=lambda line: kill() if line == PULL_OUT else None)
-        device.guarded = True
+        device.ends_force = FalconDevice.ends_force
 
         def kill():
             device.guard.child.kill()

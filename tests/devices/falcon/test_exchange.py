@@ -5,8 +5,7 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("the exchange is made of C functions", allow_module_level=True)
 
-from study_app.devices.falcon.exchange import RAMP_S
-from study_app.devices.falcon.wire.constants import (
+from study_app.devices.falcon.constants import (
     ERROR_TIMEOUT,
     FLAG_BLUE,
     FLAG_GREEN,
@@ -16,7 +15,8 @@ from study_app.devices.falcon.wire.constants import (
     ZERO,
     quiet_packet,
 )
-from study_app.devices.falcon.wire.packets import FLAGS_AT
+from study_app.devices.falcon.exchange import RAMP_S
+from study_app.devices.falcon.replies import FLAGS_AT
 from study_app.haptics.kernels.c_functions import READ_NEW, READ_NOTHING_NEW
 from tests.devices.falcon.support.scripted_bridge import (
     CENTRE_M,

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.devices.falcon import firmware
-from study_app.devices.falcon.firmware import Block, check
+from study_app.devices.falcon import boot
+from study_app.devices.falcon.boot import Block, check
 from study_app.errors import DeviceError
 from tests.devices.falcon.support.firmware_stream import BLOCKS, stream, words
 
@@ -14,7 +14,7 @@ def reason(data):
     with pytest.raises(DeviceError) as caught:
         check(data)
     text = str(caught.value)
-    assert text.startswith("the file is not a Falcon's firmware: ")
+    assert text.startswith("the Falcon cannot be used: the file is not a Falcon's firmware (")
     assert "nvent_firmware.bin, 8492 bytes" in text
     assert "\n" not in text
     return text
@@ -32,14 +32,14 @@ def test_a_whole_stream_is_told():
 
 def test_a_known_one_is_named(monkeypatch):
     digest = hashlib.sha256(stream()).hexdigest()
-    monkeypatch.setattr(firmware, "KNOWN", {(digest[:16], digest[-8:]): "novint.bin"})
+    monkeypatch.setattr(boot, "KNOWN", {(digest[:16], digest[-8:]): "novint.bin"})
     assert check(stream()).name == "novint.bin"
     assert check(stream(entry=0x3F8004)).name is None
 
 
 def test_the_hash_of_the_usual_one_is_that_which_was_published():
     published = "1119e39c39fab1f37678ea62dfc715b23dd86ee7f13d78f88f707d9f09b896a1"
-    assert firmware.KNOWN[published[:16], published[-8:]] == "nvent_firmware.bin"
+    assert boot.KNOWN[published[:16], published[-8:]] == "nvent_firmware.bin"
 
 
 @pytest.mark.parametrize("cut", [1, 21, 22, 23, 24, 30, 59, 300, 622, 623, 624, 625, 642])

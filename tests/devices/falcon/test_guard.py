@@ -10,24 +10,24 @@ if not hasattr(socket, "AF_UNIX"):
     pytest.skip("no Unix sockets here", allow_module_level=True)
 
 from study_app.devices import guard as guarding
-from study_app.devices.falcon.transport.socket_frames import DESCRIPTOR
-from study_app.devices.falcon.transport.transport import PACKETS, open_transport, quiet
-from study_app.devices.falcon.wire.constants import FLAG_HOMING, quiet_packet
+from study_app.devices.falcon.constants import FLAG_HOMING, quiet_packet
+from study_app.devices.falcon.transport import PACKETS, quiet
 from study_app.devices.guard import PATIENCE_S, watch
 from study_app.errors import DeviceError
+from tests.devices.falcon.served.bridge import DESCRIPTOR, SocketTransport
 from tests.devices.falcon.support.bridges import Server
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("falcon_socket")]
 
-ENDS_TORQUE = "study_app.devices.falcon.transport.transport:end_torque"
+ENDS_TORQUE = "tests.devices.falcon.served.bridge:end_torque"
 QUIET = [quiet_packet(FLAG_HOMING)] * PACKETS
 PUSHING = b"<PPPAPPPAPPPABA>"  # 4095 on every motor, homing on
 
 PROGRAM = """
 import os, signal, sys
-from study_app.devices.falcon.transport.transport import open_transport
+from tests.devices.falcon.served.bridge import SocketTransport
 from study_app.devices.guard import Guard
-transport = open_transport(sys.argv[1])
+transport = SocketTransport(sys.argv[1])
 guard = Guard("falcon", {ends_torque!r}, sys.argv[1])
 {guarded}
 transport.write({packet!r}, 1.0)
@@ -39,7 +39,7 @@ print("pushing", flush=True)
 @pytest.fixture
 def server(tmp_path):
     with Server(tmp_path / "falcon") as server:
-        server.bridge = f"falcon-socket:{tmp_path / 'falcon'}"
+        server.bridge = str(tmp_path / "falcon")
         yield server
 
 
@@ -129,7 +129,7 @@ def test_the_guard_waits_until_the_falcon_is_let_go(server):
 
 
 def test_a_guard_that_is_left_behind_waits_for_the_falcon_to_come_back(tmp_path):
-    guard = guard_for(f"falcon-socket:{tmp_path / 'falcon'}")
+    guard = guard_for(str(tmp_path / "falcon"))
     guard.start()
     guard.leave()  # and does not wait
     assert not guard.watching
@@ -140,7 +140,7 @@ def test_a_guard_that_is_left_behind_waits_for_the_falcon_to_come_back(tmp_path)
 
 
 def test_a_guard_that_was_left_behind_is_recalled_when_the_falcon_is_opened_again(tmp_path, capfd):
-    guard = guard_for(f"falcon-socket:{tmp_path / 'falcon'}")
+    guard = guard_for(str(tmp_path / "falcon"))
     guard.start()
     left = guard.child
     guard.leave()
@@ -176,7 +176,7 @@ def test_a_guard_stands_down_at_a_good_end(server):
 
 
 def test_a_guard_acts_at_a_bad_end(server):
-    transport = open_transport(server.bridge)
+    transport = SocketTransport(server.bridge)
 
     def fail():
         with guard_for(server.bridge):
@@ -210,7 +210,7 @@ def test_a_falcon_that_has_gone_is_told_of(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(guarding.signal, "signal", lambda *_: None)
     with (tmp_path / "ended").open("w+") as ended_at_once:
         monkeypatch.setattr(guarding.sys, "stdin", ended_at_once)
-        assert watch("falcon", ENDS_TORQUE, f"falcon-socket:{tmp_path / 'none'}") == 2
+        assert watch("falcon", ENDS_TORQUE, str(tmp_path / "none")) == 2
     said = capsys.readouterr()
     assert said.out == "ready\n"
     assert said.err.startswith("the device 'falcon' may still push: ")
@@ -238,7 +238,7 @@ def test_a_packet_that_does_not_go_out_does_not_keep_the_others_back():
 
 def test_the_guard_loads_no_compiler():
     code = (
-        "import sys, study_app.devices.guard, study_app.devices.falcon.transport.transport, "
+        "import sys, study_app.devices.guard, study_app.devices.falcon.transport, "
         "study_app.devices.force_dimension.library; sys.exit(bool({'numba', 'pandas', 'PySide6'} & {*sys.modules}))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

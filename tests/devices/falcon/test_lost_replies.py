@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("the exchange is made of C functions", allow_module_level=True)
 
+from study_app.devices.falcon.constants import ERROR_IO, ERROR_NO_DEVICE, ERROR_OVERFLOW, ERROR_TIMEOUT
 from study_app.devices.falcon.exchange import COUNTERS
-from study_app.devices.falcon.wire.constants import ERROR_IO, ERROR_NO_DEVICE, ERROR_OVERFLOW, ERROR_TIMEOUT
-from study_app.devices.falcon.wire.replies import MOST_OWED
+from study_app.devices.falcon.replies import MOST_OWED
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 from tests.devices.falcon.support.scripted_bridge import CENTRE_M, GROWTH_N, PUSH_N, SOMEWHERE_M, Ticks, force_of, reply

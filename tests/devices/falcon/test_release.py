@@ -7,9 +7,9 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("the servo and its devices exist compiled only", allow_module_level=True)
 
-from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator.emulator import Emulator
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.emulators.falcon import EmulatedFalcon
+from study_app.devices.emulators.falcon_emulator import Emulator
+from study_app.devices.simulated import ScriptedDevice
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load

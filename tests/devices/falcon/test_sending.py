@@ -7,7 +7,7 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("records as compiled code has them", allow_module_level=True)
 
-from study_app.devices.falcon.sending import limit_growth
+from study_app.devices.falcon.exchange import limit_growth
 from tests.devices.falcon.support.scripted_bridge import Ticks
 
 

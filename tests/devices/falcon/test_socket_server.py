@@ -17,11 +17,10 @@ if numba.config.DISABLE_JIT:
 if not hasattr(socket, "AF_UNIX"):
     pytest.skip("no Unix sockets here", allow_module_level=True)
 
-from study_app.cli.devices import state_of
-from study_app.devices.falcon.emulator.emulator import Emulator
-from study_app.devices.falcon.emulator.socket_server import EmulatorServer
-from study_app.devices.falcon.wire import constants
+from study_app.devices.emulators.falcon_emulator import Emulator
+from study_app.devices.falcon import constants
 from study_app.errors import DeviceError
+from tests.devices.falcon.served.server import EmulatorServer, state_of
 
 pytestmark = pytest.mark.slow
 
@@ -219,7 +218,7 @@ def test_a_state_is_a_line(emulator):
 
 def command(*words):
     return subprocess.Popen(
-        [sys.executable, "-m", "study_app", "emulate-falcon", *map(str, words)],
+        [sys.executable, "-m", "tests.devices.falcon.served.server", *map(str, words)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

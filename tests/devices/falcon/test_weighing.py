@@ -8,11 +8,10 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices.falcon.doctor.weighing import GRAVITY_MPS2, PLACES_M, Grip, hang, pull
-from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator.emulator import Emulator
-from study_app.devices.falcon.mechanics.calibration import fit, left_over
-from study_app.devices.falcon.mechanics.geometry import GEOMETRIES
+from study_app.devices.emulators.falcon import EmulatedFalcon
+from study_app.devices.emulators.falcon_emulator import Emulator
+from study_app.devices.falcon.calibration import GRAVITY_MPS2, PLACES_M, Grip, fit, hang, left_over, pull
+from study_app.devices.falcon.mechanics import GEOMETRIES
 from study_app.errors import DeviceError
 
 pytestmark = pytest.mark.slow

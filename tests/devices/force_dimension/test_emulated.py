@@ -11,7 +11,7 @@ PATH_S = np.arange(0.0, 4.0, 0.01)
 
 
 def emulated(**settings: Any) -> Any:
-    from study_app.devices.force_dimension.emulated import EmulatedForceDimension
+    from study_app.devices.emulators.force_dimension import EmulatedForceDimension
 
     return EmulatedForceDimension(tremor_m=0.0, **settings)
 
@@ -54,8 +54,8 @@ def test_readings_are_those_of_the_simulated_handle_and_force_acts_on_it() -> No
 @needs_servo
 def test_the_same_handle_through_the_falcons_own_driver_has_the_same_force() -> None:
     """Emulated halves: the Falcon's own driver with its kinematics and motors, and the maker-library driver."""
-    from study_app.devices.falcon.emulated import EmulatedFalcon
-    from study_app.devices.falcon.emulator.emulator import Emulator
+    from study_app.devices.emulators.falcon import EmulatedFalcon
+    from study_app.devices.emulators.falcon_emulator import Emulator
 
     falcon = EmulatedFalcon(emulator=Emulator(running=True, tremor_m=0.0, workspace_m=(0.05, 0.05, 0.05)))
     found = []

@@ -9,9 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE
-from study_app.devices.failure_table import DeviceFailure
-from study_app.devices.force_dimension.failures import VARIABLE
-from study_app.devices.force_dimension.library import LONGEST_WATCHDOG, SIGNATURES, Library, probe
+from study_app.devices.doctor import DeviceFailure
+from study_app.devices.force_dimension.library import LONGEST_WATCHDOG, SIGNATURES, VARIABLE, Library, probe
 from study_app.devices.registry import doctor_of, open_device
 from study_app.errors import DeviceError, DeviceNotFound, ServoFault
 from study_app.haptics.model.device_dynamics import UNKNOWN

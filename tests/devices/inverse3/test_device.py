@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.devices.inverse3 import service_settings
+from study_app.devices.emulators.inverse3 import EmulatedInverse3, EmulatedLink
+from study_app.devices.emulators.inverse3_service import Service
+from study_app.devices.inverse3 import opening
 from study_app.devices.inverse3.device import Inverse3Device, address
-from study_app.devices.inverse3.doctor import EmulatedInverse3, EmulatedLink
-from study_app.devices.inverse3.emulator.service import Service
 from study_app.devices.inverse3.exchange import MOST_UNANSWERED, MOST_WEAKER
 from study_app.devices.inverse3.opening import find_device
 from study_app.devices.registry import open_device
@@ -85,7 +85,7 @@ class TestOpening:
     def test_a_service_that_does_not_confirm_is_used_and_the_receipt_says_so(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("study_app.devices.inverse3.opening.full_state_request", service_settings.zero_force)
+        monkeypatch.setattr("study_app.devices.inverse3.opening.full_state_request", opening.zero_force)
         lines: list[str] = []
         with EmulatedInverse3(progress=lines.append) as device:
             assert device.describe()["service_settings"]["confirmed"] is False

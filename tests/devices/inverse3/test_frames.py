@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study_app.devices.inverse3.frames import (
+from study_app.devices.inverse3.wire import (
     CLOSE,
     INCOMPLETE,
     PING,

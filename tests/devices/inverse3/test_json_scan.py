@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.devices.inverse3.json_scan import (
+from study_app.devices.inverse3.wire import (
     BUTTON,
     BUTTONS,
     CALIBRATED,
-    INCOMPLETE,
     NO_DEVICE,
     NOT_FINITE,
     NOT_JSON,
@@ -22,6 +21,7 @@ from study_app.devices.inverse3.json_scan import (
     SCAN,
     UNDERSTOOD,
     VELOCITY,
+    WITHOUT_POSITION,
     scan,
     text_hash,
 )
@@ -80,7 +80,7 @@ def test_scan_finds_the_numbers_of_its_own_device_in_any_order_of_keys(indent: i
 def test_scan_names_what_is_missing() -> None:
     assert scanned(json.dumps(state(inverse3=[])))[0] == NO_DEVICE
     assert scanned(json.dumps(state()), own="FFFF")[0] == NO_DEVICE
-    assert scanned(json.dumps(state(inverse3=[{"device_id": OWN}])))[0] == INCOMPLETE
+    assert scanned(json.dumps(state(inverse3=[{"device_id": OWN}])))[0] == WITHOUT_POSITION
     for number in ("null", "1e999", "-1e400"):
         assert scanned(json.dumps(state()).replace("-0.0123", number))[0] == NOT_FINITE
 

@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE
-from study_app.devices.failure_table import DeviceFailure
+from study_app.devices.doctor import DeviceFailure
+from study_app.devices.emulators.inverse3_service import Service
 from study_app.devices.inverse3.device import Inverse3Device
-from study_app.devices.inverse3.emulator.server import ServiceServer
-from study_app.devices.inverse3.emulator.service import Service
-from study_app.devices.inverse3.link import SocketLink
-from study_app.devices.inverse3.probe import check_force_scale, force_scale, probe
+from study_app.devices.inverse3.service import SocketLink, check_force_scale, force_scale, probe
 from study_app.errors import DeviceLost
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 from tests.compiled import needs_servo
+from tests.devices.inverse3.server import ServiceServer
 
 pytestmark = [needs_servo, pytest.mark.slow]
 ENOUGH_S = 20.0

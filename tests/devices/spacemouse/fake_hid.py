@@ -3,7 +3,7 @@
 import threading
 from typing import Any
 
-from study_app.devices.spacemouse.reports import MODELS
+from study_app.devices.spacemouse.hid import MODELS
 
 MODEL = {model.name: model for model in MODELS}
 HELD_S = 0.008

@@ -9,11 +9,11 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.spacemouse import hid as spacemouse_hid
 from study_app.devices.spacemouse.device import SpaceMouseDevice
-from study_app.devices.spacemouse.hid import find_space_mice
-from study_app.devices.spacemouse.reports import (
+from study_app.devices.spacemouse.hid import (
     FULL_SPEED_MPS,
     Buttons,
     Displacement,
+    find_space_mice,
     parse,
     program_buttons,
     velocity_mps,

@@ -11,7 +11,7 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import ServoFault
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.layout import LIMITER_STALE, LIMITER_STOP, STATUS_OK

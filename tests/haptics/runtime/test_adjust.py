@@ -12,7 +12,7 @@ if numba.config.DISABLE_JIT:
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.model.layout import LIMITER_FADE
 from study_app.haptics.model.overrides import override_all

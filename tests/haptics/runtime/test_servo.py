@@ -6,7 +6,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.model.layout import LIMITER_FADE
 from study_app.haptics.model.scene import Scene

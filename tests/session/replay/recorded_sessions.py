@@ -9,7 +9,7 @@ import pyarrow as pa  # type: ignore[import-untyped]
 from pyarrow import parquet
 
 from study_app.devices.rig import Rig
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import ScriptedDevice
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Protocol

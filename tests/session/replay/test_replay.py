@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from study_app.devices.rig import Rig
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StoreError
 from study_app.haptics.model import gate
 from study_app.haptics.model.device_dynamics import Dynamics

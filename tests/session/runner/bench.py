@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.rig import Rig
-from study_app.devices.simulated.hand_commands import HandOrders, hand_of
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.pages import TaskPage

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import ScriptedDevice
 from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo

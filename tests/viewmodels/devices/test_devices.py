@@ -11,7 +11,7 @@ from study_app.store.workstation import DEFAULTS, DeviceBench
 from study_app.viewmodels.devices import benches_shown, device_named, devices_shown, looking
 
 MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
-SOCKET = Backend("falcon-socket:PATH", "a Unix socket", READY, "by command")
+EMULATED = Backend("falcon-emulated", "the program", READY, "by command")
 
 
 def falcon(state, why=""):
@@ -54,9 +54,9 @@ def test_a_falcon_is_as_well_as_the_best_way_to_it(ways, word, ready, why):
 
 
 def test_the_preferred_device_is_named_before_anybody_looked_and_if_nobody_knows_it():
-    shown = devices_shown([MOUSE, falcon("connected: FT1"), SOCKET])
+    shown = devices_shown([MOUSE, falcon("connected: FT1"), EMULATED])
     assert device_named("falcon:FT1", shown).title == "Novint Falcon"
-    assert device_named("falcon-socket:/run/f", shown).title == "Falcon behind a socket"
+    assert device_named("falcon-emulated", shown).title == "Emulated Falcon"
     assert device_named("falcon", ()) == looking("falcon")
     assert device_named("falcon", ()).word == "Looking …"
     unknown = device_named("hammer", shown)

@@ -5,9 +5,8 @@ from datetime import date
 import numpy as np
 import pytest
 
-from study_app.devices.falcon.mechanics.calibration import Calibration, calibration_file, fit, load, save
-from study_app.devices.falcon.mechanics.geometry import GEOMETRIES
-from study_app.devices.falcon.mechanics.kinematics import REACHED, inverse, new_mechanism
+from study_app.devices.falcon.calibration import Calibration, calibration_file, fit, load, save
+from study_app.devices.falcon.mechanics import GEOMETRIES, REACHED, inverse, new_mechanism
 from study_app.errors import DeviceError
 
 GEOMETRY = GEOMETRIES["libnifalcon"]

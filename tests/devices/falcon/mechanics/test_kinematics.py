@@ -5,26 +5,24 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from study_app.devices.falcon.mechanics.geometry import (
+from study_app.devices.falcon.constants import MOST_TORQUE
+from study_app.devices.falcon.mechanics import (
     GEOMETRIES,
     OUT_STROKE_M,
-    SAFE_BOX_M,
-    WORKSPACE_M,
-    geometry_named,
-)
-from study_app.devices.falcon.mechanics.kinematics import (
     OUTSIDE,
     REACHED,
+    SAFE_BOX_M,
     START_M,
+    WORKSPACE_M,
     angles,
     forward,
+    geometry_named,
     inverse,
     jacobian,
     motor_units,
     new_mechanism,
     torques,
 )
-from study_app.devices.falcon.wire.constants import MOST_TORQUE
 from study_app.errors import DeviceError
 
 UNITS_PER_NM = 6616.0

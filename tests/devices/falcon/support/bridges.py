@@ -11,18 +11,10 @@ import numpy as np
 import pytest
 import usb.core
 
-from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
+from study_app.devices.emulators.falcon import EmulatedBackend
+from study_app.devices.falcon import constants
 from study_app.devices.falcon.failures import usb_failure
-from study_app.devices.falcon.transport.socket_frames import (
-    ANSWER,
-    BULK_IN,
-    BULK_OUT,
-    CONTROL,
-    DESCRIPTOR,
-    IDENTITY,
-    REQUEST,
-)
-from study_app.devices.falcon.wire import constants
+from tests.devices.falcon.served.bridge import ANSWER, BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR, IDENTITY, REQUEST
 
 
 class Backend(EmulatedBackend):

@@ -6,12 +6,11 @@ from collections import deque
 
 import numpy as np
 
+from study_app.devices.falcon.bulk import BulkCalls
+from study_app.devices.falcon.constants import ENDPOINT_IN, ERROR_TIMEOUT, HOMED_SHIFT, PACKET, SUCCESS, ZERO
 from study_app.devices.falcon.exchange import LEAST_MASS_KG, exchange_functions, new_exchange
-from study_app.devices.falcon.mechanics.geometry import GEOMETRIES
-from study_app.devices.falcon.mechanics.kinematics import REACHED, inverse, new_mechanism
-from study_app.devices.falcon.transport.bulk_calls import BulkCalls
-from study_app.devices.falcon.wire.constants import ENDPOINT_IN, ERROR_TIMEOUT, HOMED_SHIFT, PACKET, SUCCESS, ZERO
-from study_app.devices.falcon.wire.packets import FLAGS_AT, NIBBLES, number, pack
+from study_app.devices.falcon.mechanics import GEOMETRIES, REACHED, inverse, new_mechanism
+from study_app.devices.falcon.replies import FLAGS_AT, NIBBLES, number, pack
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading
 from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n

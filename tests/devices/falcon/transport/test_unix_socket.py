@@ -11,12 +11,10 @@ import pytest
 if not hasattr(socket, "AF_UNIX"):
     pytest.skip("no Unix sockets here", allow_module_level=True)
 
+from study_app.devices.falcon import constants
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure
-from study_app.devices.falcon.transport import unix_socket
-from study_app.devices.falcon.transport.socket_frames import BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR
-from study_app.devices.falcon.transport.transport import open_transport
-from study_app.devices.falcon.transport.unix_socket import SocketTransport
-from study_app.devices.falcon.wire import constants
+from tests.devices.falcon.served import bridge
+from tests.devices.falcon.served.bridge import BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR, SocketTransport
 from tests.devices.falcon.support.bridges import Compiled, Server, both, compiled, warm
 
 
@@ -39,9 +37,9 @@ def transport(server, path):
 
 
 def test_opening_asks_who_is_there_and_closed_it_is_lost(server, path):
-    transport = open_transport(f"falcon-socket:{path}")
+    transport = SocketTransport(str(path))
     assert isinstance(transport, SocketTransport)
-    assert (transport.serial, transport.name) == ("FALC0001", f"falcon-socket:{path}")
+    assert (transport.serial, transport.name) == ("FALC0001", str(path))
     assert server.heard == [bytes([4, 0, 0, 0, 0, 0, 0, 0])]
     transport.close()
     transport.close()
@@ -136,8 +134,8 @@ def test_signals_do_not_cut_a_transfer(server, transport, kind):
 
 @pytest.mark.slow
 def test_an_answer_that_is_late_is_not_taken_for_the_next(server, path, monkeypatch):
-    monkeypatch.setattr(unix_socket, "_GRACE_S", 0)
-    monkeypatch.setattr(unix_socket, "LONGEST_TIMEOUT_MS", 1000)  # then an answer has a second
+    monkeypatch.setattr(bridge, "_GRACE_S", 0)
+    monkeypatch.setattr(bridge, "LONGEST_TIMEOUT_MS", 1000)  # then an answer has a second
     transport = SocketTransport(str(path))
     answer, given_up = server.answer, threading.Event()
     server.answer = lambda kind: (given_up.wait(30), answer(kind))[1]
@@ -170,12 +168,13 @@ def test_nobody_something_or_somebody_else_is_there(path):
 
 @pytest.mark.slow
 @compiled
+@pytest.mark.usefixtures("falcon_socket")
 def test_an_emulated_falcon_is_booted_answers_and_runs_in_the_servo_through_its_socket(path, tmp_path):
-    from study_app.devices.falcon.emulator.emulator import Emulator
-    from study_app.devices.falcon.emulator.socket_server import EmulatorServer
+    from study_app.devices.emulators.falcon_emulator import Emulator
     from study_app.devices.registry import open_device
     from study_app.haptics.runtime.clocks.clock import VirtualClock
     from study_app.haptics.runtime.servo import Servo
+    from tests.devices.falcon.served.server import EmulatorServer
     from tests.devices.falcon.support.firmware_stream import stream
 
     firmware = tmp_path / "firmware.bin"

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.devices.falcon.wire.constants import FLAG_BLUE, FLAG_HOMING, MOST_TORQUE, PACKET, quiet_packet
-from study_app.devices.falcon.wire.packets import PARSER, STATUS, feed, number, pack, put_number, strip
+from study_app.devices.falcon.constants import FLAG_BLUE, FLAG_HOMING, MOST_TORQUE, PACKET, quiet_packet
+from study_app.devices.falcon.replies import PARSER, STATUS, feed, number, pack, put_number, strip
 from study_app.haptics.model.layout import records
 
 # What a packet is, said once more and otherwise: the parser must find what this finds.

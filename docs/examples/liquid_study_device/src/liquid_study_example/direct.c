@@ -2,46 +2,41 @@
  * tick; a library that waits for the device's next sample does not fit here (see mailbox.c). */
 #include "frames.h"
 
-#include <stdatomic.h>
-
-static struct {
-    double force_limit_n;
-    atomic_int open;
-} device;
-
-/* Return the context, 0 where the device cannot be opened. */
-intptr_t direct_open(double force_limit_n) {
-    device.force_limit_n = force_limit_n;
-    device.open = maker_open() == 0;
-    return device.open ? (intptr_t)&device : 0;
+/* Return 0, or what failed. */
+int32_t direct_open(intptr_t context) {
+    (void)context;
+    return maker_open();
 }
 
-void direct_close(intptr_t context) {
-    (void)context;
-    device.open = 0; /* a servo that hung and goes on sends no more */
-    maker_close();
+void direct_close(void) {
+    maker_close(); /* zero force, then let go */
 }
 
 int32_t direct_read(intptr_t context, int64_t now_ns, intptr_t reading) {
+    liquid_study_exchange *exchange = (liquid_study_exchange *)context;
     double position_mm[3], velocity_mmps[3];
     int64_t time_ns;
-    (void)context;
-    (void)now_ns;
-    if (maker_get(position_mm, velocity_mmps, &time_ns) != 0) {
+    if (!enter(exchange)) {
         return LIQUID_STUDY_READ_LOST;
     }
-    fill_reading((liquid_study_reading *)reading, position_mm, velocity_mmps, time_ns);
-    return LIQUID_STUDY_READ_NEW;
+    exchange->now_ns = now_ns;
+    exchange->ticks++;
+    if (maker_get(position_mm, velocity_mmps, &time_ns) != 0) {
+        return leave(exchange, LIQUID_STUDY_READ_LOST);
+    }
+    fill_reading(exchange, (liquid_study_reading *)reading, position_mm, velocity_mmps, time_ns);
+    return leave(exchange, LIQUID_STUDY_READ_NEW);
 }
 
 int32_t direct_write(intptr_t context, intptr_t command) {
+    liquid_study_exchange *exchange = (liquid_study_exchange *)context;
     liquid_study_command *asked = (liquid_study_command *)command;
     double force_n[3];
-    (void)context;
-    limit_force(asked->force_n, device.open ? device.force_limit_n : 0.0, asked->sent_n);
-    if (!device.open) {
+    if (!enter(exchange)) {
+        limit_force(asked->force_n, 0.0, asked->sent_n);
         return LIQUID_STUDY_READ_LOST;
     }
+    limit_force(asked->force_n, exchange->force_limit_n, asked->sent_n);
     to_maker(asked->sent_n, force_n);
-    return maker_set_force(force_n) == 0 ? 0 : LIQUID_STUDY_READ_LOST;
+    return leave(exchange, maker_set_force(force_n) == 0 ? 0 : LIQUID_STUDY_READ_LOST);
 }

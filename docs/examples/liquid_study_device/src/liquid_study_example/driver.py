@@ -1,14 +1,21 @@
-"""The device for the servo: its C functions, their memory, its limits."""
+"""The device for the servo: how it is opened and closed, what can go wrong with it, and what its receipt records."""
 
 import ctypes
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from study_app.devices.base import Device
-from study_app.errors import DeviceNotFound
-from study_app.haptics.model.device_dynamics import Dynamics
+import numpy as np
 
+from liquid_study_example.failures import FAILURES
+from study_app.devices.driver import COMMON, FIRST_CAUSE, FramedDevice
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import records
+
+LOST = FIRST_CAUSE  # LIQUID_STUDY_LOST of liquid_study_device.h
+EXCHANGE = np.dtype(COMMON, align=True)
+DELAY_S = {"direct": 0.0, "mailbox": 1e-3}
+"""How much later than in the tick in which it is written a force acts."""
 MASS_KG = 0.2
 COUNT_M = 1e-6
 VELOCITY_LAG_S = None
@@ -28,64 +35,60 @@ def library():
     (path,) = Path(__file__).parent.glob("_device*")
     loaded = ctypes.CDLL(str(path))
     for way in ("direct", "mailbox"):
-        begin, end = getattr(loaded, f"{way}_open"), getattr(loaded, f"{way}_close")
-        begin.argtypes, begin.restype = [ctypes.c_double], ctypes.c_ssize_t
-        end.argtypes, end.restype = [ctypes.c_ssize_t], None
+        getattr(loaded, f"{way}_open").argtypes = [ctypes.c_ssize_t]
     return loaded
 
 
-class ExampleDevice(Device):
-    """The device, called directly or through a mailbox.
+class Opened(NamedTuple):
+    """The open device."""
 
-    Parameters
-    ----------
-    way : {"direct", "mailbox"}
-        Which C file drives it.
-    delay_s : float
-        How much later than in the tick in which it is written a force acts [s].
-    workspace_m : tuple of float
-        Half extents of where it reaches [m].
-    force_limit_n : float
-        The greatest force it may be asked for [N].
-    """
+    close: object
 
-    def __init__(self, way, *, delay_s, workspace_m=(0.05, 0.05, 0.05), force_limit_n=8.0):
-        self.name = f"example-{way}"
-        self.workspace_m = workspace_m
-        self.force_limit_n = force_limit_n
-        self.context = 0
-        self.read, self.write = CFunction(0), CFunction(0)
-        self._way = way
-        self._delay_s = delay_s
 
-    @property
-    def dynamics(self):
-        """What the limits of the force follow from."""
-        return Dynamics(self._delay_s, COUNT_M, MASS_KG, VELOCITY_LAG_S)
+class ExampleDevice(FramedDevice):
+    """The device, called directly or through a mailbox: ``way``; ``limits`` are those of `FramedDevice`."""
 
-    def open(self):
-        """Make it ready."""
-        self.context = self._function("open")(self.force_limit_n)
-        if self.context == 0:
-            raise DeviceNotFound(f"no device for '{self.name}' is connected: check its cable and its power supply")
-        self.read, self.write = (
-            CFunction(ctypes.cast(self._function(name), ctypes.c_void_p).value) for name in ("read", "write")
-        )
+    failures, running, causes = FAILURES, "lost", {LOST: "lost"}
 
-    def close(self):
-        """Let go of it; a second call does nothing."""
-        if self.context:
-            self._function("close")(self.context)
-            self.context = 0
+    def __init__(self, way, *, workspace_m=(0.05, 0.05, 0.05), force_limit_n=8.0):
+        self.name, self._way = f"example-{way}", way
+        functions = tuple(CFunction(self._address(name)) for name in ("read", "write"))
+        super().__init__(records(EXCHANGE, 1), workspace_m, force_limit_n, functions)
+        self._dynamics = Dynamics(DELAY_S[way], COUNT_M, MASS_KG, VELOCITY_LAG_S)
 
     def _function(self, name):
         return getattr(library(), f"{self._way}_{name}")
 
-    def describe(self):
-        """Return what a receipt records of it."""
-        return {
-            "name": self.name,
-            "workspace_m": list(self.workspace_m),
-            "force_limit_n": self.force_limit_n,
-            "dynamics": self.dynamics.describe(),
-        }
+    def _address(self, name):
+        return ctypes.cast(self._function(name), ctypes.c_void_p).value
+
+    def _connect(self):
+        if self._function("open")(self.context) != 0:
+            raise FAILURES.failure("not-found")
+        return Opened(self._function("close"))
+
+    def _prepare(self, connection):
+        self.memory[:] = records(EXCHANGE, 1)
+        self.exchange.force_limit_n = self.force_limit_n
+        return {}
+
+    def _finish(self, connection):
+        return "stand_down"  # closing the library ends the force
+
+
+class DirectDevice(ExampleDevice):
+    """The device whose library is called."""
+
+    @classmethod
+    def of(cls, request):
+        """Return the device of a request, closed."""
+        return cls("direct", **request.limits)
+
+
+class MailboxDevice(ExampleDevice):
+    """The device whose library owns the 1 kHz thread."""
+
+    @classmethod
+    def of(cls, request):
+        """Return the device of a request, closed."""
+        return cls("mailbox", **request.limits)

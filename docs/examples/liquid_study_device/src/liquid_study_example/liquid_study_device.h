@@ -52,6 +52,24 @@ typedef struct {
     double sent_n[3];        /* force_n; where the device sends another force, WRITE puts that here */
 } liquid_study_command;
 
+/* The begin of a driver's memory, whose address is `context`: study_app.devices.driver fills and reads it. */
+typedef struct {
+    int64_t now_ns;          /* of the last READ */
+    int64_t ended;           /* a value below, or your own cause from LIQUID_STUDY_LOST on: calls are rejected */
+    int64_t inside;          /* 1 while a call uses the device */
+    int64_t unguarded;       /* 1: the guard process has died: send no force */
+    double sent_n[3];        /* the force that acts since the last WRITE */
+    double force_limit_n;
+    int64_t fresh_ns;        /* of the last READ with a new sample */
+    int64_t ticks;           /* READs so far */
+    int64_t fresh;           /* of them, how many had a new sample */
+} liquid_study_exchange;
+
+#define LIQUID_STUDY_RUNS 0
+#define LIQUID_STUDY_RELEASED 1 /* closed by the program, or not open */
+#define LIQUID_STUDY_FINISHED 2 /* closed, and the force ended by a call that outlasted that */
+#define LIQUID_STUDY_LOST 3
+
 /* READ: fill in the record, and return a code above. `now_ns` is the servo's monotonic clock. */
 typedef int32_t (*liquid_study_read)(intptr_t context, int64_t now_ns, intptr_t reading);
 

@@ -40,7 +40,6 @@ typedef struct {
 #define TAKE(box) ((box).taken = atomic_exchange(&(box).newest, (box).taken) & 3u, (box).places[(box).taken])
 
 static struct {
-    double force_limit_n;
     MAILBOX(sample) samples;
     MAILBOX(force) forces;
     int64_t written;   /* WRITEs so far; of the servo's thread */
@@ -78,51 +77,58 @@ static void tick(void *unused) {
     }
 }
 
-/* Return the context, 0 where the device cannot be opened. */
-intptr_t mailbox_open(double force_limit_n) {
+/* Return 0, or what failed. */
+int32_t mailbox_open(intptr_t context) {
+    (void)context;
     memset(&device.acting, 0, sizeof device.acting);
-    device.force_limit_n = force_limit_n;
     device.written = device.silent = device.acted = device.acting_ns = 0;
     device.lost = 0;
     RESET(device.samples);
     RESET(device.forces);
     if (maker_open() != 0) {
-        return 0;
+        return -1;
     }
     if (maker_start(tick, 0) != 0) {
         maker_close();
-        return 0;
+        return -1;
     }
-    return (intptr_t)&device;
+    return 0;
 }
 
-void mailbox_close(intptr_t context) {
-    (void)context;
+void mailbox_close(void) {
     maker_close(); /* ends the thread, then zero force */
 }
 
 int32_t mailbox_read(intptr_t context, int64_t now_ns, intptr_t reading) {
+    liquid_study_exchange *exchange = (liquid_study_exchange *)context;
     liquid_study_reading *out = (liquid_study_reading *)reading;
-    (void)context;
-    (void)now_ns;
-    if (device.lost) {
+    if (!enter(exchange)) {
         return LIQUID_STUDY_READ_LOST;
     }
+    exchange->now_ns = now_ns;
+    exchange->ticks++;
+    if (device.lost) {
+        return leave(exchange, LIQUID_STUDY_READ_LOST);
+    }
     if (!IS_NEW(device.samples)) {
-        return LIQUID_STUDY_READ_NOTHING_NEW;
+        return leave(exchange, LIQUID_STUDY_READ_NOTHING_NEW);
     }
     sample newest = TAKE(device.samples);
-    fill_reading(out, newest.position_mm, newest.velocity_mmps, newest.time_ns);
+    fill_reading(exchange, out, newest.position_mm, newest.velocity_mmps, newest.time_ns);
     out->delay_ticks = device.written - newest.acted;
-    return LIQUID_STUDY_READ_NEW;
+    return leave(exchange, LIQUID_STUDY_READ_NEW);
 }
 
 int32_t mailbox_write(intptr_t context, intptr_t command) {
+    liquid_study_exchange *exchange = (liquid_study_exchange *)context;
     liquid_study_command *asked = (liquid_study_command *)command;
+    if (!enter(exchange)) {
+        limit_force(asked->force_n, 0.0, asked->sent_n);
+        return LIQUID_STUDY_READ_LOST;
+    }
     force next = {.number = ++device.written};
-    (void)context;
-    limit_force(asked->force_n, device.force_limit_n, asked->sent_n);
+    limit_force(asked->force_n, exchange->force_limit_n, asked->sent_n);
     memcpy(next.force_n, asked->sent_n, sizeof next.force_n);
     PUT(device.forces, next);
-    return device.lost ? LIQUID_STUDY_READ_LOST : 0;
+    return leave(exchange, device.lost ? LIQUID_STUDY_READ_LOST : 0);
 }

@@ -1,0 +1,144 @@
+"""The devices of the program; a device of another package has its descriptor at an entry point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pkgutil import resolve_name
+from typing import Final
+
+from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, DeviceOption, framed, later, opened
+
+FIRMWARE: Final = DeviceOption(
+    name="firmware",
+    title="Falcon's firmware",
+    help="Program of a Falcon that was switched on since it last ran: its owner has the file.",
+    about="A Falcon needs its firmware after it was turned on, and the licence does not allow us to include it. "
+    "Choose your own firmware file; it is loaded only if the Falcon needs it.",
+    hint="loaded only if the Falcon needs it",
+    placeholder="Not needed if the firmware is already loaded",
+    file_filter="Firmware (*.bin);;All files (*)",
+)
+BY_COMMAND: Final = replace(FIRMWARE, in_windows=False)
+DHD_LIBRARY: Final = DeviceOption(
+    name="dhd-library",
+    title="Force Dimension's library",
+    help="Path of the Force Dimension SDK's library (libdrd.so, libdrd.dylib, drd64.dll).",
+    about="The Force Dimension SDK is installed by its user. Choose its library if it is not found by itself.",
+    hint="only if it is not found by itself",
+    placeholder="Not needed if the library is at its usual place",
+    file_filter="Libraries (*.so* *.dylib *.dll);;All files (*)",
+)
+
+
+def _felt_and_emulated(
+    name: str,
+    title: str,
+    driver: str,
+    emulated: str,
+    failures: str,
+    probes: tuple[str, ...],
+    can: str,
+    *,
+    argument: str = "SERIAL",
+    options: tuple[DeviceOption, ...] = (),
+    emulated_options: tuple[DeviceOption, ...] = (),
+) -> tuple[DeviceDescriptor, DeviceDescriptor]:
+    """Return the descriptors of a device with force and of its emulation; ``can`` says what the latter is."""
+    package, twin = "study_app.devices.", f"{name}-emulated"
+    failures = package + failures
+    return (
+        framed(
+            name,
+            title,
+            package + driver,
+            failures,
+            icon="device",
+            kind="felt",
+            probe=lambda: [resolve_name(package + probe)() for probe in probes],
+            argument=argument,
+            options=options,
+        ),
+        framed(
+            twin,
+            f"Emulated {title.removeprefix('Haply ').removeprefix('Novint ')}",
+            package + emulated,
+            failures,
+            icon="fast_forward",
+            kind="simulated",
+            probe=lambda: [Backend(twin, "the program", READY, can)],
+            moves_by_itself=True,
+            options=emulated_options,
+        ),
+    )
+
+
+DEVICES: Final = (
+    *_felt_and_emulated(
+        "falcon",
+        "Novint Falcon",
+        "falcon.device:FalconDevice",
+        "emulators.falcon:EmulatedFalcon",
+        "falcon.failures:FAILURES",
+        ("falcon.transport:probe", "falcon.transport:probe_ftdi"),
+        "simulated hand; the Falcon's own driver with an emulated Falcon",
+        options=(FIRMWARE,),
+        emulated_options=(BY_COMMAND,),
+    ),
+    *_felt_and_emulated(
+        "force-dimension",
+        "Force Dimension",
+        "force_dimension.device:ForceDimensionDevice",
+        "emulators.force_dimension:EmulatedForceDimension",
+        "force_dimension.library:FAILURES",
+        ("force_dimension.library:probe",),
+        "simulated hand; the Force Dimension driver with emulated library functions; needs no C compiler",
+        options=(DHD_LIBRARY,),
+    ),
+    *_felt_and_emulated(
+        "inverse3",
+        "Haply Inverse3",
+        "inverse3.device:Inverse3Device",
+        "emulators.inverse3:EmulatedInverse3",
+        "inverse3.service:FAILURES",
+        ("inverse3.service:probe",),
+        "simulated hand; the Inverse3's own driver with an emulated Inverse Service",
+        argument="HOST:PORT",
+    ),
+    DeviceDescriptor(
+        name="mouse",
+        title="Mouse",
+        icon="mouse",
+        kind="seen",
+        degrees_of_freedom=3,
+        open=lambda request: opened(resolve_name("study_app.devices.simulated:MouseDevice")(**request.limits)),
+        probe=lambda: [
+            Backend("mouse", "the window", READY, "visual only, no force: the ball moves as it would in the liquid")
+        ],
+        pointer=True,
+    ),
+    DeviceDescriptor(
+        name="scripted",
+        title="Scripted hand",
+        icon="fast_forward",
+        kind="simulated",
+        degrees_of_freedom=3,
+        open=lambda request: opened(
+            resolve_name("study_app.devices.simulated:ScriptedDevice")(request.random, **request.limits)
+        ),
+        probe=lambda: [
+            Backend("scripted", "the program", READY, "simulated hand, no force; every row is marked as simulated")
+        ],
+        moves_by_itself=True,
+    ),
+    DeviceDescriptor(
+        name="spacemouse",
+        title="SpaceMouse",
+        icon="mouse",
+        kind="seen",
+        degrees_of_freedom=3,
+        open=lambda request: opened(
+            resolve_name("study_app.devices.spacemouse.device:SpaceMouseDevice")(**request.limits)
+        ),
+        probe=later("study_app.devices.spacemouse.hid:probe"),
+    ),
+)

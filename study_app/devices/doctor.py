@@ -1,0 +1,215 @@
+"""The diagnosis of a device: its modes of failure as data, the report, and the worker process that examines it.
+
+If ended early, the worker closes the driver, which ends the force; if it does not end, it is killed, and the driver's
+guard ends the force. Loads no compiler.
+"""
+
+import signal
+import sys
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import fill
+from typing import Final, Literal, NoReturn, TypeAlias
+
+from study_app.devices.registry import doctor_of
+from study_app.errors import DeviceError, DeviceNotFound
+from study_app.workers.client import WorkerClient
+from study_app.workers.server import Send, Stop
+
+State = Literal["ok", "found", "not checked"]
+ORDER: Final[tuple[State, ...]] = ("found", "not checked", "ok")
+WIDTH: Final = 100
+NOTHING_WRONG: Final = "No problem was found."
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One failure mode: its ``number`` in the list, and whether it is present.
+
+    The texts are those of its `FailureMode`.
+    """
+
+    number: int
+    id: str
+    tested: str
+    symptom: str
+    state: State
+    cause: str
+    cure: str
+    known_by: str
+    paste: str = ""
+
+    @property
+    def words(self) -> str:
+        """The symptom if it was found, else the tested state."""
+        return self.symptom if self.state == "found" else self.tested
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Observations (``seen``) in words; all ``findings`` in order; the driver's ``failure`` (None: there was none)."""
+
+    seen: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    failure: str | None
+
+    @property
+    def found(self) -> tuple[Finding, ...]:
+        """The failures found."""
+        return tuple(finding for finding in self.findings if finding.state == "found")
+
+    @property
+    def in_order(self) -> tuple[Finding, ...]:
+        """All findings: failures first, then those that could not be checked."""
+        return tuple(sorted(self.findings, key=lambda finding: ORDER.index(finding.state)))
+
+    @property
+    def unseen(self) -> tuple[Finding, ...]:
+        """The findings that could not be checked."""
+        return tuple(finding for finding in self.findings if finding.state == "not checked")
+
+    @property
+    def well(self) -> bool:
+        """Whether no failure was found."""
+        return not self.found and self.failure is None
+
+    @property
+    def conclusion(self) -> str:
+        """The summary, in a sentence."""
+        if not self.well:
+            return f"Found: {len(self.found)}."
+        if self.unseen:
+            return f"Nothing wrong was found. Not checked: {'; '.join(one.tested for one in self.unseen)}."
+        return NOTHING_WRONG
+
+
+def lines(found: Report) -> list[str]:
+    """Return a report as text of 100 columns; commands to paste are on one line."""
+    lines = ["", *(f"seen: {words}" for words in found.seen), ""]
+    for finding in found.in_order:
+        word = "FOUND" if finding.state == "found" else finding.state
+        lines.append(f"{finding.number:>2}  {word:<13}  {finding.words}")
+        if finding.state == "found":
+            lines.append(_indented(f"cause: {finding.cause}", 19))
+            lines.append(_indented(f"cure: {finding.cure}", 19))
+            lines.append(_indented(f"known by: {finding.known_by}", 19))
+            if finding.paste:
+                lines += ["", finding.paste, ""]  # in one line, to be copied
+    lines.append("")
+    if found.failure is not None:
+        lines.append(_indented(found.failure, 0))
+    lines.append(_indented(found.conclusion, 0))
+    return lines
+
+
+def _indented(words: str, by: int) -> str:
+    space = " " * by
+    return fill(words, WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
+
+
+@dataclass(frozen=True, slots=True)
+class FailureMode:
+    """A failure mode: the state without it, its symptom for the user, cause, cure, and how it is detected.
+
+    ``paste`` is the cure as a terminal command of this system, "" if there is none.
+    """
+
+    id: str
+    tested: str
+    symptom: str
+    cause: str
+    cure: str
+    known_by: str
+    paste: str = ""
+
+
+class DeviceFailure(DeviceError):
+    """A device cannot be used; ``mode`` is the id of its `FailureMode`."""
+
+    def __init__(self, mode: str, message: str) -> None:
+        self.mode = mode
+        super().__init__(message)
+
+
+class DeviceFailureNotFound(DeviceFailure, DeviceNotFound):
+    """There is no device, or no software that could find it."""
+
+
+@dataclass(frozen=True, slots=True)
+class FailureTable:
+    """The modes of failure of ``device``, in the order in which they are tested; ``not_found``: it is not there."""
+
+    device: str
+    modes: tuple[FailureMode, ...]
+    not_found: frozenset[str]
+
+    def mode(self, mode: str) -> FailureMode:
+        """Return the mode with this id."""
+        return next(one for one in self.modes if one.id == mode)
+
+    def before(self, mode: str) -> set[str]:
+        """Return the ids of the modes that are tested before this one."""
+        ids = [one.id for one in self.modes]
+        return set(ids[: ids.index(mode)])
+
+    def sentence(self, mode: str, seen: str = "") -> str:
+        """Return symptom, what was ``seen``, cause and cure of a mode in a line."""
+        known = self.mode(mode)
+        detail = f" ({seen})" if seen else ""
+        return f"{known.symptom}{detail}: {known.cause}; {known.cure}"
+
+    def failure(self, mode: str, seen: str = "") -> DeviceFailure:
+        """Return the error to raise for a mode."""
+        kind = DeviceFailureNotFound if mode in self.not_found else DeviceFailure
+        return kind(mode, f"{self.device} cannot be used: {self.sentence(mode, seen)}")
+
+    def findings(self, found: Container[str] = (), passed: Container[str] = ()) -> tuple[Finding, ...]:
+        """Return every mode in its order.
+
+        Parameters
+        ----------
+        found : ids of the modes that were found
+        passed : ids of those that were tested and not found; others count as not checked
+        """
+
+        def finding(number: int, mode: FailureMode) -> Finding:
+            state: State = "found" if mode.id in found else "ok" if mode.id in passed else "not checked"
+            texts = mode.cause, mode.cure, mode.known_by, mode.paste
+            return Finding(number, mode.id, mode.tested, mode.symptom, state, *texts)
+
+        return tuple(finding(number, mode) for number, mode in enumerate(self.modes, start=1))
+
+
+@dataclass(frozen=True, slots=True)
+class Examination:
+    """Which device to examine: ``name`` as ``--device`` takes it, its options, and ``faults`` of an emulated one."""
+
+    name: str
+    options: Mapping[str, str | Path]
+    faults: tuple[str, ...] = ()
+
+
+ExaminationClient: TypeAlias = WorkerClient[Examination, str | Report]
+"""Its answers are lines to show, then the report."""
+
+
+def start_examination(
+    name: str, *, options: Mapping[str, str | Path] | None = None, faults: Sequence[str] = ()
+) -> ExaminationClient:
+    """Start a worker process that examines one device (see `Examination`)."""
+    client: ExaminationClient = WorkerClient("study_app.devices.doctor:carry_out", name="examination")
+    client.order(Examination(name, dict(options or {}), tuple(faults)))
+    return client
+
+
+def carry_out(examination: Examination, send: Send, _stop: Stop) -> Report:
+    """Examine a device, and return the report."""
+    signal.signal(signal.SIGTERM, _leave)
+    name, options, faults = examination.name, examination.options, examination.faults
+    return doctor_of(name).examine(name, options=options, faults=faults, progress=send)
+
+
+def _leave(_number: int, _frame: object) -> NoReturn:
+    """Exit by an exception through every ``with`` block, which closes the device."""
+    sys.exit(0)

@@ -1,0 +1,367 @@
+"""The common part of the drivers whose tick is compiled: opening, gate, guard, failures, receipt, diagnosis, closing.
+
+A driver has a record that begins with the fields of `COMMON`, and two C functions, which the servo calls. A call uses
+the connection between `enter` and `leave` only. `release` rejects further calls and waits for a running one; a call
+that outlasts it ends the force before it returns.
+"""
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any, ClassVar, Final, Literal, Protocol, Self, TypeAlias
+
+import numpy as np
+
+from study_app.devices.base import Device
+from study_app.devices.descriptor import OpenRequest
+from study_app.devices.doctor import DeviceFailure, FailureTable, Report
+from study_app.devices.guard import Guard
+from study_app.devices.hand import hand_of
+from study_app.devices.registry import descriptor_of
+from study_app.errors import DeviceError, DeviceLost, ServoFault
+from study_app.haptics.kernels.c_functions import fence, full_fence
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
+from study_app.user_folder import settings_file
+
+RUNS, RELEASED, FINISHED = range(3)
+"""Values of ``ended``: open; closed by the program, or not open; closed, and ended by a call that outlasted it."""
+FIRST_CAUSE: Final = 3
+"""First value of a driver's own causes for ending the exchange."""
+LEAVE_S: Final = 0.5  # a read or a write takes a few milliseconds at most
+SILENT_NS: Final = 40_000_000  # after 50 ms without a new position the servo ends the force
+SECONDS: Final = 3.0
+LEAST_HZ: Final = 900.0
+MOVE: Final = "Hold the handle and move it a little …"
+_CHUNK_S = 0.25
+
+COMMON: Final[list[tuple[Any, ...]]] = [
+    ("now_ns", np.int64),  # time of the tick; stays first: an emulator reads it here
+    ("ended", np.int64),  # RUNS, or why calls are rejected
+    ("inside", np.int64),  # 1 while a read or write runs, which may use the connection
+    ("unguarded", np.int64),  # 1: the guard has died: no force may be sent
+    ("sent_n", np.float64, (3,)),  # the force that acts since the last command [N, hand frame]
+    ("force_limit_n", np.float64),
+    ("fresh_ns", np.int64),  # time of the last tick with a new position
+    ("ticks", np.int64),
+    ("fresh", np.int64),  # ticks with a new position
+]
+
+
+@kernel
+def enter(device: Any) -> bool:
+    """Return whether the connection may be used, until `leave`."""
+    device.inside = 1
+    full_fence()
+    if device.ended != RUNS:
+        device.inside = 0
+        return False
+    return True
+
+
+@kernel
+def outlasted(device: Any) -> bool:
+    """Return whether the device was closed during this call, which then must end the force before it returns."""
+    if device.ended != RELEASED:
+        return False
+    device.ended = FINISHED
+    return True
+
+
+@kernel
+def leave(device: Any) -> None:
+    """Mark the connection as no longer in use."""
+    fence()
+    device.inside = 0
+
+
+def release(exchange: Any) -> bool:
+    """Reject further calls and wait for a running one; return whether none is left."""
+    if exchange.ended == RUNS:
+        exchange.ended = RELEASED
+    patience = time.monotonic() + LEAVE_S
+    while exchange.inside and time.monotonic() < patience:
+        time.sleep(0.001)
+    return not exchange.inside
+
+
+class Connection(Protocol):
+    """Access to an open device: a library, a socket, a bridge, or an emulated one."""
+
+    def close(self) -> object:
+        """Close it; its force was ended before."""
+        ...
+
+
+AtClose: TypeAlias = Literal["stand_down", "release", "leave"]
+"""After closing the guard is dismissed, ends the force, or does so once the device is connected again."""
+
+
+class FramedDevice(Device):
+    """A device with a record of `COMMON` and more fields, shape (1,), and C functions ``read`` and ``write``.
+
+    A subclass states its failures, connects, and prepares the device with its force at zero.
+    """
+
+    failures: ClassVar[FailureTable]
+    causes: ClassVar[Mapping[int, str]] = {}
+    """Mode of failure of each cause that ends the exchange."""
+    silent: ClassVar[str] = "rate"
+    """Mode of failure of a device that gives no new positions."""
+    running: ClassVar[str]
+    """First mode of failure that appears only while the device runs."""
+    counted: ClassVar[Sequence[str]] = ("ticks", "fresh")
+    ends_force: str | None = None
+    """``guard.Guard``'s function that ends the force if the program dies; None: the device does so itself."""
+
+    def __init__(
+        self, memory: Any, workspace_m: tuple[float, float, float], force_limit_n: float, functions: tuple[Any, Any]
+    ) -> None:
+        self.workspace_m, self.force_limit_n = workspace_m, force_limit_n
+        self.memory, self.exchange = memory, memory[0]
+        self.exchange.ended = FINISHED
+        self.context = int(memory.ctypes.data)
+        self.read, self.write = functions
+        self.found: dict[str, Any] = {}
+        self.connection: Any = None
+        self.guard: Guard | None = None
+        self._left_guard: Guard | None = None  # of a device that may still exert force
+        self._dynamics = UNKNOWN
+
+    @classmethod
+    def of(cls, request: OpenRequest) -> Self:
+        """Return the device of a request, closed."""
+        raise NotImplementedError
+
+    def _connect(self) -> Connection:
+        """Return the open connection."""
+        raise NotImplementedError
+
+    def _prepare(self, connection: Any) -> Mapping[str, Any]:
+        """Check the device and fill its memory, with the force at zero; return what the receipt records."""
+        raise NotImplementedError
+
+    def _finish(self, connection: Any) -> AtClose:
+        """End the force by the last commands, if that was not done yet."""
+        raise NotImplementedError
+
+    def open(self) -> None:
+        """Connect, check and prepare the device; its force is zero.
+
+        Raises
+        ------
+        DeviceError
+            It is not there or cannot be used; then nothing is left open.
+        """
+        if self.connection is not None:
+            if self.exchange.ended == RUNS:
+                return
+            self.close()
+        if self.exchange.inside:
+            raise DeviceError(
+                f"a call to the device '{self.name}' does not return: turn it off, and start this program again"
+            )
+        self.connection = self._connect()
+        try:
+            self.found = dict(self._prepare(self.connection))
+        except BaseException:
+            self.close()
+            raise
+        self.exchange.ended = RUNS
+
+    def close(self) -> None:
+        """End the force and close the connection; a second call does nothing.
+
+        While a call of the servo does not return, the connection stays open and guarded, and the call ends the force
+        once it returns; closing again then closes the connection.
+        """
+        if self.connection is None or not release(self.exchange):
+            return
+        connection, self.connection = self.connection, None
+        guard, self.guard = self.guard, None
+        then: AtClose = "release"
+        try:
+            then = self._finish(connection)
+        finally:  # an interrupt prevents neither closing nor the guard
+            try:
+                connection.close()
+            finally:
+                if guard is not None:
+                    self._left_guard = guard if then == "leave" else None
+                    getattr(guard, then)()
+
+    def _start_guard(self, *arguments: str, needed: bool = True) -> None:
+        """Start the guard if needed, whose function takes these arguments, and end one that was left behind."""
+        if needed and self.ends_force is not None:
+            self.guard = Guard(self.name, self.ends_force, *arguments, died=self._lose_guard)
+            self.guard.start()
+        left, self._left_guard = self._left_guard, None
+        if left is not None:
+            left.recall()
+
+    def _lose_guard(self) -> None:
+        """Block every force from now on; called by the guard's thread."""
+        self.exchange.unguarded = 1
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """What the device reports of delay, encoder count and mass, or its bench measured."""
+        return self._dynamics
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What was counted since it was opened."""
+        return {name: int(self.exchange[name]) for name in self.counted}
+
+    @property
+    def failure_mode(self) -> str | None:
+        """The id of what ended the exchange in ``failures``; None while nothing did."""
+        state = self.exchange
+        if state.unguarded:
+            return "unguarded"
+        silent = state.ticks and state.now_ns - state.fresh_ns > SILENT_NS
+        return self.silent if state.ended == RUNS and silent else self.causes.get(int(state.ended))
+
+    @property
+    def failure(self) -> str | None:
+        """Symptom, cause and cure of what ended the exchange in a sentence; None while nothing did."""
+        mode = self.failure_mode
+        return None if mode is None else self.failures.sentence(mode, self._detail(mode))
+
+    def _detail(self, mode: str) -> str:
+        """Return what the device itself states about a failure."""
+        return ""
+
+    def check(self) -> None:
+        """Raise ``DeviceLost`` if its exchange has ended."""
+        if (self.exchange.unguarded or self.exchange.ended != RUNS) and self.failure is not None:
+            raise DeviceLost(self.failure)
+
+    def describe(self) -> dict[str, Any]:
+        """Return what the receipt says of it."""
+        return {
+            "name": self.name,
+            "workspace_m": list(self.workspace_m),
+            "force_limit_n": self.force_limit_n,
+            "dynamics": self.dynamics.describe(),
+            **self.found,
+        }
+
+    def observed(self) -> tuple[str, ...]:
+        """Return what the doctor prints about the open device."""
+        return ()
+
+    def appeared(self, samples: Any) -> set[str]:
+        """Return the modes of failure that a run at rest shows in its samples."""
+        return set() if self.failure_mode is None else {self.failure_mode}
+
+    def take_fault(self, fault: str) -> None:
+        """Have a fault, if it is emulated."""
+        raise DeviceError(f"'{self.name}' cannot be given faults: only {self.name}-emulated can")
+
+
+def framed_device(name: str, request: OpenRequest) -> FramedDevice | None:
+    """Return a device by its name, closed; None: its driver is no `FramedDevice`."""
+    driver = descriptor_of(name).driver
+    device: FramedDevice | None = resolve_name(driver).of(request) if driver else None
+    return device
+
+
+def dynamics_of(
+    delay_s: float | None, count_m: float | None, mass_kg: float | None, *, name: str, serial: str | None
+) -> Dynamics:
+    """Return a device's dynamics: as it reports them, else as its latest bench on this computer measured them.
+
+    Parameters
+    ----------
+    delay_s, count_m, mass_kg : as the device reports them; None: it does not
+    name, serial : by which its bench is kept; settings that cannot be read hold none
+    """
+    with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
+        for bench in json.loads(settings_file().read_bytes())["benches"]:
+            if (bench["name"], bench["serial"]) == (name, serial or ""):
+                count_m = count_m or bench.get("count_m")
+                mass_kg = mass_kg or max(min(bench["mass_kg"]), 0.0)
+    assumed = tuple(word for word, value in (("count_m", count_m), ("mass_kg", mass_kg)) if not value)
+    return Dynamics(delay_s, count_m or UNKNOWN.count_m, mass_kg or UNKNOWN.mass_kg, assumed=assumed)
+
+
+def examine(
+    name: str,
+    *,
+    options: Mapping[str, str | Path] | None = None,
+    faults: Sequence[str] = (),
+    progress: Callable[[str], object],
+    seconds: float = SECONDS,
+) -> Report:
+    """Open a device by the driver of sessions, run it at rest, and return which of its modes of failure appeared.
+
+    Parameters
+    ----------
+    name : as ``--device`` takes it
+    options : values of its options, by name
+    faults : of an emulated device
+    progress : receives instructions, one line at a time
+    seconds : duration of the run
+
+    Raises
+    ------
+    DeviceError
+        It cannot have faults, or not these.
+    """
+    request = OpenRequest(argument=name.partition(":")[2], options=options or {}, progress=progress)
+    device = framed_device(name, request)
+    assert device is not None  # noqa: S101 - a doctor of this kind is that of such a driver
+    for fault in faults:
+        device.take_fault(fault)
+    table = device.failures
+    try:
+        device.open()
+    except DeviceFailure as failed:
+        return Report((), table.findings({failed.mode}, table.before(failed.mode)), str(failed))
+    with device:
+        progress(MOVE)
+        samples, fault_found = run_at_rest(device, seconds)
+        found, fresh_hz = device.appeared(samples), fresh_rate_hz(samples)
+        seen = (*device.observed(), f"new positions per second: {fresh_hz:.0f}")
+    if not found and fresh_hz < LEAST_HZ:
+        found = {"rate"}
+    passed = {one.id for one in table.modes} if fault_found is None else table.before(device.running)
+    return Report(seen, table.findings(found, passed), fault_found)
+
+
+def run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:
+    """Run an open device without force; a simulated hand moves, and its time is virtual.
+
+    Returns
+    -------
+    samples : (n,) array of ``layout.SAMPLE``
+    fault : why the servo stopped itself; None: it did not
+    """
+    hand = hand_of(device)
+    kept: list[Any] = []
+    with Servo(device, clock=None if hand is None else VirtualClock()) as servo:
+        reader = servo.telemetry.reader()
+        for _ in range(max(round(seconds / _CHUNK_S), 1)):
+            if hand is None:
+                time.sleep(_CHUNK_S)
+            else:
+                hand.reach_to(0.01 * (-1) ** len(kept), 0.005, 0.0)
+                servo.advance(round(_CHUNK_S * servo.rate_hz))
+            kept.append(np.asarray(reader.read()).copy())
+        fault = None
+        try:
+            servo.check()
+        except (DeviceLost, ServoFault) as failed:
+            fault = str(failed)
+    return np.concatenate(kept), fault
+
+
+def fresh_rate_hz(samples: Any) -> float:
+    """Return the number of new positions per second in samples at 1 kHz."""
+    return float(samples["fresh"].sum()) / max(len(samples), 1) * 1000.0

@@ -1,0 +1,360 @@
+"""Emulated Falcons as a backend of pyusb, with its ``find``, ``write``, ``read`` and ``ctrl_transfer``.
+
+The descriptors are those of an FT232R with the Falcon's ids: one configuration, one interface of the vendor's class,
+two bulk endpoints. Refusals raise what pyusb's own backend of libusb would raise.
+The driver in front of it is the real one, including pyusb and the C function; the emulator replaces the USB bus. Once
+it is open, the emulator's time is that of the servo's ticks, so that it runs as fast as a rehearsal.
+"""
+
+import errno
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from types import SimpleNamespace
+from typing import Any, Final, Self
+
+import usb.backend  # type: ignore[import-untyped]
+import usb.core  # type: ignore[import-untyped]
+
+from study_app.devices.descriptor import OpenRequest
+from study_app.devices.emulators.falcon_emulator import Emulator
+from study_app.devices.falcon import constants
+from study_app.devices.falcon.bulk import BulkCalls
+from study_app.devices.falcon.device import FalconDevice
+from study_app.devices.falcon.exchange import FORCE_LIMIT_N
+from study_app.devices.falcon.mechanics import WORKSPACE_M
+from study_app.devices.falcon.transport import PyUsbTransport, Transport
+
+_STRINGS: Final = {1: "Novint", 2: constants.PRODUCT}
+_SERIAL_STRING: Final = 3
+_GET_DESCRIPTOR, _STRING_DESCRIPTOR, _ENGLISH = 6, 3, 0x0409
+_DEVICE_TO_HOST: Final = 0x80
+
+_ERRORS: Final = {
+    constants.ERROR_IO: (errno.EIO, "Input/Output Error"),
+    constants.ERROR_ACCESS: (errno.EACCES, "Access denied (insufficient permissions)"),
+    constants.ERROR_NO_DEVICE: (errno.ENODEV, "No such device (it may have been disconnected)"),
+    constants.ERROR_NOT_FOUND: (errno.ENOENT, "Entity not found"),
+    constants.ERROR_BUSY: (errno.EBUSY, "Resource busy"),
+    constants.ERROR_TIMEOUT: (errno.ETIMEDOUT, "Operation timed out"),
+    constants.ERROR_OVERFLOW: (errno.EOVERFLOW, "Overflow"),
+    constants.ERROR_PIPE: (errno.EPIPE, "Pipe error"),
+}
+
+_CONFIGURATION_VALUE: Final = 1
+_DEVICE: Final = {
+    "bLength": 18,
+    "bDescriptorType": 1,
+    "bcdUSB": 0x0200,
+    "bDeviceClass": 0,
+    "bDeviceSubClass": 0,
+    "bDeviceProtocol": 0,
+    "bMaxPacketSize0": 8,
+    "idVendor": constants.VENDOR_ID,
+    "idProduct": constants.PRODUCT_ID,
+    "bcdDevice": 0x0600,
+    "iManufacturer": 1,
+    "iProduct": 2,
+    "iSerialNumber": _SERIAL_STRING,
+    "bNumConfigurations": 1,
+    "port_number": 1,
+    "port_numbers": (1,),
+    "speed": 2,
+}
+_CONFIGURATION: Final = {
+    "bLength": 9,
+    "bDescriptorType": 2,
+    "wTotalLength": 32,
+    "bNumInterfaces": 1,
+    "bConfigurationValue": _CONFIGURATION_VALUE,
+    "iConfiguration": 0,
+    "bmAttributes": 0xA0,
+    "bMaxPower": 45,
+    "extra_descriptors": [],
+}
+_INTERFACE: Final = {
+    "bLength": 9,
+    "bDescriptorType": 4,
+    "bInterfaceNumber": 0,
+    "bAlternateSetting": 0,
+    "bNumEndpoints": 2,
+    "bInterfaceClass": 0xFF,
+    "bInterfaceSubClass": 0xFF,
+    "bInterfaceProtocol": 0xFF,
+    "iInterface": 2,
+    "extra_descriptors": [],
+}
+_ENDPOINTS: Final = (constants.ENDPOINT_IN, constants.ENDPOINT_OUT)
+
+
+@dataclass(slots=True, eq=False)
+class _Handle:
+    emulator: Emulator
+    open: bool = True
+
+
+def _check(code: int) -> None:
+    """Raise what pyusb raises for one of libusb's errors."""
+    if code >= 0:
+        return
+    if code == constants.ERROR_NOT_SUPPORTED:
+        raise NotImplementedError("Operation not supported or unimplemented on this platform")
+    number, words = _ERRORS[code]
+    kind = usb.core.USBTimeoutError if code == constants.ERROR_TIMEOUT else usb.core.USBError
+    raise kind(words, code, number)
+
+
+class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
+    """A bus with only these Falcons; its time is that of the first one."""
+
+    def __init__(self, *emulators: Emulator) -> None:
+        self.emulators = emulators
+        self._claims: dict[int, _Handle] = {}
+
+    # The part of the interface that this program's transport needs besides pyusb.
+
+    def c_calls(self, handle: _Handle) -> BulkCalls:
+        """Return an opened Falcon's interface for compiled code."""
+        return handle.emulator.calls()
+
+    def now_s(self) -> float:
+        """Return the emulated time [s]."""
+        return self.emulators[0].now_ns * 1e-9
+
+    def pause(self, seconds: float) -> None:
+        """Let emulated time pass."""
+        for emulator in self.emulators:
+            emulator.pause(seconds)
+
+    def follow_clock(self, address: int) -> None:
+        """Let the int64 [ns] at this address be the time of all; 0: their own."""
+        for emulator in self.emulators:
+            emulator.follow_clock(address)
+
+    # The interface of pyusb.
+
+    def enumerate_devices(self) -> Iterator[Emulator]:
+        """Yield the Falcons whose cable is in."""
+        return (emulator for emulator in self.emulators if not emulator.faults.is_on("unplugged"))
+
+    def get_device_descriptor(self, dev: Emulator) -> Any:
+        """Return the ids."""
+        return SimpleNamespace(**_DEVICE, bus=1, address=1 + self.emulators.index(dev))
+
+    def get_configuration_descriptor(self, dev: Emulator, config: int) -> Any:
+        """Return the one configuration."""
+        if config != 0:
+            raise IndexError(f"a Falcon has one configuration, number 0, not {config}")
+        return SimpleNamespace(**_CONFIGURATION)
+
+    def get_interface_descriptor(self, dev: Emulator, intf: int, alt: int, config: int) -> Any:
+        """Return the one interface."""
+        if (intf, alt) != (0, 0):
+            raise IndexError(f"a Falcon has one interface, number 0, not {intf}, {alt}")
+        return SimpleNamespace(**_INTERFACE)
+
+    def get_endpoint_descriptor(self, dev: Emulator, ep: int, intf: int, alt: int, config: int) -> Any:
+        """Return one of the two endpoints."""
+        return SimpleNamespace(
+            bLength=7,
+            bDescriptorType=5,
+            bEndpointAddress=_ENDPOINTS[ep],
+            bmAttributes=2,
+            wMaxPacketSize=constants.USB_PACKET,
+            bInterval=0,
+            bRefresh=0,
+            bSynchAddress=0,
+            extra_descriptors=[],
+        )
+
+    def get_parent(self, dev: Emulator) -> None:
+        """Return no hub: it is connected directly."""
+
+    def open_device(self, dev: Emulator) -> _Handle:
+        """Open a Falcon."""
+        if dev.faults.is_on("unplugged"):
+            _check(constants.ERROR_NO_DEVICE)
+        if dev.faults.is_on("access_denied"):
+            _check(constants.ERROR_ACCESS)
+        if dev.faults.is_on("not_supported"):
+            _check(constants.ERROR_NOT_SUPPORTED)
+        return _Handle(dev)
+
+    def close_device(self, dev_handle: _Handle) -> None:
+        """Close it, and give up what was claimed; nothing else changes."""
+        dev_handle.open = False
+        if self._claims.get(id(dev_handle.emulator)) is dev_handle:
+            del self._claims[id(dev_handle.emulator)]
+
+    def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
+        """Choose the only configuration there is."""
+        self._reach(dev_handle)
+
+    def get_configuration(self, dev_handle: _Handle) -> int:
+        """Return the only configuration there is."""
+        self._reach(dev_handle)
+        return _CONFIGURATION_VALUE
+
+    def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
+        """Claim the Falcon."""
+        emulator = self._reach(dev_handle)
+        if intf != 0:
+            _check(constants.ERROR_NOT_FOUND)
+        owner = self._claims.get(id(emulator))
+        if emulator.faults.is_on("busy") or emulator.faults.is_on("kernel_driver") or owner not in {None, dev_handle}:
+            _check(constants.ERROR_BUSY)
+        self._claims[id(emulator)] = dev_handle
+        emulator.claimed()
+
+    def release_interface(self, dev_handle: _Handle, intf: int) -> None:
+        """Release it."""
+        emulator = self._reach(dev_handle)
+        if self._claims.pop(id(emulator), None) is None:
+            _check(constants.ERROR_NOT_FOUND)
+
+    def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
+        """Return whether the kernel's driver is attached."""
+        return self._reach(dev_handle).faults.is_on("kernel_driver")
+
+    def detach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
+        """Detach the kernel's driver."""
+        faults = self._reach(dev_handle).faults
+        if faults.is_on("kernel_driver_stays"):
+            _check(constants.ERROR_ACCESS)
+        faults.off("kernel_driver")
+
+    def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
+        """Transfer bytes out."""
+        code, moved = self._claimed(dev_handle).write(bytes(data), timeout)
+        if moved == 0 or code != constants.ERROR_TIMEOUT:  # what went before the time was out is reported, as by libusb
+            _check(code)
+        return moved
+
+    def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
+        """Transfer bytes in."""
+        code, data = self._claimed(dev_handle).read(len(buff) * buff.itemsize, timeout)
+        if not data or code != constants.ERROR_TIMEOUT:
+            _check(code)
+        buff[: len(data)] = type(buff)("B", data)
+        return len(data)
+
+    def ctrl_transfer(
+        self,
+        dev_handle: _Handle,
+        bmRequestType: int,  # noqa: N803 - pyusb's names
+        bRequest: int,  # noqa: N803
+        wValue: int,  # noqa: N803
+        wIndex: int,  # noqa: N803
+        data: Any,
+        timeout: int,
+    ) -> int:
+        """Carry out a request of the bridge, or return a string descriptor."""
+        emulator = self._reach(dev_handle)
+        if bmRequestType == constants.REQUEST_TYPE:
+            _check(emulator.control(bRequest, wValue))
+            return len(data)
+        if (bmRequestType, bRequest, wValue >> 8) != (_DEVICE_TO_HOST, _GET_DESCRIPTOR, _STRING_DESCRIPTOR):
+            _check(constants.ERROR_PIPE)
+        descriptor = _string_descriptor(wValue & 0xFF, emulator.serial)[: len(data)]
+        data[: len(descriptor)] = type(data)("B", descriptor)
+        return len(descriptor)
+
+    def reset_device(self, dev_handle: _Handle) -> None:
+        """Reset the bridge's port; the device behind it goes on."""
+        _check(self._reach(dev_handle).control(constants.REQUEST_RESET, constants.RESET_ALL))
+
+    def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
+        """Continue after a stall of an endpoint, which never happens."""
+        self._reach(dev_handle)
+
+    def _reach(self, handle: _Handle) -> Emulator:
+        """Return the Falcon behind an open handle, its cable in."""
+        if not handle.open or handle.emulator.faults.is_on("unplugged"):
+            _check(constants.ERROR_NO_DEVICE)
+        return handle.emulator
+
+    def _claimed(self, handle: _Handle) -> Emulator:
+        emulator = self._reach(handle)
+        if self._claims.get(id(emulator)) is not handle:
+            _check(constants.ERROR_IO)
+        return emulator
+
+
+def _string_descriptor(index: int, serial: str) -> bytes:
+    if index == 0:
+        return bytes((4, _STRING_DESCRIPTOR)) + _ENGLISH.to_bytes(2, "little")
+    text = (serial if index == _SERIAL_STRING else _STRINGS.get(index, "")).encode("utf-16-le")
+    return bytes((2 + len(text), _STRING_DESCRIPTOR)) + text
+
+
+PATIENCE_S = 5.0
+_STILL_TICKS = 10  # longer than the pause between two strokes of homing
+
+
+class EmulatedFalcon(FalconDevice):
+    """An emulated Falcon; ``hand`` takes the orders of a simulated participant.
+
+    Parameters
+    ----------
+    random : random numbers for the hand's tremor and the emulator's faults; None: always the same ones
+    firmware : file to load into it; without one its program runs already
+    workspace_m : half extents of the grip's workspace [m]
+    force_limit_n : the greatest force that may be commanded [N]
+    progress : receives instructions while it is opened
+    emulator : an existing one to use
+    options : of ``FalconDevice``
+    """
+
+    name = "falcon-emulated"
+    ends_force = None  # it ends with the program
+
+    def __init__(
+        self,
+        random: Random | None = None,
+        *,
+        firmware: str | Path | None = None,
+        workspace_m: tuple[float, float, float] = WORKSPACE_M,
+        force_limit_n: float = FORCE_LIMIT_N,
+        progress: Callable[[str], object] | None = None,
+        emulator: Emulator | None = None,
+        patience_s: float = PATIENCE_S,
+        **options: Any,
+    ) -> None:
+        super().__init__(
+            firmware=firmware,
+            workspace_m=workspace_m,
+            force_limit_n=force_limit_n,
+            progress=progress,
+            patience_s=patience_s,
+            **options,
+        )
+        self.hand = emulator or Emulator(random, running=firmware is None, workspace_m=workspace_m)
+        self._backend = EmulatedBackend(self.hand)
+
+    @classmethod
+    def of(cls, request: OpenRequest) -> Self:
+        """Return the device of a request, closed."""
+        return cls(request.random, **cls._given(request))
+
+    def take_fault(self, fault: str) -> None:
+        """Have a fault."""
+        self.hand.take(fault)
+
+    def open(self) -> None:
+        """Open it, and wait until the hand has moved the grip to the middle after homing."""
+        super().open()
+        still = 0
+        while still < _STILL_TICKS:
+            self._tick()
+            still = 0 if self.hand.moving else still + 1
+        self._begin_anew()
+        self._backend.follow_clock(self.context)  # FALCON begins with the time of the tick
+
+    def close(self) -> None:
+        """Send zero torque several times and close it; a second call does nothing."""
+        self._backend.follow_clock(0)
+        super().close()
+
+    def _connect(self) -> Transport:
+        return PyUsbTransport(self._backend)

@@ -1,0 +1,237 @@
+"""The emulated USB bridge: an FT232R between the host's transfers and the bytes on the Falcon's line.
+
+Two rings store bytes with their arrival times: ``out`` toward the device, ``back`` from it. A transfer is a small
+simulation in emulated time: it runs to its end and never waits. The chip returns its bytes (two status bytes first)
+when it has 62 bytes, after the event character (not as the first byte), or when the latency timer expires, then even
+without bytes (FTDI AN232B-04).
+
+Time is read at the address ``clock``, and exceeds it by at most a transfer's time-out; without a clock it is the
+emulator's own, which every transfer advances.
+"""
+
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.devices.falcon import constants
+from study_app.haptics.kernels.c_functions import record_at
+from study_app.haptics.kernels.compiled import kernel
+
+OUT_RING: Final = 4096
+BACK_RING: Final = 4096
+OUT_BUFFER: Final = 128  # the chip's own, to the device
+BACK_BUFFER: Final = 256  # and from it
+
+BRIDGE = np.dtype(
+    [
+        ("now_ns", np.int64),  # present time
+        ("clock", np.intp),  # address of an int64 [ns]; 0: its own time
+        ("joined", np.int64),  # 1 once its time is that clock's
+        ("divisor", np.int64),
+        ("latency_ns", np.int64),
+        ("event", np.int64),  # event character; -1: off
+        ("dtr", np.int64),
+        ("sent_ns", np.int64),  # time of the last packet to the host, which restarted the latency timer
+        ("lost", np.int64),  # bytes that found a buffer full
+        ("out", np.uint8, (OUT_RING,)),
+        ("out_ns", np.int64, (OUT_RING,)),  # arrival at the device
+        ("out_divisor", np.int64, (OUT_RING,)),  # duration of each on the line
+        ("out_first", np.int64),  # bytes out_first ... out_last - 1 of all are still on their way
+        ("out_last", np.int64),
+        ("out_free_ns", np.int64),  # the line is busy until
+        ("back", np.uint8, (BACK_RING,)),
+        ("back_ns", np.int64, (BACK_RING,)),  # arrival in the chip
+        ("back_first", np.int64),
+        ("back_last", np.int64),
+        ("back_free_ns", np.int64),
+    ],
+    align=True,
+)
+
+BYTE = np.dtype([("value", np.uint8)])
+WORD = np.dtype([("value", np.int64)])
+byte_at = record_at(BYTE)
+_word_at = record_at(WORD)
+
+USB_NS: Final = 30_000  # least duration of a transfer, in the emulator's own time
+ENDLESS_NS: Final = 3_600_000_000_000
+_BACK_NS: Final = 1_000_000_000  # a clock this far behind is another one, or was reset
+_STATUS = (0x01, 0x60)  # modem status, line status: ready and empty
+_EIGHTHS = (0, 4, 2, 1)  # of a divisor, by its two highest bits
+
+
+@kernel
+def power_up(bridge: Any) -> None:
+    """Reset the bridge to its state after connection: 9600 baud, 16 ms, empty buffers."""
+    bridge.divisor, bridge.latency_ns, bridge.event = constants.BAUD_9600, 16_000_000, -1
+    bridge.dtr = 0
+    bridge.out_first, bridge.back_first = bridge.out_last, bridge.back_last
+    bridge.out_free_ns, bridge.back_free_ns, bridge.sent_ns = bridge.now_ns, bridge.now_ns, bridge.now_ns
+
+
+@kernel
+def begin(bridge: Any) -> int:
+    """Begin a transfer; return the jump of the clock meanwhile, by which all other times must be shifted [ns]."""
+    if bridge.clock == 0:
+        bridge.now_ns += USB_NS
+        return 0
+    clock_ns = _word_at(bridge.clock).value
+    if bridge.joined == 0 or clock_ns < bridge.now_ns - _BACK_NS:
+        bridge.joined = 1
+        return int(clock_ns - bridge.now_ns)
+    bridge.now_ns = max(bridge.now_ns, clock_ns)
+    return 0
+
+
+@kernel
+def end_of(bridge: Any, timeout_ns: int) -> int:
+    """Return the time-out of a transfer that begins now [ns]."""
+    lasting = timeout_ns if timeout_ns > 0 else ENDLESS_NS
+    if bridge.clock == 0:
+        return int(bridge.now_ns + lasting)
+    return int(max(bridge.now_ns, _word_at(bridge.clock).value + lasting))
+
+
+@kernel
+def shift_bridge(bridge: Any, jump_ns: int) -> None:
+    """Shift all times by a duration."""
+    bridge.now_ns += jump_ns
+    bridge.sent_ns += jump_ns
+    bridge.out_free_ns += jump_ns
+    bridge.back_free_ns += jump_ns
+    for k in range(bridge.out_first, bridge.out_last):
+        bridge.out_ns[k % OUT_RING] += jump_ns
+    for k in range(bridge.back_first, bridge.back_last):
+        bridge.back_ns[k % BACK_RING] += jump_ns
+
+
+@kernel
+def byte_ns(divisor: int) -> int:
+    """Return the duration of ten bits at 3 MHz over this divisor [ns]; 0 and 1 mean 1 and 1.5."""
+    eighths = 8 * (divisor & 0x3FFF) + _EIGHTHS[(divisor >> 14) & 3]
+    if divisor == 0:
+        eighths = 8
+    elif divisor == 1:
+        eighths = 12
+    return int(10 * eighths * 1000 // 24)
+
+
+@kernel
+def send(bridge: Any, value: int, end_ns: int) -> bool:
+    """Queue a byte for the device when there is room; return False if there is none until ``end_ns``."""
+    lasting = byte_ns(bridge.divisor)
+    arrival = max(bridge.out_free_ns, bridge.now_ns) + lasting
+    room_ns = arrival - OUT_BUFFER * lasting
+    if room_ns > end_ns or bridge.out_last - bridge.out_first >= OUT_RING:
+        return False
+    bridge.now_ns = max(bridge.now_ns, room_ns)
+    place = bridge.out_last % OUT_RING
+    bridge.out[place] = value
+    bridge.out_ns[place] = arrival
+    bridge.out_divisor[place] = bridge.divisor
+    bridge.out_free_ns = arrival
+    bridge.out_last += 1
+    return True
+
+
+@kernel
+def answer(bridge: Any, value: int, since_ns: int, divisor: int) -> None:
+    """Put a byte from the device on the line, not before ``since_ns``."""
+    if bridge.back_last - bridge.back_first >= BACK_RING:
+        bridge.lost += 1
+        return
+    bridge.back_free_ns = max(bridge.back_free_ns, since_ns) + byte_ns(divisor)
+    place = bridge.back_last % BACK_RING
+    bridge.back[place] = value
+    bridge.back_ns[place] = bridge.back_free_ns
+    bridge.back_last += 1
+
+
+@kernel
+def hand_over_ns(bridge: Any) -> int:
+    """Return when the chip hands its next packet to a host that asks from now on [ns]."""
+    due = bridge.sent_ns + bridge.latency_ns
+    first, held = bridge.back_first, bridge.back_last - bridge.back_first
+    if held >= constants.CHUNK:
+        due = min(due, bridge.back_ns[(first + constants.CHUNK - 1) % BACK_RING])
+    if bridge.event >= 0:
+        for k in range(1, min(held, constants.CHUNK)):
+            if bridge.back[(first + k) % BACK_RING] == bridge.event:
+                due = min(due, bridge.back_ns[(first + k) % BACK_RING])
+                break
+    return int(max(due, bridge.now_ns))
+
+
+@kernel
+def hand_over(bridge: Any, data: int, noise: int) -> int:
+    """Write the present packet to the address ``data``; return its length, including status bytes."""
+    byte_at(data).value = _STATUS[0] ^ (noise & 0xF0)
+    byte_at(data + 1).value = _STATUS[1] ^ ((noise >> 8) & 0xFF)
+    length = constants.STATUS_BYTES
+    while length < constants.USB_PACKET and arrived(bridge) > 0:
+        byte_at(data + length).value = bridge.back[bridge.back_first % BACK_RING]
+        bridge.back_first += 1
+        length += 1
+    bridge.sent_ns = bridge.now_ns
+    return length
+
+
+@kernel
+def arrived(bridge: Any) -> int:
+    """Return whether the chip has a byte for the host."""
+    if bridge.back_first == bridge.back_last:
+        return 0
+    return 1 if bridge.back_ns[bridge.back_first % BACK_RING] <= bridge.now_ns else 0
+
+
+@kernel
+def overflow(bridge: Any) -> None:
+    """Drop bytes that arrived while the chip's buffer was full: all except the oldest."""
+    held = 0
+    for k in range(bridge.back_first, bridge.back_last):
+        if bridge.back_ns[k % BACK_RING] <= bridge.now_ns:
+            held += 1
+    beyond = held - BACK_BUFFER
+    if beyond <= 0:
+        return
+    bridge.lost += beyond
+    for k in range(bridge.back_first + BACK_BUFFER, bridge.back_last - beyond):
+        bridge.back[k % BACK_RING] = bridge.back[(k + beyond) % BACK_RING]
+        bridge.back_ns[k % BACK_RING] = bridge.back_ns[(k + beyond) % BACK_RING]
+    bridge.back_last -= beyond
+
+
+@kernel
+def control(bridge: Any, request: int, value: int) -> None:
+    """Carry out a request of the host; ignore those without an effect on bytes."""
+    if request == constants.REQUEST_RESET:
+        if value in (constants.RESET_ALL, constants.PURGE_RX):
+            _purge_back(bridge)
+        if value in (constants.RESET_ALL, constants.PURGE_TX):
+            _purge_out(bridge)
+    elif request == constants.REQUEST_MODEM:
+        if value & 0x0100:
+            bridge.dtr = value & 1
+    elif request == constants.REQUEST_BAUD:
+        bridge.divisor = value
+    elif request == constants.REQUEST_EVENT_CHARACTER:
+        bridge.event = value & 0xFF if value & constants.EVENT_ENABLED else -1
+    elif request == constants.REQUEST_LATENCY:
+        bridge.latency_ns = 1_000_000 * max(value & 0xFF, 1)
+
+
+@kernel
+def _purge_back(bridge: Any) -> None:
+    while arrived(bridge) > 0:
+        bridge.back_first += 1
+
+
+@kernel
+def _purge_out(bridge: Any) -> None:
+    """Clear bytes whose transfer has not begun."""
+    while bridge.out_last > bridge.out_first:
+        newest = (bridge.out_last - 1) % OUT_RING
+        if bridge.out_ns[newest] - byte_ns(bridge.out_divisor[newest]) <= bridge.now_ns:
+            break
+        bridge.out_last -= 1
+        bridge.out_free_ns = bridge.out_ns[newest] - byte_ns(bridge.out_divisor[newest])

@@ -1,0 +1,221 @@
+"""The driver in front of emulated library functions, whose handle is that of the scripted device.
+
+The servo's part of the driver is the real one: it calls these functions, compiled with the signatures of the maker's,
+at their addresses. No C compiler is needed. Opening through a loaded library is not part of it.
+"""
+
+from functools import cache
+from random import Random
+from typing import Any, Self
+
+import numpy as np
+
+from study_app.devices.descriptor import OpenRequest
+from study_app.devices.force_dimension.device import FORCE_LIMIT_N, WORKSPACE_M, ForceDimensionDevice, Functions
+from study_app.devices.force_dimension.exchange import BUTTONS, FILL, FUNCTIONS, PUSH, PUSH_ALL, STOP, TIMEGUARD, VECTOR
+from study_app.devices.force_dimension.library import FORCE, FORCE_OFF_CAUSE
+from study_app.devices.simulated import TREMOR_M, ScriptedDevice
+from study_app.errors import DeviceError
+from study_app.haptics.kernels.c_functions import READ, READ_NEW, WRITE, c_function, call_at, record_at
+from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, new_command, new_reading, records
+
+NO_FAULT, FAULT_ERROR, FAULT_NAN, FAULT_FORCE_OFF, FAULT_TIMEGUARD = range(5)
+FAULTS = {"error": FAULT_ERROR, "nan": FAULT_NAN, "force-off": FAULT_FORCE_OFF, "time-guard": FAULT_TIMEGUARD}
+FAULT_AFTER = 1000  # readings
+_VELOCITY_THRESHOLD = 2  # its cause in dhdc.h 3.17.5, line 202
+
+EMULATED = np.dtype(
+    [
+        ("clock", np.intp),  # address of the time [ns]
+        ("force_on", np.int64),
+        ("fault", np.int64),
+        ("fault_after", np.int64),  # readings until it appears
+        ("read", np.intp),  # of the simulated device
+        ("write", np.intp),
+        ("context", np.intp),
+        ("reading", READING),
+        ("command", COMMAND),
+    ],
+    align=True,
+)
+_TIME = np.dtype([("ns", np.int64)])
+_NUMBER = np.dtype([("value", np.float64)])
+_WORD = np.dtype([("value", np.int32)])
+_emulated_at, _time_at = record_at(EMULATED), record_at(_TIME)
+_number_at, _word_at = record_at(_NUMBER), record_at(_WORD)
+_call_read, _call_write = call_at(READ), call_at(WRITE)
+_fields = EMULATED.fields
+assert _fields is not None  # noqa: S101 - it is a record
+_READING, _COMMAND = int(_fields["reading"][1]), int(_fields["command"][1])
+
+
+class EmulatedFunctions:
+    """The library's functions, emulated, with one device, whose handle is that of ``hand``."""
+
+    def __init__(self, hand: ScriptedDevice) -> None:
+        self.memory = records(EMULATED, 1)
+        self.state = self.memory[0]
+        self.id = int(self.memory.ctypes.data)
+        self.state.reading = new_reading()[0]
+        self.state.command = new_command()[0]
+        self.state.read, self.state.write = hand.read.address, hand.write.address
+        self.state.context = hand.context
+        self._hand = hand
+
+    def prepare(self, force_limit_n: float) -> dict[str, Any]:
+        """Enable the force."""
+        self.state.force_on = 1
+        names, handle = ("wrist", "gripper", "active_wrist", "active_gripper"), self._hand.dynamics
+        known = {"delay_s": handle.delay_s, "count_m": handle.count_m, "mass_kg": handle.mass_kg}
+        return {"sdk": None, "system": "emulated"} | dict.fromkeys(names, False) | known
+
+    def address(self, name: str) -> int:
+        """Return where an emulated function is."""
+        return int(_functions()[name].address)
+
+    def take(self, fault: str, after: int = 0) -> None:
+        """Have a fault after so many readings.
+
+        Raises
+        ------
+        DeviceError
+            There is no such fault.
+        """
+        if fault not in FAULTS:
+            raise DeviceError(f"fault '{fault}' is not known; choose of: {', '.join(FAULTS)}")
+        self.state.fault, self.state.fault_after = FAULTS[fault], after
+
+    def close(self) -> bool:
+        """Take the force off the handle."""
+        self._hand.close()
+        return True
+
+
+class EmulatedForceDimension(ForceDimensionDevice):
+    """A Force Dimension device of numbers; ``hand`` takes the orders of whoever simulates a participant.
+
+    Parameters
+    ----------
+    random : where the hand's tremor is drawn from; None: always the same one
+    workspace_m : half extents of where the handle shall reach, and can be sent [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    tremor_m : amplitude of the tremor's waves [m]
+    """
+
+    name = "force-dimension-emulated"
+    ends_force = None  # it ends with the program
+
+    def __init__(
+        self,
+        random: Random | None = None,
+        *,
+        workspace_m: tuple[float, float, float] = WORKSPACE_M,
+        force_limit_n: float = FORCE_LIMIT_N,
+        tremor_m: float = TREMOR_M,
+    ) -> None:
+        super().__init__(workspace_m=workspace_m, force_limit_n=force_limit_n)
+        self.hand = ScriptedDevice(random, workspace_m=workspace_m, force_limit_n=force_limit_n, tremor_m=tremor_m)
+        self.hand.measure_velocity()
+        self.emulated = EmulatedFunctions(self.hand)
+        self.emulated.state.clock = self.context  # FORCE_DIMENSION begins with the time of the tick
+
+    @classmethod
+    def of(cls, request: OpenRequest) -> Self:
+        """Return the device of a request, closed."""
+        return cls(request.random, **request.limits)
+
+    def take_fault(self, fault: str) -> None:
+        """Have a fault."""
+        self.emulated.take(fault, FAULT_AFTER)
+
+    def _connect(self) -> Functions:
+        return self.emulated
+
+
+@cache
+def _functions() -> dict[str, Any]:
+    """Compile the emulated functions, by the names of the maker's."""
+    compiled = {
+        "get_position": c_function(VECTOR, _get_position),
+        "get_velocity": c_function(VECTOR, _get_velocity),
+        "get_orientation": c_function(FILL, _not_available),
+        "get_gripper": c_function(FILL, _not_available),
+        "get_buttons": c_function(BUTTONS, _get_buttons),
+        "get_status": c_function(FILL, _get_status),
+        "set_force": c_function(PUSH, _set_force),
+        "set_all_forces": c_function(PUSH_ALL, _set_all_forces),
+        "stop": c_function(STOP, _stop),
+    }
+    return {FUNCTIONS[field]: function for field, function in compiled.items()}
+
+
+def _get_position(x_at: int, y_at: int, z_at: int, device: int) -> int:
+    """Give the position in the maker's axes: x toward the participant, y to the right, z up."""
+    state = _emulated_at(device)
+    faulty = False
+    if state.fault != NO_FAULT:
+        state.fault_after -= 1
+        faulty = state.fault_after < 0
+    if faulty and state.fault == FAULT_TIMEGUARD:
+        return TIMEGUARD
+    if faulty and state.fault == FAULT_ERROR:
+        return -1
+    if faulty and state.fault == FAULT_FORCE_OFF:
+        state.force_on = 0
+    state.reading.measured = 0
+    got = np.int32(_call_read(state.read, state.context, _time_at(state.clock).ns, device + _READING))
+    if got != READ_NEW:
+        return TIMEGUARD if got > READ_NEW else -1
+    position_m = state.reading.position_m
+    _number_at(x_at).value = np.nan if faulty and state.fault == FAULT_NAN else position_m[2]
+    _number_at(y_at).value = position_m[0]
+    _number_at(z_at).value = position_m[1]
+    return 0
+
+
+def _get_velocity(x_at: int, y_at: int, z_at: int, device: int) -> int:
+    reading = _emulated_at(device).reading
+    if reading.measured & MEASURED_VELOCITY == 0:
+        return -1
+    _number_at(x_at).value = reading.velocity_mps[2]
+    _number_at(y_at).value = reading.velocity_mps[0]
+    _number_at(z_at).value = reading.velocity_mps[1]
+    return 0
+
+
+def _not_available(out_at: int, device: int) -> int:
+    return -1
+
+
+def _get_buttons(device: int) -> Any:
+    return np.uint32(_emulated_at(device).reading.buttons)
+
+
+def _get_status(out_at: int, device: int) -> int:
+    state = _emulated_at(device)
+    _word_at(out_at + 4 * FORCE).value = state.force_on
+    _word_at(out_at + 4 * FORCE_OFF_CAUSE).value = 0 if state.force_on != 0 else _VELOCITY_THRESHOLD
+    return 0
+
+
+def _set_force(x_n: float, y_n: float, z_n: float, device: int) -> Any:
+    state = _emulated_at(device)
+    force_n = state.command.force_n
+    on = 1.0 if state.force_on != 0 else 0.0
+    force_n[0], force_n[1], force_n[2] = on * y_n, on * z_n, on * x_n
+    return np.int32(_call_write(state.write, state.context, device + _COMMAND))
+
+
+def _set_all_forces(
+    x_n: float, y_n: float, z_n: float, torque_x: float, torque_y: float, torque_z: float, grip_n: float, device: int
+) -> int:
+    return -1
+
+
+def _stop(device: int) -> Any:
+    """Turn the force off; the handle is free."""
+    state = _emulated_at(device)
+    state.force_on = 0
+    for axis in range(3):
+        state.command.force_n[axis] = 0.0
+    return np.int32(_call_write(state.write, state.context, device + _COMMAND))

@@ -1,0 +1,106 @@
+"""The Inverse3's driver in front of an emulated Inverse Service, whose handle a simulated hand holds.
+
+All of the driver is the real one, down to the bytes of the WebSocket; in place of the socket's functions it calls those
+of the emulator. Once it is open, the emulator's time is that of the servo's ticks.
+"""
+
+from collections.abc import Callable
+from random import Random
+from typing import Any, Self
+
+import numpy as np
+
+from study_app.devices.descriptor import OpenRequest
+from study_app.devices.emulators.inverse3_service import Service, service_calls
+from study_app.devices.inverse3.device import FORCE_LIMIT_N, WORKSPACE_M, Inverse3Device
+from study_app.devices.inverse3.service import FAILURES, Link, TransferCalls
+
+FAULT_AFTER = 1000  # commands
+
+
+class EmulatedLink:
+    """The byte stream to an emulated service: nothing waits, since each command is carried out at once."""
+
+    emulated = True
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        service.connected()
+
+    def calls(self) -> TransferCalls:
+        """Return it as compiled code sees it."""
+        return TransferCalls(*service_calls(self._service))
+
+    def send(self, data: bytes) -> None:
+        """Send all of it."""
+        self._service.take_bytes(data)
+
+    def receive(self, timeout_s: float) -> bytes:
+        """Return what came."""
+        data = self._service.give_bytes()
+        if not data and self._service.state.ended:
+            raise FAILURES.failure("closed", "while it was opened")
+        if not data:
+            raise FAILURES.failure("no-reply", f"nothing within {timeout_s:g} s")
+        return data
+
+    def now_s(self) -> float:
+        """Return the emulated time [s]."""
+        return 1e-9 * float(self._service.state.now_ns)
+
+    def close(self) -> None:
+        """Let the service see the end of the stream."""
+        self._service.disconnected()
+
+
+class EmulatedInverse3(Inverse3Device):
+    """An emulated Inverse3; ``hand`` takes the orders of a simulated participant.
+
+    Parameters
+    ----------
+    random : where the hand's tremor is drawn from; None: always the same one
+    workspace_m : half extents of where the handle shall reach, and can be sent [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    progress : is given what to do while it is opened
+    service : another than a new one
+    """
+
+    name = "inverse3-emulated"
+
+    def __init__(
+        self,
+        random: Random | None = None,
+        *,
+        workspace_m: tuple[float, float, float] = WORKSPACE_M,
+        force_limit_n: float = FORCE_LIMIT_N,
+        progress: Callable[[str], object] | None = None,
+        service: Service | None = None,
+    ) -> None:
+        super().__init__(workspace_m=workspace_m, force_limit_n=force_limit_n, progress=progress)
+        self.hand = service if service is not None else Service(random, workspace_m=workspace_m)
+
+    @classmethod
+    def of(cls, request: OpenRequest) -> Self:
+        """Return the device of a request, closed."""
+        return cls(request.random, progress=request.progress, **request.limits)
+
+    def take_fault(self, fault: str) -> None:
+        """Have a fault."""
+        self.hand.take(fault, FAULT_AFTER)
+
+    def open(self) -> None:
+        """Open the session; from then on the emulator's time is that of the ticks."""
+        super().open()
+        self.exchange.now_ns = np.int64(self.hand.state.now_ns)
+        self.hand.follow_clock(self.context)  # the record begins with the time of the tick
+
+    def close(self) -> None:
+        """Send zero force and a close frame, and close the connection; a second call does nothing."""
+        super().close()
+        self.hand.follow_clock(0)
+
+    def _connect(self) -> Link:
+        return EmulatedLink(self.hand)
+
+    def _force_scale(self) -> Any:
+        return self.hand.force_scale

@@ -1,0 +1,443 @@
+"""The messages of the emulated service, as its documentation shows them.
+
+Written from docs.haply.co: "WebSocket Protocol" 3.5.x, step 1 (inventory) and core rule; "Simulation Channel" 3.5.x
+(a state update has ``state`` and ``status``, a full state ``config``, too); "HTTP" 3.4.x, Devices (``status``, grips).
+Not shown there, so a guess: that a state update has a ``session_id``, and the values of ``control_mode`` but "idle".
+
+
+An emulated Inverse Service with one Inverse3, whose handle a simulated hand holds.
+
+What a session is opened with is read by the standard library's JSON; the commands afterwards are compiled (``stream``).
+Documents: see ``documents``; "Device Configuration" 3.5.x for what ``configure`` takes, "Simulation Channel" 3.5.x for
+``session.force_render_full_state``, "Filters" and "Settings Reference" for the force scale, RFC 6455 §4.2 for the
+handshake.
+"""
+
+import base64
+import copy
+import hashlib
+import json
+import struct
+from random import Random
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.devices.emulators.inverse3_stream import (
+    SERVICE,
+    act,
+    drop,
+    fill,
+    go_on,
+    let_pass,
+    put_bytes,
+    put_frame,
+    rest,
+    stream_functions,
+    take_frames,
+)
+from study_app.devices.hand import HandOrders
+from study_app.devices.simulated import QUANTUM_M, TREMOR_M, new_scripted_handle
+from study_app.errors import DeviceError
+from study_app.haptics.model.layout import records
+
+DEVICE_ID: Final = "EMU1"
+SLOTS: Final = tuple(f"{name}_{axis}" for name in ("position", "velocity", "force") for axis in "xyz")
+SLOT_WIDTH: Final = 14
+_UNIT: Final = {"x": 0, "y": 0, "z": 0}
+FACTORY_CONFIG: Final[dict[str, Any]] = {
+    "type": "inverse3",
+    "port": "EMULATED",
+    "device_info": {"major_version": 7, "minor_version": 4, "id": DEVICE_ID, "device_type": 4, "uuid": "00" * 16},
+    "extended_device_id": "00" * 16,
+    "extended_firmware_version": "00" * 16,
+    "gravity_compensation": {"enabled": True, "scaling_factor": 1.0},
+    "handedness": "right",
+    "streaming_mode": "USB",
+    "torque_scaling": {"enabled": True},
+    "home_return": {"enabled": False},
+    "preset": "defaults",
+    "basis": {"permutation": "XYZ"},
+    "mount": {"position": dict(_UNIT), "rotation": {"w": 1, "x": 0, "y": 0, "z": 0}, "scale": {"x": 1, "y": 1, "z": 1}},
+    "filters": {"force_gate": {"gain": 0.3}, "damping": {"scalar": 0.0}},
+}
+STATUS: Final = {"calibrated": True, "in_use": False, "power_supply": True, "ready": True, "started": True}
+LEGACY_STATE: Final[dict[str, Any]] = {
+    "inverse3": {DEVICE_ID: {"config": {"device_info": {"id": DEVICE_ID}}, "state": {}, "status": {}}}
+}
+"""Format 3.0: an object by device id ("Haply Inverse Service" 3.0.x, Devices)."""
+OF_OPENING: Final = (
+    "not-websocket",
+    "version-3.0",
+    "version-3.1",
+    "no-device",
+    "off",  # no power supply
+    "uncalibrated",
+    "in-use",
+    "gravity-off",  # gravity compensation was turned off for the device
+    "disobeys",  # keeps its own settings
+    "force-scale",
+    "unknown-scale",  # no answer about the force scale
+)
+OF_TIME: Final = (
+    "late",  # each state 30 ms late
+    "slow",  # each state 1.5 ms late: within what the servo is stable with
+    "torn",  # each state in pieces of 300 bytes
+)
+OF_STREAM: Final = (
+    "silent",  # no more states
+    "closes",  # a close frame (RFC 6455 §5.5.1, status 1001), and the end
+    "drops",  # the end of the stream without one
+    "nan",  # a position NaN, which JSON does not have
+    "null",  # a position null
+    "infinite",  # a position 1e999
+    "bad-json",
+    "no-position",
+    "gone",  # the device is no longer listed
+    "power-off",
+    "calibration-lost",
+    "binary",  # a binary frame
+    "masked",  # a masked frame
+    "fragment",  # a message in two frames
+    "too-long",  # a frame that says it is 2^63 - 1 bytes long, the most that RFC 6455 permits
+)
+FAULTS: Final = (*OF_OPENING, *OF_TIME, *OF_STREAM)
+
+
+def config() -> dict[str, Any]:
+    """Return a new configuration with factory values."""
+    return copy.deepcopy(FACTORY_CONFIG)
+
+
+def state_message(
+    status: dict[str, Any], buttons: int, full: dict[str, Any] | None = None, session_id: int = 7
+) -> dict[str, Any]:
+    """Return a state whose numbers are the words of `SLOTS`.
+
+    Parameters
+    ----------
+    buttons : of the wireless grip: a is bit 0
+    full : its configuration, for an inventory or a full state
+    """
+
+    def vector(name: str) -> dict[str, str]:
+        return {axis: f"{name}_{axis}" for axis in "xyz"}
+
+    angles = {"a0": 0.0, "a1": 0.0, "a2": 0.0}
+    state = {
+        "cursor_position": vector("position"),
+        "cursor_velocity": vector("velocity"),
+        "angular_position": angles,
+        "angular_velocity": angles,
+        "body_orientation": {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0},
+        "current_cursor_force": vector("force"),
+        "current_cursor_position": dict(_UNIT),
+        "current_angular_torques": angles,
+        "current_angular_position": angles,
+        "control_domain": "cartesian",
+        "control_mode": "idle",
+    }
+    device: dict[str, Any] = {"device_id": DEVICE_ID}
+    if full is not None:
+        device["config"] = full
+    grip = {
+        "device_id": "0",
+        "state": {"battery_level": 0.8, "buttons": {name: bool(buttons >> k & 1) for k, name in enumerate("abc")}},
+    }
+    return {"session_id": session_id, "inverse3": [device | {"state": state, "status": status}],
+            "wireless_verse_grip": [grip]}  # fmt: skip
+
+
+def template(message: dict[str, Any]) -> tuple[bytes, list[int]]:
+    """Return a message as text with room for its numbers, and where each of `SLOTS` begins; -1 where it is not."""
+    text = json.dumps(message)
+    for slot in SLOTS:
+        text = text.replace(f'"{slot}"', "#" + slot.ljust(SLOT_WIDTH - 1))
+    places = [text.find(f"#{slot}") for slot in SLOTS]
+    for slot in SLOTS:
+        text = text.replace("#" + slot.ljust(SLOT_WIDTH - 1), "0.0".ljust(SLOT_WIDTH))
+    return text.encode(), places
+
+
+def faulty_bytes(fault: str, message: dict[str, Any]) -> bytes:
+    """Return what is sent for a fault of `OF_STREAM` in place of a state, whose numbers are the words of ``SLOTS``."""
+    device = message["inverse3"][0]
+    if fault == "no-position":
+        del device["state"]["cursor_position"]
+    elif fault == "gone":
+        message["inverse3"] = []
+    elif fault == "power-off":
+        device["status"] = device["status"] | {"power_supply": False, "ready": False}
+    elif fault == "calibration-lost":
+        device["status"] = device["status"] | {"calibrated": False}
+    text = json.dumps(message)
+    number = {"nan": "NaN", "null": "null", "infinite": "1e999"}.get(fault, "0.01")
+    text = text.replace(f'"{SLOTS[0]}"', number)
+    for slot in SLOTS:
+        text = text.replace(f'"{slot}"', "0.0")
+    if fault == "bad-json":
+        text = text[:-2]
+    data = text.encode()
+    if fault == "closes":
+        return b"\x88\x02" + struct.pack(">H", 1001)
+    if fault == "too-long":
+        return b"\x81\x7f" + struct.pack(">Q", (1 << 63) - 1)
+    first = {"binary": 0x82, "fragment": 0x01}.get(fault, 0x81)
+    mask = 0x80 if fault == "masked" else 0
+    return bytes([first, mask | 126]) + struct.pack(">H", len(data)) + (b"\0\0\0\0" if mask else b"") + data
+
+
+STOPS_M: Final = (0.10, 0.10, 0.10)
+_ZERO: Final = {"x": 0.0, "y": 0.0, "z": 0.0}
+_GUID: Final = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
+
+
+class Service(HandOrders):
+    """The emulated service; orders go to the hand at the handle.
+
+    Parameters
+    ----------
+    random : where the hand's tremor is drawn from; None: always the same one
+    workspace_m : half extents of where the hand can be sent [m]
+    tremor_m : amplitude of the tremor's waves [m]
+    quantum_m : one count of the encoders [m]
+
+    Attributes
+    ----------
+    config, status : of the device, as the documentation shows them; may be changed before a client connects
+    force_scale : the answer about the setting devices/force_scale; None: there is none
+    """
+
+    def __init__(
+        self,
+        random: Random | None = None,
+        *,
+        workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05),
+        tremor_m: float = TREMOR_M,
+        quantum_m: float = QUANTUM_M,
+    ) -> None:
+        self.memory = records(SERVICE, 1)
+        super().__init__(self.memory[0], workspace_m)
+        self.state.handle = new_scripted_handle(quantum_m)
+        self.state.handle.stop_m = STOPS_M
+        self._tremble(random, tremor_m)
+        self.config = config()
+        self.status = dict(STATUS)
+        self.force_scale: Any = {"value": 1.0}
+        self.version = "3.5"
+        self.obeys = True
+        quoted = np.frombuffer(f'"{DEVICE_ID}"'.encode(), np.uint8)
+        self.state.id[: quoted.size] = quoted
+        self.state.id_size = quoted.size
+        self._upgraded = False
+        self._asked = b""
+        self._fault: tuple[str, int] | None = None
+        self.hold(0.0, 0.0, 0.0)
+
+    @property
+    def handle(self) -> int:
+        """What its ``send`` and ``recv`` take."""
+        return int(self.memory.ctypes.data)
+
+    def compile(self) -> None:
+        """Compile all that answers a client, or load it from the cache: a client waits for seconds only."""
+        self.connected()
+        self._answer_message(
+            {"inverse3": [{"device_id": DEVICE_ID, "commands": {"set_cursor_force": {"vector": _ZERO}}}]}
+        )
+        take_frames(self.state)
+        self.give_bytes()
+        self.disconnected()
+
+    def follow_clock(self, address: int) -> None:
+        """Let the int64 [ns] at this address be the time; 0: a millisecond a command."""
+        self.state.clock = address
+
+    def press(self, buttons: int) -> None:
+        """Hold down exactly these buttons of the grip: button 1 (a) is bit 0."""
+        super().press(buttons)
+        self._refresh()
+
+    def take(self, fault: str, after: int = 0) -> None:
+        """Have a fault: at once where it concerns opening, else so many commands from now.
+
+        Raises
+        ------
+        DeviceError
+            There is no such fault.
+        """
+        if fault not in FAULTS:
+            raise DeviceError(f"fault '{fault}' is not known; choose of: {', '.join(FAULTS)}")
+        state = self.state
+        if fault in {"version-3.0", "version-3.1"}:
+            self.version = fault.partition("-")[2]
+        elif fault == "not-websocket":
+            self.version = "http"
+        elif fault == "no-device":
+            self.version = "empty"
+        elif fault in {"off", "uncalibrated", "in-use"}:
+            key = {"off": "power_supply", "uncalibrated": "calibrated", "in-use": "in_use"}[fault]
+            self.status[key] = fault == "in-use"
+            self._refresh()
+        elif fault == "gravity-off":
+            self.config["gravity_compensation"]["enabled"] = False
+        elif fault == "disobeys":
+            self.obeys = False
+        elif fault == "force-scale":
+            self.force_scale = {"value": 2.0}
+        elif fault == "unknown-scale":
+            self.force_scale = None
+        elif fault == "late":
+            state.lag_ns = 30_000_000
+        elif fault == "slow":
+            state.lag_ns = 1_500_000
+        elif fault == "torn":
+            state.portion = 300
+        else:
+            self._fault = (fault, after)
+            if self._upgraded:
+                self._arm()
+
+    def _arm(self) -> None:
+        """Begin the fault of the stream after its commands."""
+        if self._fault is None:
+            return
+        (fault, after), state = self._fault, self.state
+        data = np.frombuffer(faulty_bytes(fault, self._message()), np.uint8)
+        state.faulty[: data.size] = data
+        state.faulty_size = data.size
+        state.silent = int(fault in {"silent", "drops"})
+        state.ends = int(fault in {"drops", "closes"})
+        state.fault_at = state.commands + 1 + after
+
+    def connected(self) -> None:
+        """Begin a connection."""
+        state = self.state
+        for name in ("in_size", "written", "visible", "read", "queue_first", "queue_next", "complex_size", "ended"):
+            setattr(state, name, 0)
+        self._upgraded, self._asked = False, b""
+        self._refresh()
+
+    def take_bytes(self, data: bytes) -> None:
+        """Take what the client sends while its session is opened, or at any time."""
+        state = self.state
+        if not self._upgraded:
+            self._asked += data
+            if b"\r\n\r\n" in self._asked:
+                self._answer_handshake(self._asked)
+            return
+        came = np.frombuffer(data, np.uint8)
+        state.inbox[state.in_size : state.in_size + came.size] = came
+        state.in_size += came.size
+        self.work()
+
+    def give_bytes(self) -> bytes:
+        """Return all that the client may see by now."""
+        state = self.state
+        if state.clock == 0 and state.visible == state.read and state.queue_first < state.queue_next:
+            state.now_ns = max(state.now_ns, state.queue_ns[state.queue_first % state.queue_ns.size])  # who asks waits
+        let_pass(state)
+        places = np.arange(state.read, state.visible) % state.outbox.size
+        state.read = state.visible
+        return bytes(state.outbox[places].tobytes())
+
+    def disconnected(self) -> None:
+        """See the end of the stream: the session is over, and its device idle."""
+        rest(self.state)
+        self.state.ended = 1
+
+    def work(self) -> None:
+        """Answer what waits in the inbox."""
+        take_frames(self.state)
+        while self.state.complex_size:
+            state = self.state
+            text = state.inbox[state.complex_at : state.complex_at + state.complex_size].tobytes()
+            self._answer_message(json.loads(text))
+            drop(state, int(state.complex_end))
+            state.complex_size = 0
+            take_frames(state)
+
+    def _answer_handshake(self, asked: bytes) -> None:
+        """Answer RFC 6455's opening handshake (§4.2.2), then send the inventory."""
+        lines = asked.decode("latin-1").split("\r\n")
+        fields = {name.strip().lower(): value.strip() for name, _, value in (line.partition(":") for line in lines[1:])}
+        if self.version == "http" or fields.get("upgrade", "").lower() != "websocket":
+            self._send_raw(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n")
+            return
+        digest = hashlib.sha1((fields["sec-websocket-key"] + _GUID).encode()).digest()  # noqa: S324 - RFC 6455
+        accept = base64.b64encode(digest).decode()
+        self._send_raw(
+            b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            b"Sec-WebSocket-Accept: %b\r\n\r\n" % accept.encode()
+        )
+        self._upgraded = True
+        self._send(self.inventory())
+
+    def inventory(self) -> dict[str, Any]:
+        """Return the first message of a session, with the words of ``SLOTS`` for its numbers."""
+        if self.version == "3.0":
+            return LEGACY_STATE
+        message = self._message(full=True)
+        if self.version == "empty":
+            message["inverse3"] = []
+        if self.version == "3.1":
+            for key in ("filters", "preset", "basis", "mount"):
+                del message["inverse3"][0]["config"][key]
+        return message
+
+    def _message(self, *, full: bool = False) -> dict[str, Any]:
+        return state_message(
+            self.status, int(self.state.buttons), json.loads(json.dumps(self.config)) if full else None
+        )
+
+    def _answer_message(self, message: dict[str, Any]) -> None:
+        """Take settings and the command, and answer with a state; with the configuration where that is asked for."""
+        session = message.get("session", {})
+        for entry in message.get("inverse3", []):
+            if entry.get("device_id") == DEVICE_ID:
+                if self.obeys:
+                    self._configure(entry.get("configure", {}), session.get("configure", {}))
+                go_on(self.state)
+                force = entry.get("commands", {}).get("set_cursor_force", {}).get("vector")
+                if force is not None:
+                    act(self.state, float(force["x"]), float(force["y"]), float(force["z"]))
+        self._send(self._message(full="force_render_full_state" in session))
+        if "configure" in session:
+            self._arm()
+
+    def _configure(self, device: dict[str, Any], session: dict[str, Any]) -> None:
+        """Set what "Device Configuration" lists for WebSocket ``configure``."""
+        filters = self.config["filters"]
+        if "preset" in device:
+            self.config["preset"] = device["preset"]["preset"]
+        if "damping" in device:
+            filters["damping"] |= device["damping"]
+        if "force_gate" in device:
+            filters["force_gate"] |= device["force_gate"]
+        if "basis" in session:
+            self.config["basis"] = session["basis"]
+
+    def _send(self, message: dict[str, Any]) -> None:
+        text, slots = template(message)
+        data, places = np.frombuffer(text, np.uint8).copy(), np.array(slots, np.int64)
+        fill(self.state, data, places)
+        put_frame(self.state, 1, data, data.size, 0)
+        let_pass(self.state)
+
+    def _send_raw(self, data: bytes) -> None:
+        put_bytes(self.state, np.frombuffer(data, np.uint8), len(data))
+        let_pass(self.state)
+
+    def _refresh(self) -> None:
+        """Render the state's text anew."""
+        text, slots = template(self._message())
+        data = np.frombuffer(text, np.uint8)
+        self.state.text[: data.size] = data
+        self.state.slots[:] = slots
+        self.state.text_size = data.size
+
+
+def service_calls(service: Service) -> tuple[int, int, int]:
+    """Return handle and addresses of ``send`` and ``recv`` in place of the system's."""
+    send, receive = stream_functions()
+    return service.handle, int(send.address), int(receive.address)

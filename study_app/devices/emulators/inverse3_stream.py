@@ -1,0 +1,356 @@
+"""The emulated service behind the byte stream, compiled: commands in, one state each out, and the handle between.
+
+Its functions have the signature of a socket's ``send`` and ``recv``, so that the client's compiled exchange calls them
+in place of the system's. Frames are those of a server (RFC 6455 §5.1: it must not mask, and refuses what is not
+masked). A message that does more than command a force waits in ``complex`` for `service.Service`.
+"""
+
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+from numba import types
+
+from study_app.devices.hand import HAND, move_held_handle
+from study_app.haptics.kernels.c_functions import c_function, record_at
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.plant import HANDLE, let_go, measure, push
+
+SOCKET_CALL = types.intp(types.intp, types.intp, types.uintp, types.int32)
+IDLE_NS: Final = 100_000_000
+"""A device without commands for so long is idle: that it returns to idle is documented, after which time is not."""
+INBOX: Final = 1 << 14
+OUTBOX: Final = 1 << 17
+TEXT: Final = 1 << 12
+FAULTY: Final = 1 << 12
+_QUEUE = 256
+_OWN_STEP_NS = 1_000_000
+_SLOTS = 9
+_WIDTH = 14
+_DECIMALS = 100_000_000
+
+SERVICE = np.dtype(
+    [
+        ("clock", np.intp),  # address of the time [ns]; 0: a millisecond a command
+        ("now_ns", np.int64),
+        ("last_ns", np.int64),  # of the last command
+        ("started", np.int64),
+        ("hand", HAND),
+        ("handle", HANDLE),
+        ("counted_m", np.float64, (3,)),  # what its encoders say
+        ("buttons", np.int64),
+        ("inbox", np.uint8, (INBOX,)),
+        ("in_size", np.int64),
+        ("outbox", np.uint8, (OUTBOX,)),  # a ring
+        ("written", np.int64),  # bytes ever written to it
+        ("visible", np.int64),  # as far as its time has come
+        ("read", np.int64),
+        ("queue_end", np.int64, (_QUEUE,)),  # frames that wait for their time: where each ends
+        ("queue_ns", np.int64, (_QUEUE,)),  # and when
+        ("queue_first", np.int64),
+        ("queue_next", np.int64),
+        ("text", np.uint8, (TEXT,)),  # a state, with room for its numbers
+        ("text_size", np.int64),
+        ("slots", np.int64, (_SLOTS,)),
+        ("id", np.uint8, (16,)),  # the device's, in quotes
+        ("id_size", np.int64),
+        ("complex_at", np.int64),  # where the message for Python begins in the inbox
+        ("complex_size", np.int64),  # and its length; 0: none
+        ("complex_end", np.int64),  # where its frame ends
+        ("ended", np.int64),  # 1: the stream is over
+        ("refused", np.int64),  # 1: the client broke RFC 6455
+        # what was commanded
+        ("commands", np.int64),
+        ("pushes", np.int64),  # of them, how many commanded a force that is not zero
+        ("force_n", np.float64, (3,)),  # the last, hand frame
+        ("most_n", np.float64),  # the largest
+        ("close_frames", np.int64),
+        # faults
+        ("fault_at", np.int64),  # from this command on; 0: none
+        ("faulty", np.uint8, (FAULTY,)),  # bytes in place of a state
+        ("faulty_size", np.int64),
+        ("silent", np.int64),  # 1: nothing
+        ("ends", np.int64),  # 1: and the stream is over
+        ("lag_ns", np.int64),  # states come so much later, fault or not
+        ("portion", np.int64),  # a receive gives at most so many bytes; 0: all
+    ],
+    align=True,
+)
+
+_service_at = record_at(SERVICE)
+_byte_at = record_at(np.dtype([("value", np.uint8)]))
+_time_at = record_at(np.dtype([("ns", np.int64)]))
+_FORCE, _VECTOR, _SESSION, _CONFIGURE, _X, _Y, _Z = (
+    np.frombuffer(b'"%b"' % word, np.uint8)
+    for word in (b"set_cursor_force", b"vector", b"session", b"configure", b"x", b"y", b"z")
+)
+
+
+@cache
+def stream_functions() -> tuple[Any, Any]:
+    """Compile what stands for ``send`` and ``recv``."""
+    return c_function(SOCKET_CALL, _send), c_function(SOCKET_CALL, _receive)
+
+
+def _send(handle: int, data: int, size: Any, _flags: int) -> Any:
+    service = _service_at(handle)
+    if service.ended:
+        return -1
+    taken = min(np.int64(size), INBOX - service.in_size)
+    for k in range(taken):
+        service.inbox[service.in_size + k] = _byte_at(data + k).value
+    service.in_size += taken
+    take_frames(service)
+    return taken
+
+
+def _receive(handle: int, data: int, size: Any, _flags: int) -> Any:
+    service = _service_at(handle)
+    _look_at_clock(service)
+    let_pass(service)
+    waiting = min(service.visible - service.read, np.int64(size))
+    if service.portion > 0:
+        waiting = min(waiting, service.portion)
+    for k in range(waiting):
+        _byte_at(data + k).value = service.outbox[(service.read + k) % OUTBOX]
+    service.read += waiting
+    if waiting > 0:
+        return waiting
+    return 0 if service.ended and service.read == service.written else -1
+
+
+@kernel
+def _look_at_clock(service: Any) -> None:
+    if service.clock != 0:
+        service.now_ns = _time_at(service.clock).ns
+
+
+@kernel
+def let_pass(service: Any) -> None:
+    """Let the client see the frames whose time has come."""
+    while service.queue_first < service.queue_next:
+        row = service.queue_first % _QUEUE
+        if service.queue_ns[row] > service.now_ns:
+            return
+        service.visible = service.queue_end[row]
+        service.queue_first += 1
+
+
+@kernel
+def put_frame(service: Any, opcode: int, payload: Any, size: int, lag_ns: int) -> None:
+    """Queue an unmasked frame (RFC 6455 §5.2)."""
+    _put(service, 0x80 | opcode)
+    if size < 126:
+        _put(service, size)
+    else:
+        _put(service, 126)
+        _put(service, size >> 8)
+        _put(service, size & 0xFF)
+    for k in range(size):
+        _put(service, payload[k])
+    _enqueue(service, lag_ns)
+
+
+@kernel
+def put_bytes(service: Any, data: Any, size: int) -> None:
+    """Queue bytes as they are."""
+    for k in range(size):
+        _put(service, data[k])
+    _enqueue(service, 0)
+
+
+@kernel
+def _put(service: Any, byte: int) -> None:
+    service.outbox[service.written % OUTBOX] = np.uint8(byte)
+    service.written += 1
+
+
+@kernel
+def _enqueue(service: Any, lag_ns: int) -> None:
+    row = service.queue_next % _QUEUE
+    service.queue_end[row] = service.written
+    service.queue_ns[row] = service.now_ns + lag_ns
+    service.queue_next += 1
+
+
+@kernel
+def take_frames(service: Any) -> None:
+    """Carry out what came whole, up to a message for Python."""
+    while service.complex_size == 0 and service.in_size >= 2 and not service.ended:
+        first: Any = np.int64(service.inbox[0])
+        second: Any = np.int64(service.inbox[1])
+        if second & 0x80 == 0:  # a client must mask
+            service.refused = service.ended = 1
+            return
+        size, at = second & 0x7F, 2
+        if size == 126:
+            if service.in_size < 4:
+                return
+            size, at = (np.int64(service.inbox[2]) << 8) | np.int64(service.inbox[3]), 4
+        if size == 127 or at + 4 + size > INBOX:
+            service.refused = service.ended = 1
+            return
+        end = at + 4 + size
+        if service.in_size < end:
+            return
+        for k in range(size):
+            service.inbox[at + 4 + k] ^= service.inbox[at + k % 4]
+        if first & 0x0F == 8:
+            service.close_frames += 1
+            rest(service)
+            put_frame(service, 8, service.inbox[at + 4 : end], size, 0)
+            service.ended = 1
+            return
+        if first & 0x0F == 1 and not _answer(service, at + 4, end):
+            service.complex_at, service.complex_size, service.complex_end = at + 4, size, end
+            return
+        drop(service, end)
+
+
+@kernel
+def drop(service: Any, end: int) -> None:
+    """Remove a frame from the inbox."""
+    for k in range(end, service.in_size):
+        service.inbox[k - end] = service.inbox[k]
+    service.in_size -= end
+
+
+@kernel
+def _answer(service: Any, begin: int, end: int) -> bool:
+    """Carry out a command and answer it; return False where the message is more than that."""
+    if _find(service.inbox, begin, end, _SESSION) >= 0 or _find(service.inbox, begin, end, _CONFIGURE) >= 0:
+        return False
+    go_on(service)
+    own = _find(service.inbox, begin, end, service.id[: service.id_size])
+    at = _find(service.inbox, begin, end, _FORCE)
+    if own >= 0 and at >= 0:
+        at = _find(service.inbox, at, end, _VECTOR)
+        if at >= 0:
+            x_n = _number(service.inbox, _find(service.inbox, at, end, _X), end)
+            y_n = _number(service.inbox, _find(service.inbox, at, end, _Y), end)
+            z_n = _number(service.inbox, _find(service.inbox, at, end, _Z), end)
+            act(service, x_n, y_n, z_n)
+    reply(service)
+    return True
+
+
+@kernel
+def go_on(service: Any) -> None:
+    """Let the handle move until now; without commands for long it was idle."""
+    _look_at_clock(service)
+    if service.clock == 0:
+        service.now_ns += _OWN_STEP_NS
+    elapsed_ns = service.now_ns - service.last_ns if service.started else 0
+    if elapsed_ns > IDLE_NS:
+        rest(service)
+    service.started = 1
+    service.last_ns = service.now_ns
+    move_held_handle(service, service.now_ns, elapsed_ns * 1e-9)
+
+
+@kernel
+def act(service: Any, x_n: float, y_n: float, z_n: float) -> None:
+    """Apply a force from now on [N, service frame: x right, y forward, z up]."""
+    service.commands += 1
+    service.force_n[0], service.force_n[1], service.force_n[2] = x_n, z_n, -y_n
+    size_n = (x_n * x_n + y_n * y_n + z_n * z_n) ** 0.5
+    service.most_n = max(service.most_n, size_n)
+    service.pushes += 1 if size_n > 0.0 else 0
+    push(service.handle, x_n, z_n, -y_n)
+
+
+@kernel
+def rest(service: Any) -> None:
+    """Take the force off: the device is idle."""
+    let_go(service.handle)
+    for axis in range(3):
+        service.force_n[axis] = 0.0
+
+
+@kernel
+def reply(service: Any) -> None:
+    """Send the state, or what a fault sends in its place."""
+    if service.fault_at > 0 and service.commands >= service.fault_at:
+        if service.silent == 0:
+            put_bytes(service, service.faulty, service.faulty_size)
+        if service.ends:
+            rest(service)
+            service.ended = 1
+        return
+    fill(service, service.text, service.slots)
+    put_frame(service, 1, service.text, service.text_size, service.lag_ns)
+
+
+@kernel
+def fill(service: Any, text: Any, slots: Any) -> None:
+    """Write position, velocity and force into a state's text, where it has them (axes of the service)."""
+    handle = service.handle
+    measure(handle, service.counted_m)
+    for name in range(3):
+        for axis in range(3):
+            own = 0 if axis == 0 else 3 - axis
+            sign = -1.0 if axis == 1 else 1.0
+            if name == 0:
+                value = service.counted_m[own]
+            else:
+                value = handle.velocity_mps[own] if name == 1 else handle.force_n[own]
+            if slots[3 * name + axis] >= 0:
+                _write(text, slots[3 * name + axis], sign * value)
+
+
+@kernel
+def _write(text: Any, at: int, value: float) -> None:
+    """Write a number with eight decimals and blanks up to the slot's width."""
+    scaled = np.int64(abs(value) * _DECIMALS + 0.5)
+    text[at] = 45 if value < 0.0 else 32
+    whole, part = scaled // _DECIMALS, scaled % _DECIMALS
+    text[at + 1] = 48 + whole // 10 if whole >= 10 else 32
+    if whole >= 10 and value < 0.0:
+        text[at], text[at + 1] = 45, 48 + whole // 10
+    elif value < 0.0:
+        text[at], text[at + 1] = 32, 45
+    text[at + 2] = 48 + whole % 10
+    text[at + 3] = 46
+    for k in range(8):
+        text[at + 11 - k] = 48 + part % 10
+        part //= 10
+    text[at + 12] = text[at + 13] = 32
+
+
+@kernel
+def _find(data: Any, begin: int, end: int, word: Any) -> int:
+    """Return where a word ends in the data; -1 where it is not, or ``begin`` is negative."""
+    if begin < 0:
+        return -1
+    for at in range(begin, end - word.size + 1):
+        same = True
+        for k in range(word.size):
+            if data[at + k] != word[k]:
+                same = False
+                break
+        if same:
+            return at + int(word.size)
+    return -1
+
+
+@kernel
+def _number(data: Any, at: int, end: int) -> float:
+    """Return the number after the colon at ``at``; 0 where there is none."""
+    if at < 0:
+        return 0.0
+    while at < end and (data[at] == 58 or data[at] == 32):
+        at += 1
+    sign, value, share = 1.0, 0.0, 0.0
+    if at < end and data[at] == 45:
+        sign = -1.0
+        at += 1
+    while at < end and (48 <= data[at] <= 57 or data[at] == 46):
+        if data[at] == 46:
+            share = 1.0
+        elif share == 0.0:
+            value = 10.0 * value + (float(data[at]) - 48.0)
+        else:
+            share *= 0.1
+            value += share * (float(data[at]) - 48.0)
+        at += 1
+    return sign * value

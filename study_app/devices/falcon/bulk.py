@@ -1,0 +1,127 @@
+"""The one C function that the compiled exchange needs: ``libusb_bulk_transfer``, or anything of its signature.
+
+``int32 (intp handle, uint8 endpoint, intp data, int32 length, intp transferred, uint32 timeout_ms)``: move ``length``
+bytes at address ``data`` out, or at most as many in; write how many were moved into the int32 at ``transferred``;
+return 0 or a negative libusb error.
+
+
+The C function that puts FTDI's library (``transport_ftdi``) where libusb would be: ``FT_Read`` and ``FT_Write``.
+"""
+
+import ctypes
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from study_app.devices.falcon import constants
+from study_app.haptics.kernels.c_functions import c_function, call_at, record_at
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import records
+
+BULK = types.int32(types.intp, types.uint8, types.intp, types.int32, types.intp, types.uint32)
+
+
+class BulkCalls(NamedTuple):
+    """An open bridge as compiled code sees it: the handle to pass, and the address of the function."""
+
+    handle: int
+    transfer: int
+
+
+BRIDGE = np.dtype(
+    [
+        ("handle", np.intp),  # FT_HANDLE
+        ("read", np.intp),  # addresses of the library's functions
+        ("write", np.intp),
+        ("waiting", np.intp),
+        ("set_timeouts", np.intp),
+        ("timeout_ms", np.int64),  # as set last; 0: not yet
+        ("count", np.uint32),  # where the library writes how many
+    ],
+    align=True,
+)
+_COUNT_AT = int(BRIDGE.fields["count"][1])  # type: ignore[index]
+_DATA_BYTES = constants.USB_PACKET - constants.STATUS_BYTES
+_GONE = 4  # FT_STATUS 1 to 4: no such handle, device not found, not opened, input/output error
+
+_bridge_at = record_at(BRIDGE)
+_count_at = record_at(np.dtype([("count", np.int32)]))
+_status_at = record_at(np.dtype([("bytes", np.uint8, (constants.STATUS_BYTES,))]))
+_move = call_at(types.uint32(types.intp, types.intp, types.uint32, types.intp))
+_waiting = call_at(types.uint32(types.intp, types.intp))
+_set_timeouts = call_at(types.uint32(types.intp, types.uint32, types.uint32))
+
+
+def bridge_record(library: Any, handle: Any) -> Any:
+    """Return the memory of an open bridge's C function, whose address is its handle."""
+    memory = records(BRIDGE, 1)
+    bridge = memory[0]
+    bridge.handle = handle.value
+    bridge.read = _address(library.FT_Read)
+    bridge.write = _address(library.FT_Write)
+    bridge.waiting = _address(library.FT_GetQueueStatus)
+    bridge.set_timeouts = _address(library.FT_SetTimeouts)
+    return memory
+
+
+def _address(function: Any) -> int:
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
+@cache
+def transfer() -> Any:
+    """Return the C function, of ``bulk.BULK``'s signature; a read gives one packet of at most 64 bytes."""
+    return c_function(BULK, _transfer)
+
+
+def _transfer(handle: int, endpoint: int, data: int, length: int, transferred: int, timeout_ms: int) -> Any:
+    bridge = _bridge_at(handle)
+    _count_at(transferred).count = 0
+    if bridge.timeout_ms != timeout_ms:
+        status = _set_timeouts(bridge.set_timeouts, bridge.handle, timeout_ms, timeout_ms)
+        if status != 0:
+            return _code(status)
+        bridge.timeout_ms = timeout_ms
+    if endpoint == constants.ENDPOINT_OUT:
+        status = _move(bridge.write, bridge.handle, data, length, transferred)
+        if status == 0 and _count_at(transferred).count < length:
+            return constants.ERROR_TIMEOUT
+        return _code(status)
+    return _receive(handle, data, length, transferred)
+
+
+@kernel
+def _receive(handle: int, data: int, length: int, transferred: int) -> Any:
+    """Receive what there is, or wait for a first byte and take what came with it; status bytes go in front."""
+    bridge = _bridge_at(handle)
+    room = min(length - constants.STATUS_BYTES, _DATA_BYTES)
+    received: Any = 0
+    for _ in range(2):
+        status = _waiting(bridge.waiting, bridge.handle, handle + _COUNT_AT)
+        if status != 0:
+            return _code(status)
+        least = 1 if received == 0 else 0
+        wanted: Any = min(max(np.int64(bridge.count), least), room - received)
+        if wanted > 0:
+            into = data + constants.STATUS_BYTES + received
+            status = _move(bridge.read, bridge.handle, into, wanted, handle + _COUNT_AT)
+            if status != 0:
+                return _code(status)
+            received += np.int64(bridge.count)
+        if received != 1:
+            break  # only a byte that was waited for may have brought more with it
+    if received == 0:
+        return constants.ERROR_TIMEOUT
+    for i in range(constants.STATUS_BYTES):
+        _status_at(data).bytes[i] = 0
+    _count_at(transferred).count = constants.STATUS_BYTES + received
+    return constants.SUCCESS
+
+
+@kernel
+def _code(status: int) -> Any:
+    if status == 0:
+        return constants.SUCCESS
+    return constants.ERROR_NO_DEVICE if status <= _GONE else constants.ERROR_IO

@@ -1,0 +1,400 @@
+"""Calibration of one Falcon with a weight or a scale: motor units per newton metre, and its arms' offset.
+
+The Falcon holds its grip at a place against a load, and the motor units are recorded. At each place the grip comes to
+rest once from above and once from below, with nothing on it and with a load, so that friction and the grip's own weight
+are separated from the load; `fit` computes motor units per newton from the notes.
+
+Two published gains differ by half, so a force in newtons is known only for a calibrated device. Without calibration the
+gain with the weaker forces is used, and the receipt states it. A calibration is kept by the device's serial number
+among the user's settings, not with results.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from study_app.devices.falcon.constants import ERROR_NO_DEVICE
+from study_app.devices.falcon.failures import usb_failure
+from study_app.devices.falcon.mechanics import (
+    REACHED,
+    START_M,
+    Geometry,
+    angles,
+    forward,
+    geometry_named,
+    jacobian,
+    new_mechanism,
+)
+from study_app.errors import DeviceError
+from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
+from study_app.haptics.model.layout import new_command, new_reading
+from study_app.user_folder import FOLDER_VARIABLE, user_folder
+
+if TYPE_CHECKING:
+    from study_app.devices.falcon.device import FalconDevice
+
+UNCALIBRATED_UNITS_PER_NM: Final = 6616.0
+"""Martin & Hillier 2009, quoted from another source; with libnifalcon's 10 000 forces would be half as strong again."""
+
+LEAST_POSES: Final = 5
+MOST_RESIDUAL_N: Final = 0.5
+"""Greatest residual of consistent weights."""
+_GAINS: Final = (1000.0, 100_000.0)  # no Falcon's is outside
+_OFFSETS_RAD: Final = math.radians(15)  # nor its arms' offset
+_STEPS: Final = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The result of `fit`; ``measured`` is the day, ``residual_n`` the root mean square of the residual."""
+
+    geometry: str
+    units_per_nm: float
+    arm_offset_rad: float = 0.0
+    own_weight_n: float = 0.0
+    residual_n: float = 0.0
+    poses: int = 0
+    measured: str = ""
+
+    def describe(self) -> dict[str, Any]:
+        """Return what the receipt says of it."""
+        return {
+            "units_per_nm": self.units_per_nm,
+            "arm_offset_deg": math.degrees(self.arm_offset_rad),
+            "residual_n": self.residual_n,
+            "poses": self.poses,
+            "measured": self.measured,
+        }
+
+
+def fit(geometry: Geometry, poses: Any, forces_n: Any, units: Any, *, measured: date | None = None) -> Calibration:
+    """Return the gain, offset and weight of the grip that explain best what the motors held, by least squares.
+
+    The grip stands still when motors, its own weight and what pulls at it balance:
+    ``-J(theta + offset)^T units / gain + (0, -own weight, 0) + force = 0``.
+
+    Parameters
+    ----------
+    poses : (n, 3) array, encoder counts
+    forces_n : (n, 3) array [N], what pulled at the grip: (0, -weight, 0) of a hung weight
+    units : (n, 3) array, motor units that held it
+
+    Raises
+    ------
+    DeviceError
+        There are fewer than five poses, the forces are all alike, or the result is impossible for a Falcon.
+    """
+    counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
+    if counts.shape != pulled_n.shape or counts.shape != held.shape or counts.ndim != 2 or counts.shape[1:] != (3,):
+        raise DeviceError("a calibration needs three numbers a pose: counts, force and motor units")
+    if len(counts) < LEAST_POSES:
+        raise DeviceError(f"a calibration needs {LEAST_POSES} poses or more, not {len(counts)}: measure at more places")
+    if np.ptp(pulled_n, axis=0).max() < 0.5:
+        raise DeviceError(
+            "a calibration needs two weights half a newton apart (one may be none): hang another one, too"
+        )
+    offset_rad = 0.0
+    for _ in range(_STEPS):
+        small = 1e-5
+        left = _solve(geometry, offset_rad, counts, pulled_n, held)[1]
+        slope = (_solve(geometry, offset_rad + small, counts, pulled_n, held)[1] - left) / small
+        step = float(slope @ left) / float(slope @ slope)
+        offset_rad = min(max(offset_rad - step, -_OFFSETS_RAD), _OFFSETS_RAD)
+        if abs(step) < 1e-9:
+            break
+    (share, own_n), left = _solve(geometry, offset_rad, counts, pulled_n, held)
+    gain = 1.0 / share if share else math.inf
+    if not _GAINS[0] <= gain <= _GAINS[1] or abs(offset_rad) >= _OFFSETS_RAD:
+        raise DeviceError(
+            f"these weights would mean {gain:.0f} motor units a newton metre and arms {math.degrees(offset_rad):.1f} "
+            f"degrees off; {_GAINS[0]:.0f} to {_GAINS[1]:.0f} and less than 15 degrees are possible: check the "
+            "weights, and that nothing touches the grip"
+        )
+    residual_n = math.sqrt(float(left @ left) / len(counts))
+    day = (measured or date.today()).isoformat()
+    return Calibration(geometry.name, gain, offset_rad, float(own_n), residual_n, len(counts), day)
+
+
+def left_over(found: Calibration, poses: Any, forces_n: Any, units: Any) -> Any:
+    """Return the residual forces (n, 3) [N] of ``found``; arguments as for `fit`."""
+    counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
+    return _solve(geometry_named(found.geometry), found.arm_offset_rad, counts, pulled_n, held)[1].reshape(-1, 3)
+
+
+def _solve(geometry: Geometry, offset_rad: float, counts: Any, pulled_n: Any, held: Any) -> tuple[Any, Any]:
+    """Return the best (1 / gain, own weight) for an offset, and what is left of the forces, flat [N]."""
+    mechanism = new_mechanism(geometry, 1.0, offset_rad)
+    theta, place_m, rates = np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    pushed = np.zeros((len(counts), 3))
+    for row, count in enumerate(counts):
+        angles(mechanism, count, theta)
+        place_m[:] = START_M
+        if forward(mechanism, theta, place_m) != REACHED:
+            raise DeviceError(f"pose {row + 1}: encoders {count.astype(int).tolist()} are no pose of {geometry.name!r}")
+        jacobian(mechanism, theta, place_m, rates)
+        pushed[row] = -rates.T @ held[row]
+    down = np.tile([0.0, -1.0, 0.0], len(counts))
+    design = np.column_stack([pushed.ravel(), down])
+    best = np.linalg.lstsq(design, -pulled_n.ravel(), rcond=None)[0]
+    return best, design @ best + pulled_n.ravel()
+
+
+def calibration_file(serial: str) -> Path:
+    """Return the path of the calibration of the Falcon with this serial number, which may not exist."""
+    name = "".join(letter if letter.isalnum() and letter.isascii() else "-" for letter in serial)
+    return user_folder() / f"falcon-{name or 'unnamed'}.json"
+
+
+def save(serial: str, calibration: Calibration) -> Path:
+    """Store the calibration of the Falcon with this serial number; return its path.
+
+    Raises
+    ------
+    DeviceError
+        It cannot be written.
+    """
+    file = calibration_file(serial)
+    fresh = file.with_suffix(".new")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        fresh.write_text(json.dumps(asdict(calibration), indent=2) + "\n", encoding="utf-8")
+        fresh.replace(file)
+    except OSError as error:
+        raise DeviceError(
+            f"the calibration cannot be kept in {file.parent}: {error.strerror}; set {FOLDER_VARIABLE} to a folder "
+            "that can be written"
+        ) from error
+    return file
+
+
+def load(serial: str) -> Calibration | None:
+    """Return the calibration of the Falcon with this serial number; None where it has none."""
+    file = calibration_file(serial)
+    try:
+        found = Calibration(**json.loads(file.read_text(encoding="utf-8")))
+        geometry_named(found.geometry)
+        whole = _GAINS[0] <= found.units_per_nm <= _GAINS[1] and abs(found.arm_offset_rad) <= _OFFSETS_RAD
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, TypeError, RecursionError) as error:
+        raise _unusable(file) from error
+    if not whole:
+        raise _unusable(file)
+    return found
+
+
+def _unusable(file: Path) -> DeviceError:
+    return DeviceError(f"the Falcon's calibration in {file} cannot be used: delete the file, or calibrate again")
+
+
+PLACES_M: Final = (
+    (0.0, 0.0, 0.0),
+    (0.025, 0.012, -0.015),
+    (-0.025, 0.012, 0.015),
+    (0.020, -0.012, 0.018),
+    (-0.020, -0.012, -0.018),
+)
+GRAVITY_MPS2: Final = 9.80665
+LEAST_N, MOST_N = 1.0, 6.0
+"""Range of loads that can be measured, and held in addition to the grip's own weight."""
+
+_STIFFNESS_NPM = 600.0
+_DAMPING_NSPM = 8.0
+_SMOOTHING_S = 0.005
+_PACE_MPS = 0.05
+_BESIDE_M = 0.005
+_TICK_S = 0.001
+_STILL_MPS = 0.002
+_STILL_TICKS = 300
+_PATIENCE_S = 6.0
+_BLIND_TICKS = 20
+_WEIGHED_TICKS = 300
+
+Ask = Callable[[str, str], Callable[[], str | None]]
+"""(the request: "let-go", "hang", "pull", "reading" or "take-off"; its text) -> a function that returns None until the
+operator has answered, then the answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Notes:
+    """The measurements, one row per rest: encoder counts, force on the grip [N] and motor units, each (n, 3)."""
+
+    counts: Any
+    forces_n: Any
+    units: Any
+
+
+class Grip:
+    """The grip of an open Falcon, kept at a place by a spring; one tick of it takes a millisecond.
+
+    Parameters
+    ----------
+    device : open and homed
+    virtual : whether time is counted in ticks instead of read from the clock
+    """
+
+    def __init__(self, device: FalconDevice, *, virtual: bool = False) -> None:
+        self._device = device
+        self._virtual = virtual
+        self._now_ns = 0 if virtual else time.monotonic_ns()
+        self._reading, self._command = new_reading(), new_command()
+        self._read_m = self._reading["position_m"][0]
+        self._asked_n, self._sent_n = self._command["force_n"][0], self._command["sent_n"][0]
+        self._addresses = int(self._reading.ctypes.data), int(self._command.ctypes.data)
+        self._place_m = np.zeros(3)
+        self._velocity_mps = np.zeros(3)
+        self._target_m: Any = None
+        self._blind = 0
+        for _ in range(_BLIND_TICKS):
+            self.tick()
+        self._target_m = self._place_m.copy()
+
+    @property
+    def place_m(self) -> Any:
+        """Its place (3,) [m, hand frame]."""
+        return self._place_m.copy()
+
+    def tick(self) -> None:
+        """Read its place and push it toward its target; without a new position for 20 ticks, send no force."""
+        if self._virtual:
+            self._now_ns += round(1e9 * _TICK_S)
+            elapsed_s = _TICK_S
+        else:
+            time.sleep(_TICK_S)
+            before_ns, self._now_ns = self._now_ns, time.monotonic_ns()
+            elapsed_s = (self._now_ns - before_ns) * 1e-9
+        device = self._device
+        reading, command = self._addresses
+        answer = device.read.ctypes(device.context, self._now_ns, reading)
+        if answer == READ_LOST:
+            device.check()
+            raise usb_failure(ERROR_NO_DEVICE, "weighing with it")
+        if answer == READ_NEW:
+            self._blind = 0
+            self._see(self._read_m, elapsed_s)
+        else:
+            self._blind += 1
+        self._asked_n[:] = self._sent_n[:] = self._force_n()
+        device.write.ctypes(device.context, command)
+
+    def _see(self, place_m: Any, elapsed_s: float) -> None:
+        moved = (place_m - self._place_m) / elapsed_s
+        self._velocity_mps += (moved - self._velocity_mps) * elapsed_s / (_SMOOTHING_S + elapsed_s)
+        self._place_m[:] = place_m
+
+    def _force_n(self) -> Any:
+        if self._target_m is None or self._blind > _BLIND_TICKS:
+            return np.zeros(3)
+        force_n = _STIFFNESS_NPM * (self._target_m - self._place_m) - _DAMPING_NSPM * self._velocity_mps
+        size = float(np.linalg.norm(force_n))
+        return force_n * min(1.0, self._device.force_limit_n / size) if size else force_n
+
+    def wait(self, answered: Callable[[], str | None]) -> str:
+        """Hold it in place until there is an answer; return the answer."""
+        while (answer := answered()) is None:
+            self.tick()
+        return answer
+
+    def come(self, place_m: Any) -> None:
+        """Move it slowly to a place, and wait until it rests there, possibly displaced by its load."""
+        way = np.asarray(place_m) - self._target_m
+        ticks = max(int(np.linalg.norm(way) / (_PACE_MPS * _TICK_S)), 1)
+        began = self._target_m.copy()
+        for k in range(ticks):
+            self._target_m = began + way * ((k + 1) / ticks)
+            self.tick()
+        still = 0
+        for _ in range(round(_PATIENCE_S / _TICK_S)):
+            self.tick()
+            still = still + 1 if np.linalg.norm(self._velocity_mps) < _STILL_MPS else 0
+            if still >= _STILL_TICKS:
+                return
+        raise DeviceError(
+            "the grip does not come to rest: let nothing touch it, hang the weight on a short string, and start again"
+        )
+
+    def weigh(self) -> tuple[Any, Any]:
+        """Return the mean encoder counts and motor units (each (3,)) of some tenths of a second."""
+        counts, units = np.zeros(3), np.zeros(3)
+        for _ in range(_WEIGHED_TICKS):
+            self.tick()
+            held_at, held_with = self._device.held
+            counts += held_at
+            units += held_with
+        return counts / _WEIGHED_TICKS, units / _WEIGHED_TICKS
+
+
+def hang(grip: Grip, weight_n: float, ask: Ask) -> Notes:
+    """Measure without load at all places, then with a weight of ``weight_n`` newtons; return the measurements."""
+    if not LEAST_N <= weight_n <= MOST_N:
+        raise DeviceError(
+            f"a weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g is {weight_n:.2f} N: take one of "
+            f"{LEAST_N:g} to {MOST_N:g} N, 110 to 600 g"
+        )
+    notes: list[tuple[Any, float, Any]] = []
+    grip.wait(ask("let-go", "Let go of the grip; it will hold itself and move slowly. Keep clear of it."))
+    notes += _round(grip, 0.0)
+    grip.wait(
+        ask("hang", f"Hang the weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g on the grip, and let it hang still.")
+    )
+    notes += _round(grip, weight_n)
+    grip.wait(ask("take-off", "Take the weight off and hold the grip: its motors are turned off now."))
+    return _noted(notes)
+
+
+def _round(grip: Grip, load_n: float) -> list[tuple[Any, float, Any]]:
+    notes = []
+    for place in PLACES_M:
+        for side in (1.0, -1.0):
+            grip.come(np.add(place, (0.0, side * _BESIDE_M, 0.0)))
+            grip.come(place)
+            counts, units = grip.weigh()
+            notes.append((counts, load_n, units))
+    return notes
+
+
+def pull(grip: Grip, ask: Ask) -> Notes:
+    """Measure without load and then with an operator's pull on a scale, at each place; return the measurements."""
+    notes: list[tuple[Any, float, Any]] = []
+    grip.wait(ask("let-go", "Let go of the grip; it will hold itself and move slowly. Keep clear of it."))
+    for number, place in enumerate(PLACES_M, start=1):
+        grip.come(place)
+        counts, units = grip.weigh()
+        notes.append((counts, 0.0, units))
+        words = f"Place {number} of {len(PLACES_M)}: pull straight down with the scale, at 200 to 500 g, and hold it so"
+        grip.wait(ask("pull", words))
+        counts, units = grip.weigh()
+        notes.append((counts, _read_scale(grip, ask), units))
+        grip.wait(ask("let-go", "Take the scale off, and let go."))
+    grip.wait(ask("take-off", "Hold the grip: its motors are turned off now."))
+    return _noted(notes)
+
+
+def _read_scale(grip: Grip, ask: Ask) -> float:
+    """Return the scale's reading [N], asking until it is a valid weight."""
+    words = "What did the scale show, in grams?"
+    while True:
+        reading = grip.wait(ask("reading", words))
+        try:
+            load_n = float(reading.replace(",", ".")) / 1000 * GRAVITY_MPS2
+        except ValueError:
+            load_n = -1.0
+        if 0.0 < load_n <= MOST_N:
+            return load_n
+        words = f"'{reading}' is not a reading of the scale in grams, above 0 and up to 600. What did it show?"
+
+
+def _noted(notes: list[tuple[Any, float, Any]]) -> Notes:
+    counts, loads_n, units = zip(*notes, strict=True)
+    forces_n = np.zeros((len(notes), 3))
+    forces_n[:, 1] = -np.array(loads_n)
+    return Notes(np.array(counts), forces_n, np.array(units))

@@ -1,1 +1,0 @@
-"""An emulated Falcon, independent of the driver: it shares only constants of wire and geometry."""

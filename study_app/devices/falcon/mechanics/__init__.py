@@ -1,1 +1,0 @@
-"""Geometry, kinematics and calibration of a Falcon."""

@@ -1,0 +1,317 @@
+"""Packets of sixteen bytes each way: torques and lights out, encoders and buttons in; the stream may lose bytes.
+
+A number is four bytes, a nibble each, the least significant first, with ``ZERO`` added; a packet is ``START``, three
+such numbers, a byte of flags or status, a byte of unknown meaning, ``STOP`` (``wire``). There is no checksum, so the
+parser accepts a packet only if every byte of it is permitted at its place, keeps a possible start of the next, and
+returns each packet once.
+
+
+The delay of a Falcon's replies, and which of them are accepted: recent ones that are plausible for a hand.
+
+A reply cannot be matched to its packet, so replies with a constant delay look like punctual ones after a loss. So the
+delay is measured: when for ``SLOWER_READS`` reads more replies are owed than the delay explains, or for
+``FASTER_READS`` fewer, no packet is sent until a read has no reply; the number of these reads is the delay. Replies
+still owed then are lost. A longer delay is adopted at once, a shorter one after two measurements in a row, since a lost
+reply looks like a shorter one. If the force changes too fast for a measurement, the delay is set to explain the owed
+replies. Positions later than ``MOST_DELAY`` are not used, nor those read while more than ``MOST_OWED`` replies are owed
+beyond the delay.
+
+There is no checksum, so a byte corrupted into a permitted one passes the parser. An implausible jump of an arm
+therefore needs a second reply that confirms it; likewise buttons, the end of the out-stroke and arms no longer homed.
+The functions work on the exchange's record (``exchange.FALCON``).
+"""
+
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.devices.falcon.constants import (
+    HOMED_SHIFT,
+    MOST_TORQUE,
+    PACKET,
+    START,
+    STATUS_BYTES,
+    STOP,
+    USB_PACKET,
+    ZERO,
+)
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.device_dynamics import MOST_DELAY
+
+NIBBLES = 4
+FLAGS_AT = 13  # flags to the device, status from it; numbers stand at 1, 5 and 9
+UNKNOWN_AT = 14
+STATUS_BITS = 7
+
+PARSER = np.dtype(
+    [
+        ("tail", np.uint8, (PACKET,)),  # the start of an incomplete packet
+        ("held", np.int64),  # its number of bytes
+        ("packets", np.int64),  # whole valid packets so far
+        ("skipped", np.int64),  # bytes so far that belonged to none
+    ],
+    align=True,
+)
+
+STATUS = np.dtype(
+    [
+        ("encoders", np.int64, (3,)),  # counts of arms 1 to 3
+        ("buttons", np.int64),  # bits 0 to 3 of the grip
+        ("homed", np.int64),  # bits 0 to 2: arms 1 to 3
+        ("count", np.int64),  # how many packets were written here so far
+    ],
+    align=True,
+)
+
+
+@kernel
+def put_number(out: Any, at: int, value: int) -> None:
+    """Write ``value``, as 16 bits with sign, into the four bytes of ``out`` from ``at`` on."""
+    for nibble in range(NIBBLES):
+        out[at + nibble] = ZERO + ((value >> (4 * nibble)) & 0xF)
+
+
+@kernel
+def number(data: Any, at: int) -> Any:
+    """Return what stands in the four bytes of ``data`` from ``at`` on, -32768 to 32767."""
+    value: Any = 0
+    for nibble in range(NIBBLES):
+        value += ((np.int64(data[at + nibble]) - ZERO) & 0xF) << (4 * nibble)
+    return value - 0x10000 if value >= 0x8000 else value
+
+
+@kernel
+def pack(torques: Any, flags: int, out: Any) -> None:
+    """Write the packet of ``torques`` (3,) and ``flags`` into ``out`` (16,) bytes.
+
+    A torque beyond ``MOST_TORQUE`` is clipped, so that it never overflows into the opposite sign.
+    """
+    out[0] = START
+    for arm in range(3):
+        put_number(out, 1 + NIBBLES * arm, min(max(torques[arm], -MOST_TORQUE), MOST_TORQUE))
+    out[FLAGS_AT] = ZERO + flags
+    out[UNKNOWN_AT] = ZERO
+    out[PACKET - 1] = STOP
+
+
+@kernel
+def strip(data: Any, length: int, out: Any) -> int:
+    """Copy the first ``length`` bytes of a read without the bridge's status bytes; return how many are left.
+
+    ``out`` may be ``data`` itself.
+    """
+    kept = 0
+    for i in range(length):
+        if i % USB_PACKET >= STATUS_BYTES:
+            out[kept] = data[i]
+            kept += 1
+    return kept
+
+
+@kernel
+def feed(parser: Any, data: Any, length: int, status: Any) -> Any:
+    """Process ``length`` more bytes of the stream; return the number of valid packets that ended in them.
+
+    The newest of them goes into ``status``, which stays as it was where there is none.
+
+    Parameters
+    ----------
+    parser : record of ``PARSER``; zeros at the begin of a stream
+    data : (>= length,) bytes, without the bridge's status bytes
+    status : record of ``STATUS``
+    """
+    before = parser.packets
+    for i in range(length):
+        _take(parser, data[i])
+        if parser.held == PACKET:
+            _read(parser.tail, status)
+            parser.packets += 1
+            parser.held = 0
+    return parser.packets - before
+
+
+@kernel
+def _take(parser: Any, byte: Any) -> None:
+    """Append ``byte`` to the tail, after dropping the part of the tail that cannot be the start of a packet."""
+    while not _fits(parser.held, byte):
+        if parser.held == 0:
+            parser.skipped += 1
+            return
+        # Among the bytes that fit, only the unknown one can be another start.
+        if parser.held > UNKNOWN_AT and parser.tail[UNKNOWN_AT] == START:
+            parser.skipped += UNKNOWN_AT
+            parser.held = 1
+        else:
+            parser.skipped += parser.held
+            parser.held = 0
+    parser.tail[parser.held] = byte
+    parser.held += 1
+
+
+@kernel
+def _fits(at: int, byte: int) -> bool:
+    """Whether ``byte`` may stand ``at`` that place of a packet."""
+    if at == 0:
+        return byte == START
+    if at < FLAGS_AT:
+        return ZERO <= byte < ZERO + 16
+    if at == FLAGS_AT:
+        return ZERO <= byte < ZERO + (1 << STATUS_BITS)
+    return at == UNKNOWN_AT or byte == STOP
+
+
+@kernel
+def _read(packet: Any, status: Any) -> None:
+    for arm in range(3):
+        status.encoders[arm] = number(packet, 1 + NIBBLES * arm)
+    bits = np.int64(packet[FLAGS_AT]) - ZERO
+    status.buttons = bits & 0xF
+    status.homed = bits >> HOMED_SHIFT
+    status.count += 1
+
+
+MOST_OWED: Final = 4
+SLOWER_READS: Final = 8
+FASTER_READS: Final = 200
+GIVEN_UP_READS: Final = 32
+RETEST_TICKS: Final = 30
+"""For at least this many ticks after a measurement the motors receive a new command in every tick."""
+ALL_HOMED: Final = 0b111
+BELIEVED: Final = 3
+"""Number of packets in a row that must report that an arm is no longer homed: a single one may be corrupted."""
+
+LEAP: Final = 24.0
+"""Greatest deviation of an arm from its predicted motion [counts]: 0.7 to 1.4 mm of the grip within a tick."""
+DOUBTS: Final = 2  # greatest number of doubted replies in a row
+
+
+@kernel
+def settle(falcon: Any, packets: int, gap: bool) -> bool:
+    """Update the owed replies and the delay; return whether the received reply is recent enough."""
+    owed = falcon.owed + falcon.asked - packets
+    falcon.asked = 0
+    falcon.surplus += max(-owed, 0)
+    falcon.owed = max(owed, 0)
+    falcon.retest = max(falcon.retest - 1, 0)
+    if owed < 0:
+        falcon.unsure = 1
+    if gap:
+        falcon.testing = 0
+        _write_off(falcon)
+        falcon.tracked = 0
+        return False
+    if falcon.testing > 0:
+        _measure_delay(falcon, packets)
+    elif packets > 0:  # no reply gives no information about pending ones
+        _look_for_change(falcon)
+    return bool(falcon.delay <= MOST_DELAY and _few_owed(falcon))
+
+
+@kernel
+def _look_for_change(falcon: Any) -> None:
+    """Begin a measurement if more, or for a long time fewer, replies are owed than the delay explains."""
+    more, less = falcon.owed > falcon.delay - 1, falcon.owed < falcon.delay - 1
+    falcon.astray = falcon.astray + 1 if more or less else max(falcon.astray - 1, 0)
+    due = falcon.unsure != 0 or falcon.delay > MOST_DELAY or falcon.astray >= (SLOWER_READS if more else FASTER_READS)
+    if (due and falcon.retest == 0) or (not _few_owed(falcon) and falcon.delay <= MOST_DELAY):
+        falcon.testing = 1
+    if more and falcon.astray >= GIVEN_UP_READS:  # the force changes too much for a measurement
+        _believe_delay(falcon, falcon.owed + 1)
+
+
+@kernel
+def _few_owed(falcon: Any) -> bool:
+    """Return whether few enough replies are owed beyond the delay that any received one is recent."""
+    return bool(falcon.owed < falcon.delay + MOST_OWED)
+
+
+@kernel
+def _measure_delay(falcon: Any, packets: int) -> None:
+    """Wait for a read without a reply: then no reply to an earlier packet is pending."""
+    found = falcon.testing
+    if packets > 0 and found <= MOST_DELAY:
+        falcon.testing += 1
+        return
+    falcon.testing = 0
+    if packets == 0:
+        _write_off(falcon)
+    if found >= falcon.delay or found == falcon.measured:
+        _believe_delay(falcon, found)
+    else:  # a reply lost may look like that: once more
+        falcon.measured = found
+        falcon.unsure = 1
+        falcon.retest = MOST_DELAY
+
+
+@kernel
+def give_up_measurement(falcon: Any) -> None:
+    """Cancel the measurement and send for some ticks; adopt the delay as far as measured."""
+    falcon.delay = max(falcon.delay, falcon.testing)
+    falcon.testing = 0
+    falcon.retest = MOST_DELAY
+
+
+@kernel
+def _believe_delay(falcon: Any, found: int) -> None:
+    falcon.delay = found
+    falcon.measured = 0
+    falcon.unsure = 0
+    falcon.astray = 0
+    falcon.retest = RETEST_TICKS
+
+
+@kernel
+def _write_off(falcon: Any) -> None:
+    falcon.written_off += falcon.owed
+    falcon.owed = 0
+
+
+@kernel
+def believe(falcon: Any) -> bool:
+    """Take buttons and homed arms from the newest packet; return whether its encoders count from their index."""
+    status = falcon.status
+    if status.homed != ALL_HOMED:
+        falcon.unhomed += 1
+        falcon.tracked = 0
+        falcon.beyond = 0
+        if falcon.unhomed >= BELIEVED:
+            falcon.homed = 0
+            falcon.pulled_out = 0
+            falcon.share = 0.0
+        return False
+    falcon.unhomed = 0
+    falcon.homed = 1
+    if status.buttons == falcon.seen_buttons:
+        falcon.buttons = status.buttons
+    falcon.seen_buttons = status.buttons
+    return True
+
+
+@kernel
+def trust(falcon: Any) -> bool:
+    """Return whether the encoder counts continue the arms' motion, or confirm counts doubted before."""
+    counts = falcon.status.encoders
+    astray, repeated = False, falcon.doubts > 0
+    for i in range(3):
+        if abs(counts[i] - falcon.counts[i] - falcon.pace[i] * falcon.apart) > LEAP:
+            astray = True
+        if abs(counts[i] - falcon.doubted[i]) > LEAP:
+            repeated = False
+    if falcon.tracked != 0 and astray and not repeated and falcon.doubts < DOUBTS:
+        falcon.doubts += 1
+        falcon.doubted_at = falcon.apart
+        for i in range(3):
+            falcon.doubted[i] = counts[i]
+        return False
+    for i in range(3):
+        if falcon.tracked == 0:
+            falcon.pace[i] = 0.0
+        elif astray and falcon.doubts > 0:
+            falcon.pace[i] = (counts[i] - falcon.doubted[i]) / (falcon.apart - falcon.doubted_at)
+        else:
+            falcon.pace[i] = (counts[i] - falcon.counts[i]) / falcon.apart
+        falcon.counts[i] = counts[i]
+    falcon.tracked = 1
+    falcon.apart = 0
+    falcon.doubts = 0
+    return True

@@ -1,0 +1,536 @@
+"""Access to the Falcon's USB bridge, and which Falcons are connected.
+
+`PyUsbTransport` uses pyusb, with libusb or another backend, such as the emulator's. `FtdiTransport` uses FTDI's own
+driver (D2XX) on Windows, where Novint's driver keeps libusb out; D2XX removes the status bytes from the stream, so they
+are put back as zeros. Written from FTDI's "D2XX Programmer's Guide", tested against a stand-in of the library only.
+Loads no compiler before `calls` are asked for: the guard process must be small.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+import libusb_package
+import usb.core  # type: ignore[import-untyped]
+import usb.util  # type: ignore[import-untyped]
+
+from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, Backend
+from study_app.devices.falcon import constants
+from study_app.devices.falcon.constants import FLAG_HOMING, milliseconds, quiet_packet
+from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure, failures_on, usb_failure
+from study_app.errors import DeviceError
+
+if TYPE_CHECKING:
+    from study_app.devices.falcon.bulk import BulkCalls
+
+PACKETS: Final = 10
+_BETWEEN_S: Final = 0.002
+_WRITE_S: Final = 0.1
+
+
+class Transport(Protocol):
+    """An open bridge; all methods raise `UsbFailure`."""
+
+    @property
+    def name(self) -> str:
+        """The word by which `open_transport` opens it again."""
+        ...
+
+    @property
+    def serial(self) -> str | None:
+        """Its serial number, if it reports one."""
+        ...
+
+    def control(self, request: int, value: int) -> None:
+        """Send a control request (``wire.REQUEST_*``) with its value."""
+        ...
+
+    def write(self, data: bytes, timeout_s: float) -> None:
+        """Send all of ``data``."""
+        ...
+
+    def read(self, size: int, timeout_s: float) -> bytes:
+        """Return what one read of at most ``size`` bytes, a multiple of 64, gives, status bytes and all.
+
+        Nothing at all (``b""``) when the time is out.
+        """
+        ...
+
+    def calls(self) -> BulkCalls:
+        """Return the bridge as compiled code sees it; good until `close` or `reopen`."""
+        ...
+
+    def now_s(self) -> float:
+        """Return the time on the clock that its time-outs run on [s]."""
+        ...
+
+    def pause(self, seconds: float) -> None:
+        """Let that clock pass."""
+        ...
+
+    def reopen(self) -> None:
+        """Close it and open it again, as new."""
+        ...
+
+    def close(self) -> None:
+        """Let go of it; a second call does nothing."""
+        ...
+
+
+def open_transport(name: str = "") -> Transport:
+    """Return the bridge with this serial number, open; "": the first one."""
+    serial = name or None
+    try:
+        return PyUsbTransport(serial=serial)
+    except UsbFailure as failure:
+        if os.name != "nt" or failure.kind not in {"not-supported", "not-found"}:
+            raise
+        try:
+            return FtdiTransport(serial=serial)
+        except UsbFailure as also:
+            if also.kind == "not-found" and find_falcons(libusb_package.get_libusb1_backend()):
+                raise UsbFailure("two-drivers", "opening it") from None
+            raise failure from None
+
+
+def quiet(transport: Transport) -> int:
+    """Send ``PACKETS`` packets of zero torque; return the number sent.
+
+    They keep the homing flag, and the bridge's settings are unchanged, so that the Falcon stays loaded and homed.
+    """
+    sent = 0
+    for _ in range(PACKETS):
+        with suppress(DeviceError):
+            transport.write(quiet_packet(FLAG_HOMING), _WRITE_S)
+            sent += 1
+        transport.pause(_BETWEEN_S)
+    return sent
+
+
+def end_torque(name: str) -> None:
+    """Open the bridge called ``name`` and send packets of zero torque: what a guard does."""
+    transport = open_transport(name)
+    try:
+        if not quiet(transport):
+            raise DeviceError("it takes no packet")
+    finally:
+        transport.close()
+
+
+_INTERFACE = 0
+_CONTROL_TIMEOUT_MS = 1000
+_CODES: Final = {
+    errno.EACCES: constants.ERROR_ACCESS,
+    errno.EPERM: constants.ERROR_ACCESS,
+    errno.ENODEV: constants.ERROR_NO_DEVICE,
+    errno.ENOENT: constants.ERROR_NOT_FOUND,
+    errno.EBUSY: constants.ERROR_BUSY,
+    errno.ETIMEDOUT: constants.ERROR_TIMEOUT,
+    errno.EOVERFLOW: constants.ERROR_OVERFLOW,
+    errno.EPIPE: constants.ERROR_PIPE,
+    errno.ENOSYS: constants.ERROR_NOT_SUPPORTED,
+}
+
+
+class PyUsbTransport:
+    """The bridge over pyusb.
+
+    Parameters
+    ----------
+    backend : pyusb's; None: libusb. One that is not libusb may bring its own clock and C functions: ``now_s()``,
+        ``pause(seconds)``, ``c_calls(handle) -> BulkCalls`` with the handle that its ``open_device`` gave.
+    index : which Falcon, of several
+    serial : its serial number; then ``index`` does not count
+    """
+
+    def __init__(self, backend: Any = None, *, index: int = 0, serial: str | None = None) -> None:
+        self._backend: Any = backend if backend is not None else libusb_package.get_libusb1_backend()
+        if self._backend is None:
+            raise UsbFailure("no-libusb", "loading libusb")
+        self._index = index
+        self._device: Any = None
+        self.serial = serial
+        self.reopen()
+
+    @property
+    def name(self) -> str:
+        """The word by which ``open_transport`` opens it again."""
+        return self.serial or ""
+
+    def reopen(self) -> None:
+        """Close it and open it again, as new."""
+        self.close()
+        with _failures("looking for it"):
+            found = find_falcons(self._backend)
+        if self.serial is None:
+            found = found[self._index :]
+        else:  # one that does not tell its number may be the one, and say why when it is opened
+            found = [device for device in found if serial_of(device) in {self.serial, None}]
+            found.sort(key=lambda device: serial_of(device) is None)
+        if not found:
+            raise FalconNotFound("not-found", "looking for it")
+        self._open(found[0])
+
+    def _open(self, device: Any) -> None:
+        try:
+            with _failures("opening it"):
+                _claim(device)
+            serial = serial_of(device)
+            if self.serial not in {None, serial}:
+                raise FalconNotFound("not-found", f"looking for number {self.serial}")
+        except UsbFailure:
+            usb.util.dispose_resources(device)
+            raise
+        self._device, self.serial = device, serial
+
+    def control(self, request: int, value: int) -> None:
+        """Send a control request with its value."""
+        with _failures("setting the bridge"):
+            self._open_device().ctrl_transfer(constants.REQUEST_TYPE, request, value, 0, None, _CONTROL_TIMEOUT_MS)
+
+    def write(self, data: bytes, timeout_s: float) -> None:
+        """Send all of ``data``."""
+        with _failures("sending"):
+            sent = self._open_device().write(constants.ENDPOINT_OUT, data, constants.milliseconds(timeout_s))
+        if sent < len(data):
+            raise usb_failure(constants.ERROR_TIMEOUT, "sending")
+
+    def read(self, size: int, timeout_s: float) -> bytes:
+        """Return what one read gives; nothing when the time is out."""
+        if size <= 0 or size % constants.USB_PACKET:
+            raise ValueError(f"a read asks for a multiple of {constants.USB_PACKET} bytes, not {size}")
+        try:
+            with _failures("receiving"):
+                return bytes(self._open_device().read(constants.ENDPOINT_IN, size, constants.milliseconds(timeout_s)))
+        except UsbFailure as failure:
+            if failure.kind == "timeout":
+                return b""
+            raise
+
+    def calls(self) -> BulkCalls:
+        """Return the bridge as compiled code sees it; good until `close` or `reopen`."""
+        handle = self._open_device()._ctx.handle  # noqa: SLF001 - pyusb has no public way to it
+        own = getattr(self._backend, "c_calls", None)
+        if own is not None:
+            return own(handle)  # type: ignore[no-any-return]
+        return libusb_calls(self._backend.lib, handle.handle)
+
+    def now_s(self) -> float:
+        """Return the time on the backend's clock, or the machine's [s]."""
+        own = getattr(self._backend, "now_s", None)
+        return time.monotonic() if own is None else float(own())
+
+    def pause(self, seconds: float) -> None:
+        """Let that clock pass."""
+        getattr(self._backend, "pause", time.sleep)(seconds)
+
+    def close(self) -> None:
+        """Let go of it; a second call does nothing."""
+        device, self._device = self._device, None
+        if device is not None:
+            with suppress(usb.core.USBError, NotImplementedError):  # it may be gone
+                usb.util.dispose_resources(device)
+
+    def _open_device(self) -> Any:
+        if self._device is None:
+            raise FalconLost("no-device", "using it after it was closed")
+        return self._device
+
+
+def find_falcons(backend: Any) -> list[Any]:
+    """Return pyusb's device of each Falcon that ``backend`` sees, opened or not."""
+    found = usb.core.find(find_all=True, backend=backend, idVendor=constants.VENDOR_ID, idProduct=constants.PRODUCT_ID)
+    return list(found)
+
+
+def serial_of(device: Any) -> str | None:
+    """Return the serial number of pyusb's ``device``; None where it has none, or does not let itself be asked."""
+    with suppress(usb.core.USBError, ValueError, NotImplementedError):
+        return device.serial_number or None
+    return None
+
+
+def libusb_calls(library: Any, handle: Any) -> BulkCalls:
+    """Return ``libusb_bulk_transfer`` of a ctypes ``library``, and the ctypes pointer ``handle``, as addresses."""
+    from study_app.devices.falcon.bulk import BulkCalls  # noqa: PLC0415 - loads the compiler
+
+    transfer = ctypes.cast(library.libusb_bulk_transfer, ctypes.c_void_p)
+    return BulkCalls(handle=handle.value or 0, transfer=transfer.value or 0)
+
+
+def _claim(device: Any) -> None:
+    """Open and claim pyusb's ``device``, without a reset: a Falcon that runs shall run on."""
+    try:
+        device.get_active_configuration()
+    except usb.core.USBError as error:
+        if error.backend_error_code is not None or error.errno is not None:
+            raise
+        device.set_configuration()  # pyusb's own word that there is none yet
+    try:
+        held = device.is_kernel_driver_active(_INTERFACE)
+    except NotImplementedError:
+        held = False  # only Linux knows
+    if held:
+        try:
+            device.detach_kernel_driver(_INTERFACE)
+        except (usb.core.USBError, NotImplementedError) as error:
+            raise UsbFailure("kernel-driver", "opening it", _code(error)) from error
+    usb.util.claim_interface(device, _INTERFACE)
+
+
+@contextmanager
+def _failures(where: str) -> Iterator[None]:
+    """Turn pyusb's errors into ours."""
+    try:
+        yield
+    except (usb.core.USBError, NotImplementedError) as error:
+        raise usb_failure(_code(error), where) from error
+
+
+def _code(error: Exception) -> int:
+    """Return libusb's code of an error of pyusb, which says "not supported" with a class of its own."""
+    if isinstance(error, NotImplementedError):
+        return constants.ERROR_NOT_SUPPORTED
+    code = getattr(error, "backend_error_code", None)
+    if code is not None and code < 0:
+        return int(code)
+    return _CODES.get(getattr(error, "errno", None) or 0, constants.ERROR_IO)
+
+
+LIBRARIES: Final = ("ftd2xx64.dll", "ftd2xx.dll")
+_SERIAL_SIZE, _DESCRIPTION_SIZE = 16, 64
+_DATA_BYTES = constants.USB_PACKET - constants.STATUS_BYTES
+_D2XX_CODES: Final = {
+    1: constants.ERROR_NO_DEVICE,  # FT_INVALID_HANDLE
+    2: constants.ERROR_NOT_FOUND,  # FT_DEVICE_NOT_FOUND
+    3: constants.ERROR_BUSY,  # FT_DEVICE_NOT_OPENED: somebody else has opened it
+    4: constants.ERROR_NO_DEVICE,  # FT_IO_ERROR: what an unplugged bridge gives
+}
+_PURGE_RX, _PURGE_TX = 1, 2
+_EIGHT_BITS = 8
+
+Setter = Callable[[Any, Any, int], int]
+"""(library, handle, value of the control request) -> FT_STATUS."""
+
+
+def _reset(library: Any, handle: Any, value: int) -> int:
+    masks = {constants.PURGE_RX: _PURGE_RX, constants.PURGE_TX: _PURGE_TX}
+    return int(library.FT_Purge(handle, masks[value]) if value in masks else library.FT_ResetDevice(handle))
+
+
+def _modem(library: Any, handle: Any, value: int) -> int:
+    names = {
+        constants.DTR_HIGH: "FT_SetDtr",
+        constants.DTR_LOW: "FT_ClrDtr",
+        constants.RTS_HIGH: "FT_SetRts",
+        constants.RTS_LOW: "FT_ClrRts",
+    }
+    return int(getattr(library, names[value])(handle))
+
+
+def _event_character(library: Any, handle: Any, value: int) -> int:
+    return int(library.FT_SetChars(handle, value & 0xFF, 1 if value & constants.EVENT_ENABLED else 0, 0, 0))
+
+
+_SETTERS: Final[dict[int, Setter]] = {
+    constants.REQUEST_RESET: _reset,
+    constants.REQUEST_MODEM: _modem,
+    constants.REQUEST_FLOW: lambda library, handle, _: int(library.FT_SetFlowControl(handle, 0, 0, 0)),
+    constants.REQUEST_BAUD: lambda library, handle, value: int(library.FT_SetDivisor(handle, value)),
+    constants.REQUEST_LINE: lambda library, handle, _: int(
+        library.FT_SetDataCharacteristics(handle, _EIGHT_BITS, 0, 0)
+    ),
+    constants.REQUEST_EVENT_CHARACTER: _event_character,
+    constants.REQUEST_LATENCY: lambda library, handle, value: int(library.FT_SetLatencyTimer(handle, value)),
+}
+
+
+class FtdiTransport:
+    """The bridge over D2XX.
+
+    Parameters
+    ----------
+    library : D2XX as ctypes loads it; None: it is loaded by name
+    serial : number of the Falcon that is meant; None: the first
+    """
+
+    def __init__(self, library: Any = None, *, serial: str | None = None) -> None:
+        self._library = load_d2xx() if library is None else library
+        self._handle: Any = None
+        self._timeout_ms = 0
+        self._memory: Any = None
+        self.serial = serial
+        self.reopen()
+
+    @property
+    def name(self) -> str:
+        """The word by which ``open_transport`` opens it again."""
+        return self.serial or ""
+
+    def reopen(self) -> None:
+        """Close it and open it again, as new."""
+        self.close()
+        self._timeout_ms = 0
+        for index, (serial, description) in enumerate(self._listed()):
+            if constants.PRODUCT in description and self.serial in {None, serial}:
+                handle = ctypes.c_void_p()
+                self._check(self._library.FT_Open(index, ctypes.byref(handle)), "opening it")
+                self._handle, self.serial = handle, serial or None
+                return
+        raise FalconNotFound("not-found", "looking for it with FTDI's driver")
+
+    def control(self, request: int, value: int) -> None:
+        """Do what a control request with this value would do."""
+        self._check(_SETTERS[request](self._library, self._opened(), value), "setting the bridge")
+
+    def write(self, data: bytes, timeout_s: float) -> None:
+        """Send all of ``data``."""
+        handle, sent = self._opened(), ctypes.c_uint32()
+        self._set_timeout(milliseconds(timeout_s))
+        self._check(self._library.FT_Write(handle, data, len(data), ctypes.byref(sent)), "sending")
+        if sent.value < len(data):
+            raise usb_failure(constants.ERROR_TIMEOUT, "sending")
+
+    def read(self, size: int, timeout_s: float) -> bytes:
+        """Return what there is, as one packet of the bridge; wait for a first byte; nothing when the time is out."""
+        if size <= 0 or size % constants.USB_PACKET:
+            raise ValueError(f"a read asks for a multiple of {constants.USB_PACKET} bytes, not {size}")
+        self._set_timeout(milliseconds(timeout_s))
+        data = self._receive(min(max(self._waiting(), 1), _DATA_BYTES))
+        if len(data) == 1:  # perhaps it was waited for, and more came with it
+            data += self._receive(min(self._waiting(), _DATA_BYTES - 1))
+        return bytes(constants.STATUS_BYTES) + data if data else b""
+
+    def calls(self) -> BulkCalls:
+        """Return the bridge as compiled code sees it; good until `close` or `reopen`."""
+        from study_app.devices.falcon.bulk import BulkCalls, bridge_record, transfer  # noqa: PLC0415 - likewise
+
+        self._memory = bridge_record(self._library, self._opened())
+        self._timeout_ms = 0  # the C function sets its own
+        return BulkCalls(handle=int(self._memory.ctypes.data), transfer=int(transfer().address))
+
+    def now_s(self) -> float:
+        """Return the time on the machine's clock [s]."""
+        return time.monotonic()
+
+    def pause(self, seconds: float) -> None:
+        """Let that clock pass."""
+        time.sleep(seconds)
+
+    def close(self) -> None:
+        """Let go of it; a second call does nothing."""
+        handle, self._handle = self._handle, None
+        if handle is not None:
+            self._library.FT_Close(handle)
+
+    def _listed(self) -> list[tuple[str, str]]:
+        """Return serial number and description of each bridge that the driver has."""
+        count = ctypes.c_uint32()
+        self._check(self._library.FT_CreateDeviceInfoList(ctypes.byref(count)), "looking for it")
+        return [self._detail(index) for index in range(count.value)]
+
+    def _detail(self, index: int) -> tuple[str, str]:
+        numbers = [ctypes.c_uint32() for _ in range(4)]  # flags, type, ids, place: not needed
+        serial = ctypes.create_string_buffer(_SERIAL_SIZE)
+        description = ctypes.create_string_buffer(_DESCRIPTION_SIZE)
+        references = [ctypes.byref(number) for number in numbers]
+        status = self._library.FT_GetDeviceInfoDetail(
+            index, *references, serial, description, ctypes.byref(ctypes.c_void_p())
+        )
+        self._check(status, "looking for it")
+        return serial.value.decode("latin-1"), description.value.decode("latin-1")
+
+    def _waiting(self) -> int:
+        count = ctypes.c_uint32()
+        self._check(self._library.FT_GetQueueStatus(self._opened(), ctypes.byref(count)), "receiving")
+        return count.value
+
+    def _receive(self, size: int) -> bytes:
+        if size == 0:
+            return b""
+        buffer, received = ctypes.create_string_buffer(size), ctypes.c_uint32()
+        self._check(self._library.FT_Read(self._opened(), buffer, size, ctypes.byref(received)), "receiving")
+        return buffer.raw[: received.value]
+
+    def _set_timeout(self, timeout_ms: int) -> None:
+        if timeout_ms != self._timeout_ms:
+            self._check(self._library.FT_SetTimeouts(self._opened(), timeout_ms, timeout_ms), "setting the bridge")
+            self._timeout_ms = timeout_ms
+
+    def _opened(self) -> Any:
+        if self._handle is None:
+            raise FalconLost("no-device", "using it after it was closed")
+        return self._handle
+
+    @staticmethod
+    def _check(status: int, where: str) -> None:
+        if status != 0:
+            raise usb_failure(_D2XX_CODES.get(status, constants.ERROR_IO), where)
+
+
+def load_d2xx() -> Any:
+    """Return FTDI's library; raise `UsbFailure` of kind "no-ftd2xx" where there is none."""
+    loader = getattr(ctypes, "WinDLL", ctypes.CDLL)
+    for name in LIBRARIES:
+        try:
+            return loader(name)
+        except OSError:
+            continue
+    raise UsbFailure("no-ftd2xx", "loading FTDI's driver library")
+
+
+def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
+    """Return what libusb finds.
+
+    Parameters
+    ----------
+    usb : pyusb's backend; None: libusb
+    platform : as ``sys.platform`` says it
+    """
+    can = "force up to 8 N; needs firmware after it was turned on, and homing"
+    by = f"libusb {_version()}"
+    usb = usb if usb is not None else libusb_package.get_libusb1_backend()
+    if usb is None:
+        return Backend("falcon", by, NOT_AVAILABLE, can, failures_on(platform).mode("no-libusb").cure)
+    found = find_falcons(usb)
+    if not found:
+        return Backend("falcon", by, NONE, can, failures_on(platform).mode("not-connected").cure)
+    serials = [serial_of(one) for one in found]
+    why = ""
+    if None in serials:
+        cause = failures_on(platform).mode("driver" if platform == "win32" else "permission").cause
+        why = f"one does not report its serial number; perhaps {cause}: liquid-study devices doctor finds out"
+    return Backend("falcon", by, "connected: " + ", ".join(serial or "unnamed" for serial in serials), can, why)
+
+
+def probe_ftdi(d2xx: Any = None, platform: str = sys.platform) -> Backend:
+    """Return whether FTDI's driver can be used.
+
+    Parameters
+    ----------
+    d2xx : FTDI's library; None: it is loaded
+    platform : as ``sys.platform`` says it
+    """
+    can = "the same, where FTDI's or Novint's driver is bound to it; taken by itself where libusb may not open it"
+    if platform != "win32":
+        return Backend("falcon", "ftd2xx", NOT_AVAILABLE, can, "for Windows alone, where drivers keep libusb out")
+    try:
+        load_d2xx() if d2xx is None else d2xx
+    except UsbFailure as failure:
+        return Backend("falcon", "ftd2xx", NOT_AVAILABLE, can, str(failure))
+    return Backend("falcon", "ftd2xx", DRIVER_READY, can)
+
+
+def _version() -> str:
+    try:
+        return version("libusb-package")
+    except PackageNotFoundError:
+        return "(not installed)"

@@ -1,1 +1,0 @@
-"""Connections to a Falcon: libusb, FTDI, socket."""

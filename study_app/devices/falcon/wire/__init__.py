@@ -1,1 +1,0 @@
-"""Constants, packets and replies of the Falcon's protocol."""

@@ -1,0 +1,461 @@
+"""Frames of a WebSocket client, compiled: RFC 6455 §5.2 (layout), §5.3 (masking), §5.5 (control frames).
+
+A client masks what it sends; a server must not (§5.1). The service answers each message with one text frame, so
+fragments (§5.4) are not expected and count as a violation of the protocol.
+
+
+Numbers and texts written into bytes by compiled code.
+
+What a state message of the Inverse Service says of one device, read by a compiled JSON scanner (RFC 8259).
+
+The scanner checks the grammar of the whole message, in any order of its keys, and keeps the numbers at the places
+that it knows (``_PLACES``). Unknown keys are skipped, so that a later service may add some. A place is known by a hash
+of the keys that lead to it; an element of an array counts as the key ``*``.
+
+Documented in docs.haply.co, version 3.5.x: "WebSocket Protocol", steps 1 and 2 (``inverse3``: ``state.cursor_position``
+[m], ``state.cursor_velocity`` [m/s], ``status``) and "HTTP", Devices (``verse_grip``, ``wireless_verse_grip``).
+"""
+
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.haptics.kernels.compiled import kernel
+
+TEXT: Final = 0x1
+CLOSE: Final = 0x8
+PING: Final = 0x9
+PONG: Final = 0xA
+
+INCOMPLETE: Final = 0
+VIOLATION: Final = -1
+LONGEST_CONTROL: Final = 125
+
+_FIN = 0x80
+_MASKED = 0x80
+
+
+@kernel
+def parse_header(data: Any, begin: int, end: int, header: Any) -> int:
+    """Read the header of the frame that begins at ``begin``.
+
+    Parameters
+    ----------
+    data : (n,) array
+        Bytes received, of which those before ``end`` are valid.
+    begin, end : int
+        Where the frame begins, and how far bytes were received.
+    header : (2,) array
+        Is given the opcode and the length of the payload [bytes].
+
+    Returns
+    -------
+    int
+        The length of the header [bytes], `INCOMPLETE` where more bytes are needed, or `VIOLATION`.
+    """
+    if end - begin < 2:
+        return INCOMPLETE
+    first: Any = np.int64(data[begin])
+    second: Any = np.int64(data[begin + 1])
+    opcode = first & 0x0F
+    control = opcode >= CLOSE
+    if first & 0xF0 != _FIN or second & _MASKED or opcode not in (TEXT, CLOSE, PING, PONG):
+        return VIOLATION
+    size, length = 2, second
+    if length > LONGEST_CONTROL:
+        if control:
+            return VIOLATION
+        more = 2 if length == 126 else 8
+        size = 2 + more
+        if end - begin < size:
+            return INCOMPLETE
+        length = 0
+        for k in range(more):
+            length = (length << 8) | np.int64(data[begin + 2 + k])
+        if length < 0:
+            return VIOLATION
+    header[0] = opcode
+    header[1] = length
+    return size
+
+
+@kernel
+def build_frame(out: Any, opcode: int, payload: Any, length: int, key: int) -> int:
+    """Write a masked frame into ``out`` and return its length [bytes].
+
+    Parameters
+    ----------
+    out : (n,) array
+        Bytes; 8 more than the payload.
+    opcode : int
+        `TEXT`, `CLOSE` or `PONG`.
+    payload : (m,) array
+        Bytes, of which ``length`` are sent: less than 65,536.
+    length : int
+        Of the payload [bytes].
+    key : int
+        The masking key, 32 bits.
+    """
+    out[0] = np.uint8(_FIN | opcode)
+    size = 2
+    if length <= LONGEST_CONTROL:
+        out[1] = np.uint8(_MASKED | length)
+    else:
+        out[1] = np.uint8(_MASKED | 126)
+        out[2] = np.uint8(length >> 8)
+        out[3] = np.uint8(length & 0xFF)
+        size = 4
+    for k in range(4):
+        out[size + k] = np.uint8((key >> (8 * (3 - k))) & 0xFF)
+    for i in range(length):
+        out[size + 4 + i] = payload[i] ^ out[size + i % 4]
+    return size + 4 + length
+
+
+@kernel
+def next_key(state: Any) -> int:
+    """Return the next masking key, and step the generator in ``state[0]``: xorshift64*, Vigna 2016."""
+    word = state[0]
+    word ^= word >> np.uint64(12)
+    word ^= word << np.uint64(25)
+    word ^= word >> np.uint64(27)
+    state[0] = word
+    return int(np.int64((word * np.uint64(0x2545F4914F6CDD1D)) >> np.uint64(32)))
+
+
+_DECIMALS = 6
+_SCALE = 10**_DECIMALS
+
+
+@kernel
+def put_text(out: Any, at: int, text: Any) -> int:
+    """Copy ``text`` to ``out`` from ``at`` on; return where it ends."""
+    for k in range(text.size):
+        out[at + k] = text[k]
+    return at + int(text.size)
+
+
+@kernel
+def put_fixed(out: Any, at: int, value: float) -> int:
+    """Write a number with six decimals, as JSON takes it, from ``at`` on; return where it ends.
+
+    Parameters
+    ----------
+    out : (n,) array
+        Bytes.
+    at : int
+        Where to begin.
+    value : float
+        Less than 10^9 in size.
+    """
+    whole = int(abs(value) * _SCALE + 0.5)
+    if value < 0.0 and whole > 0:
+        out[at] = np.uint8(45)
+        at += 1
+    digits = _DECIMALS + 1
+    power = _SCALE
+    while whole // power >= 10:
+        power *= 10
+        digits += 1
+    for k in range(digits):
+        if digits - k == _DECIMALS:
+            out[at] = np.uint8(46)
+            at += 1
+        out[at] = np.uint8(48 + whole // power)
+        at += 1
+        whole %= power
+        power //= 10
+    return at
+
+
+UNDERSTOOD: Final = 0
+NOT_JSON: Final = 1
+NO_DEVICE: Final = 2  # the message does not list the device
+WITHOUT_POSITION: Final = 3  # the device has no position
+NOT_FINITE: Final = 4
+
+DEEPEST: Final = 16
+_OBJECT, _ARRAY = 1, 2
+_FNV_BASIS, _FNV_PRIME = 0xCBF29CE484222325, 0x100000001B3
+
+_VECTOR = ("x", "y", "z")
+_PLACES: Final = (
+    *(f"inverse3.*.state.cursor_position.{axis}" for axis in _VECTOR),
+    *(f"inverse3.*.state.cursor_velocity.{axis}" for axis in _VECTOR),
+    "inverse3.*.status.ready",
+    "inverse3.*.status.calibrated",
+    "inverse3.*.status.power_supply",
+    "verse_grip.*.state.button",
+    *(f"wireless_verse_grip.*.state.buttons.{name}" for name in "abc"),
+)
+POSITION, VELOCITY, READY, CALIBRATED, POWER, BUTTON, BUTTONS = 0, 3, 6, 7, 8, 9, 10
+PLACES: Final = len(_PLACES)
+_OF_DEVICE = 9  # places of the inverse3; those after them are of grips
+_NEEDED = 0b111
+
+SCAN = np.dtype(
+    [
+        ("own_id", np.uint64),  # hash of the device's id
+        ("kinds", np.int64, (DEEPEST,)),
+        ("paths", np.uint64, (DEEPEST,)),
+        ("candidate", np.float64, (PLACES,)),  # of the device that is being read
+        ("seen", np.int64),  # bits of the places that the candidate has
+        ("value", np.float64, (PLACES,)),  # of the device
+        ("known", np.int64),  # bits of the places that were found
+        ("is_own", np.int64),  # 1: the id of the candidate is the device's
+        ("found", np.int64),  # 1: the message lists the device
+        ("infinite", np.int64),  # 1: a number of the device is beyond what a float64 holds
+    ],
+    align=True,
+)
+
+
+def text_hash(text: bytes) -> int:
+    """Return the 64-bit FNV-1a hash of a string as it stands between the quotes."""
+    value = _FNV_BASIS
+    for byte in text:
+        value = ((value ^ byte) * _FNV_PRIME) % 2**64
+    return value
+
+
+def _path_hash(path: str) -> int:
+    value = 0
+    for key in path.split("."):
+        value = ((value ^ text_hash(key.encode())) * _FNV_PRIME) % 2**64
+    return value
+
+
+_BASIS, _PRIME = np.uint64(_FNV_BASIS), np.uint64(_FNV_PRIME)
+_ELEMENT = np.uint64(text_hash(b"*"))
+_CODES = np.array([_path_hash(path) for path in _PLACES], np.uint64)
+_DEVICE, _ID = np.uint64(_path_hash("inverse3.*")), np.uint64(_path_hash("inverse3.*.device_id"))
+_NOTHING = np.uint64(0)
+_TENS = np.array([float(f"1e{power}") for power in range(309)] + [np.inf])
+
+
+@kernel
+def scan(data: Any, begin: int, end: int, found: Any) -> int:
+    """Read a message; return `UNDERSTOOD` or why it says nothing of the device.
+
+    Parameters
+    ----------
+    data : (n,) array
+        Bytes, of which the message is those from ``begin`` to ``end``.
+    begin, end : int
+        Where the message begins and ends.
+    found : Record
+        Of type ``SCAN``, whose ``own_id`` says which device is meant.
+    """
+    found.known = found.found = found.infinite = found.seen = found.is_own = 0
+    at, depth, path, value_due = _skip(data, begin, end), 0, _NOTHING, True
+    while True:
+        if at >= end:
+            return NOT_JSON
+        byte = data[at]
+        if value_due:
+            if byte == 123 or byte == 91:  # noqa: PLR1714 - { or [; compiled as it stands
+                if depth + 1 >= DEEPEST:
+                    return NOT_JSON
+                depth += 1
+                found.kinds[depth] = _OBJECT if byte == 123 else _ARRAY
+                found.paths[depth] = path
+                if path == _DEVICE:
+                    found.seen = found.is_own = 0
+                at = _skip(data, at + 1, end)
+                if at < end and data[at] == (125 if byte == 123 else 93):
+                    value_due = False
+                    continue
+            else:
+                at = _skip(data, _scalar(data, at, end, path, found), end)
+                value_due = False
+                if at < 0:
+                    return NOT_JSON
+                if depth == 0:
+                    return NOT_JSON  # a state is an object
+                continue
+        elif byte == 44:  # ,
+            at = _skip(data, at + 1, end)
+        elif byte == (125 if found.kinds[depth] == _OBJECT else 93):  # } ]
+            if found.paths[depth] == _DEVICE:
+                _keep(found)
+            depth -= 1
+            at = _skip(data, at + 1, end)
+            if depth == 0:
+                return _verdict(found) if at == end else NOT_JSON
+            continue
+        else:
+            return NOT_JSON
+        # the next member or element
+        value_due = True
+        if found.kinds[depth] == _ARRAY:
+            path = (found.paths[depth] ^ _ELEMENT) * _PRIME
+            continue
+        close = _string_end(data, at, end)
+        if close < 0:
+            return NOT_JSON
+        path = (found.paths[depth] ^ _hash(data, at + 1, close)) * _PRIME
+        at = _skip(data, close + 1, end)
+        if at >= end or data[at] != 58:  # :
+            return NOT_JSON
+        at = _skip(data, at + 1, end)
+
+
+@kernel
+def _verdict(found: Any) -> int:
+    if found.found == 0:
+        return NO_DEVICE
+    if found.infinite:
+        return NOT_FINITE
+    return UNDERSTOOD if found.known & _NEEDED == _NEEDED else WITHOUT_POSITION
+
+
+@kernel
+def _keep(found: Any) -> None:
+    """Take over what was read of a device, if it is the one."""
+    if found.is_own == 0:
+        return
+    found.found = 1
+    found.known |= found.seen
+    for place in range(_OF_DEVICE):
+        if found.seen >> place & 1:
+            found.value[place] = found.candidate[place]
+            if not abs(found.value[place]) < np.inf:
+                found.infinite = 1
+
+
+@kernel
+def _skip(data: Any, at: int, end: int) -> int:
+    """Return where the white space from ``at`` on ends; a negative ``at`` as it is."""
+    while 0 <= at < end and data[at] <= 32:
+        byte = data[at]
+        if byte != 32 and byte != 10 and byte != 13 and byte != 9:  # noqa: PLR1714 - compiled
+            return at
+        at += 1
+    return at
+
+
+@kernel
+def _string_end(data: Any, at: int, end: int) -> int:
+    """Return where the closing quote of the string at ``at`` is; -1 where there is none."""
+    if at >= end or data[at] != 34:
+        return -1
+    at += 1
+    while at < end and data[at] != 34:
+        if data[at] < 32:
+            return -1
+        if data[at] == 92:
+            at += 1
+            if at >= end or not _is_escape(data, at, end):
+                return -1
+        at += 1
+    return at if at < end else -1
+
+
+@kernel
+def _is_escape(data: Any, at: int, end: int) -> bool:
+    """Return whether what follows a backslash is an escape (RFC 8259 §7): a letter of these, or u and four digits."""
+    if data[at] != 117:
+        return data[at] in (34, 92, 47, 98, 102, 110, 114, 116)
+    if at + 4 >= end:
+        return False
+    for k in range(1, 5):
+        byte = data[at + k]
+        if not (48 <= byte <= 57 or 65 <= byte <= 70 or 97 <= byte <= 102):
+            return False
+    return True
+
+
+@kernel
+def _hash(data: Any, begin: int, end: int) -> Any:
+    value = _BASIS
+    for i in range(begin, end):
+        value = (value ^ np.uint64(data[i])) * _PRIME
+    return value
+
+
+@kernel
+def _scalar(data: Any, at: int, end: int, path: Any, found: Any) -> int:
+    """Read a string, number or literal, and keep it where its place is known; return where it ends, -1: nowhere."""
+    byte = data[at]
+    if byte == 34:
+        close = _string_end(data, at, end)
+        if close < 0:
+            return -1
+        if path == _ID and _hash(data, at + 1, close) == found.own_id:
+            found.is_own = 1
+        return close + 1
+    if byte == 116:  # true
+        return _literal(data, at, end, _TRUE, 1.0, path, found)
+    if byte == 102:  # false
+        return _literal(data, at, end, _FALSE, 0.0, path, found)
+    if byte == 110:  # null
+        return _literal(data, at, end, _NULL, np.nan, path, found)
+    return _number(data, at, end, path, found)
+
+
+_TRUE, _FALSE, _NULL = (np.frombuffer(word, np.uint8) for word in (b"true", b"false", b"null"))
+
+
+@kernel
+def _literal(data: Any, at: int, end: int, word: Any, value: float, path: Any, found: Any) -> int:
+    if at + word.size > end:
+        return -1
+    for k in range(word.size):
+        if data[at + k] != word[k]:
+            return -1
+    _note(found, path, value)
+    return at + int(word.size)
+
+
+@kernel
+def _number(data: Any, at: int, end: int, path: Any, found: Any) -> int:
+    """Read a number: right to 1 part in 10^15, which is far below what a device resolves."""
+    negative = data[at] == 45
+    if negative:
+        at += 1
+    first, mantissa, power = at, 0.0, 0
+    while at < end and 48 <= data[at] <= 57:
+        mantissa = 10.0 * mantissa + (np.int64(data[at]) - 48)
+        at += 1
+    if at == first or (data[first] == 48 and at > first + 1):
+        return -1
+    if at < end and data[at] == 46:
+        at += 1
+        first = at
+        while at < end and 48 <= data[at] <= 57:
+            mantissa = 10.0 * mantissa + (np.int64(data[at]) - 48)
+            power -= 1
+            at += 1
+        if at == first:
+            return -1
+    if at < end and (data[at] == 69 or data[at] == 101):
+        at += 1
+        down = at < end and data[at] == 45
+        if at < end and (data[at] == 43 or data[at] == 45):
+            at += 1
+        first = at
+        exponent: Any = 0
+        while at < end and 48 <= data[at] <= 57:
+            exponent = min(10 * exponent + (np.int64(data[at]) - 48), 9999)
+            at += 1
+        if at == first:
+            return -1
+        power += -exponent if down else exponent
+    value = mantissa
+    if power != 0 and mantissa != 0.0:
+        tens = _TENS[min(abs(power), _TENS.size - 1)]
+        value = mantissa / tens if power < 0 else mantissa * tens
+    _note(found, path, -value if negative else value)
+    return at
+
+
+@kernel
+def _note(found: Any, path: Any, value: float) -> None:
+    for place in range(PLACES):
+        if path == _CODES[place]:
+            if place < _OF_DEVICE:
+                found.candidate[place] = value
+                found.seen |= 1 << place
+            else:
+                found.value[place] = value
+                found.known |= 1 << place

@@ -1,0 +1,225 @@
+"""Devices made of ``haptics.kernels.plant`` and a hand: the mouse, and the common part of it and the scripted device.
+
+The read of such a device advances hand and handle to the given time, inside the servo's loop; its write stores the
+force for the next step. With the mouse the liquid is seen instead of felt: a spring and a damper connect a simulated
+handle to the pointer, and the liquid's force acts on that handle: it lags behind the pointer by force / stiffness, and
+continues after the pointer has stopped, as the liquid moves it. In free space it follows smoothly, 20 ms behind (two
+low-passes of 10 ms, which smooth the pointer's steps).
+
+
+A device moved by a simulated hand: along a given motion or in human-like reaches, with tremor and encoders.
+"""
+
+from functools import cache
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from study_app.devices.base import Device
+from study_app.devices.hand import HAND, POINT, HandOrders, move_held_handle
+from study_app.haptics.kernels.c_functions import (
+    READ,
+    READ_LOST,
+    READ_NEW,
+    READ_NOTHING_NEW,
+    WRITE,
+    c_function,
+    record_at,
+)
+from study_app.haptics.kernels.plant import HANDLE, let_go, measure, new_handle, push
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, records
+
+SIMULATED = np.dtype(
+    [
+        ("handle", HANDLE),
+        ("hand", HAND),
+        ("last_ns", np.int64),  # time of the last read
+        ("started", np.int64),  # 1 after the first read
+        ("buttons", np.int64),
+        ("unplugged", np.int64),  # 1: does not respond
+        ("measures_velocity", np.int64),  # 1: reports the handle's velocity with every sample
+    ],
+    align=True,
+)
+_simulated_at = record_at(SIMULATED)
+_reading_at = record_at(READING)
+_command_at = record_at(COMMAND)
+POINTED_MASS_KG = 0.2
+POINTED_STIFFNESS_NPM = 400.0  # 8 N hold the handle back by 20 mm, a fifth of the workspace
+POINTED_DAMPING_NSPM = 27.0  # 1.5 times critical
+LAG_S = 0.010
+
+
+class SimulatedDevice(HandOrders, Device):
+    """A handle moved by a hand; the subclass defines ``name``, hand and parameters.
+
+    Parameters
+    ----------
+    workspace_m : half extents of the end stops [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    """
+
+    name = ""
+
+    def __init__(self, handle: Any, workspace_m: tuple[float, float, float], force_limit_n: float) -> None:
+        self._memory = records(SIMULATED, 1)
+        super().__init__(self._memory[0], workspace_m)
+        self.force_limit_n = force_limit_n
+        self.state.handle = handle
+        self.state.handle.stop_m = workspace_m
+        self.context = int(self._memory.ctypes.data)
+        self.read, self.write = _functions()
+        self.hold(0.0, 0.0, 0.0)
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """The handle's dynamics, with its delay at 1 kHz."""
+        handle = self.state.handle
+        lag_s = 0.0 if self.state.measures_velocity else None
+        return Dynamics(1e-3 * float(handle.delay), float(handle.quantum_m), float(handle.mass_kg), lag_s)
+
+    def measure_velocity(self) -> None:
+        """Report the handle's velocity with every sample, like devices with tachometers."""
+        self.state.measures_velocity = 1
+
+    def unplug(self) -> None:
+        """Stop responding, like a disconnected device."""
+        self.state.unplugged = 1
+
+    def open(self) -> None:
+        """Connect it again."""
+        self.state.unplugged = 0
+
+    def close(self) -> None:
+        """Set the force on the handle to zero."""
+        let_go(self.state.handle)
+
+    def describe(self) -> dict[str, Any]:
+        """Return name and numbers for the receipt."""
+        handle = self.state.handle
+        return {
+            "name": self.name,
+            "workspace_m": list(self.workspace_m),
+            "force_limit_n": self.force_limit_n,
+            "mass_kg": float(handle.mass_kg),
+            "viscous_nspm": float(handle.viscous_nspm),
+            "coulomb_n": float(handle.coulomb_n),
+            "stiffness_npm": float(handle.stiffness_npm),
+            "damping_nspm": float(handle.damping_nspm),
+            "quantum_m": float(handle.quantum_m),
+            "dynamics": self.dynamics.describe(),
+        }
+
+
+@cache
+def _functions() -> tuple[Any, Any]:
+    """Compile read and write, once for all simulated devices."""
+    return c_function(READ, _read), c_function(WRITE, _write)
+
+
+def _read(context: int, now_ns: int, reading: int) -> int:
+    device = _simulated_at(context)
+    if device.unplugged != 0:
+        return READ_LOST
+    elapsed_s = 0.0
+    if device.started != 0:
+        if now_ns <= device.last_ns:
+            return READ_NOTHING_NEW
+        elapsed_s = (now_ns - device.last_ns) * 1e-9
+    device.started = 1
+    device.last_ns = now_ns
+    move_held_handle(device, now_ns, elapsed_s)
+    out = _reading_at(reading)
+    measure(device.handle, out.position_m)
+    out.buttons = device.buttons
+    out.delay_ticks = device.handle.delay
+    if device.measures_velocity != 0:
+        out.measured |= MEASURED_VELOCITY
+        for axis in range(3):
+            out.velocity_mps[axis] = device.handle.velocity_mps[axis]
+    return READ_NEW
+
+
+def _write(context: int, command: int) -> int:
+    device, force_n = _simulated_at(context), _command_at(command).force_n
+    push(device.handle, force_n[0], force_n[1], force_n[2])
+    return READ_LOST if device.unplugged != 0 else 0
+
+
+class PointedDevice(SimulatedDevice):
+    """A handle connected to a pointer; the subclass moves the pointer.
+
+    Parameters
+    ----------
+    workspace_m : half extents of the handle's workspace [m]
+    force_limit_n : the greatest force that may be commanded [N]
+    """
+
+    def __init__(
+        self, workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05), force_limit_n: float = 8.0
+    ) -> None:
+        handle = new_handle(
+            mass_kg=POINTED_MASS_KG, stiffness_npm=POINTED_STIFFNESS_NPM, damping_nspm=POINTED_DAMPING_NSPM
+        )
+        super().__init__(handle, workspace_m, force_limit_n)
+        self.state.hand.lag_s = LAG_S
+
+    def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
+        """Set the pointer's place [m, hand frame]; a place outside the workspace counts as its border."""
+        self._post(POINT, target_m=self._inside(x_m, y_m, z_m))
+
+
+class MouseDevice(PointedDevice):
+    """The built-in default: a pointer and its buttons without hardware; a window sets the pointer."""
+
+    name = "mouse"
+
+
+MASS_KG = 0.2
+VISCOUS_NSPM = 0.5
+COULOMB_N = 0.1
+STIFFNESS_NPM = 500.0
+DAMPING_NSPM = 30.0
+QUANTUM_M = 38e-6  # one count of a Falcon at the knee
+TREMOR_M = 5e-5  # three waves of this amplitude an axis: 0.06 mm in the mean square root, 0.15 mm at most
+
+
+def new_scripted_handle(quantum_m: float) -> Any:
+    """Return the handle in a simulated participant's hand, with encoders of this count [m]."""
+    return new_handle(
+        mass_kg=MASS_KG,
+        viscous_nspm=VISCOUS_NSPM,
+        coulomb_n=COULOMB_N,
+        stiffness_npm=STIFFNESS_NPM,
+        damping_nspm=DAMPING_NSPM,
+        quantum_m=quantum_m,
+    )
+
+
+class ScriptedDevice(SimulatedDevice):
+    """A handle in the hand of a simulated participant; the same ``random`` moves it to the same bit anywhere.
+
+    Parameters
+    ----------
+    random : random numbers for frequencies and phases of the tremor; None: always the same ones
+    workspace_m : half extents of the handle's workspace [m]
+    force_limit_n : the greatest force that may be commanded [N]
+    tremor_m : amplitude of each of the tremor's three waves per axis [m]; 0: no tremor quantum_m : one count of the
+    encoders [m]; 0: exact
+    """
+
+    name = "scripted"
+
+    def __init__(
+        self,
+        random: Random | None = None,
+        *,
+        workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05),
+        force_limit_n: float = 8.0,
+        tremor_m: float = TREMOR_M,
+        quantum_m: float = QUANTUM_M,
+    ) -> None:
+        super().__init__(new_scripted_handle(quantum_m), workspace_m, force_limit_n)
+        self._tremble(random, tremor_m)

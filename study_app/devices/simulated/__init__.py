@@ -1,1 +1,0 @@
-"""Devices without hardware: a simulated hand and handle."""
