@@ -1,7 +1,7 @@
 """Velocity estimators, sample validation and safety layer on real encoders, recorded at 1 kHz.
 
 ``python tests/benchmarks/haptics/encoders.py [FOLDER]``: a folder of the data set named in
-``tests/evidence/velocity/encoders.md`` (340 recordings, some minutes); without it, the excerpt beside the tests.
+``tests/evidence/stability/encoders.md`` (340 recordings, some minutes); without it, the excerpt beside the tests.
 """
 
 import sys
@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_ESTIMATOR, LIMITER_GLITCH
 from study_app.protocol.load import load_scene
-from tests.evidence.velocity.recorded_encoders import (
+from tests.evidence.stability.recorded_encoders import (
     COUNTS_M,
     ESTIMATORS,
     errors,

@@ -5,7 +5,7 @@ import pytest
 
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NORM, LIMITER_SLEW, LIMITER_SLOPE
 from study_app.protocol.load import load_scene
-from tests.evidence.velocity.recorded_encoders import COUNTS_M, ESTIMATORS, FORCE_LIMIT_N, errors, excerpt, felt
+from tests.evidence.stability.recorded_encoders import COUNTS_M, ESTIMATORS, FORCE_LIMIT_N, errors, excerpt, felt
 from tests.haptics.scenes import COMPILED
 
 pytestmark = [pytest.mark.skipif(not COMPILED, reason="many thousands of ticks"), pytest.mark.slow]
