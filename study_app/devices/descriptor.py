@@ -178,7 +178,6 @@ class DeviceDescriptor:
 
     @property
     def window_options(self) -> tuple[DeviceOption, ...]:
-        """The options that windows ask for."""
         return tuple(option for option in self.options if option.in_windows)
 
     def window_values(self, values: Mapping[str, str | Path]) -> dict[str, str | Path]:

@@ -56,7 +56,6 @@ class Report:
 
     @property
     def found(self) -> tuple[Finding, ...]:
-        """The failures found."""
         return tuple(finding for finding in self.findings if finding.state == "found")
 
     @property
@@ -66,17 +65,14 @@ class Report:
 
     @property
     def unseen(self) -> tuple[Finding, ...]:
-        """The findings that could not be checked."""
         return tuple(finding for finding in self.findings if finding.state == "not checked")
 
     @property
     def well(self) -> bool:
-        """Whether no failure was found."""
         return not self.found and self.failure is None
 
     @property
     def conclusion(self) -> str:
-        """The summary, in a sentence."""
         if not self.well:
             return f"Found: {len(self.found)}."
         if self.unseen:
@@ -145,7 +141,6 @@ class FailureTable:
     not_found: frozenset[str]
 
     def mode(self, mode: str) -> FailureMode:
-        """Return the mode with this id."""
         return next(one for one in self.modes if one.id == mode)
 
     def before(self, mode: str) -> set[str]:

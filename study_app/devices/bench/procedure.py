@@ -154,7 +154,6 @@ def run_bench(
 
 
 def _held(**more: Any) -> Excitation:
-    """Return a spring to the middle, with more."""
     return Excitation(
         **{
             "stiffness_npm": SPRING_NPM,
@@ -232,7 +231,6 @@ def _gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], ob
 
 
 def _wait(stand: Stand, answered: Callable[[], str | None]) -> str:
-    """Let time pass until the operator has answered."""
     _, answer = stand.run(_PATIENCE_S, answered=answered)
     if answer is None:
         raise DeviceError(f"nothing was answered for {_PATIENCE_S:g} s, so the bench was ended; the force is zero")

@@ -119,11 +119,9 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         return handle.emulator.calls()
 
     def now_s(self) -> float:
-        """Return the emulated time [s]."""
         return self.emulators[0].now_ns * 1e-9
 
     def pause(self, seconds: float) -> None:
-        """Let emulated time pass."""
         for emulator in self.emulators:
             emulator.pause(seconds)
 
@@ -135,27 +133,22 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
     # The interface of pyusb.
 
     def enumerate_devices(self) -> Iterator[Emulator]:
-        """Yield the Falcons whose cable is in."""
         return (emulator for emulator in self.emulators if not emulator.faults.is_on("unplugged"))
 
     def get_device_descriptor(self, dev: Emulator) -> Any:
-        """Return the ids."""
         return SimpleNamespace(**_DEVICE, bus=1, address=1 + self.emulators.index(dev))
 
     def get_configuration_descriptor(self, dev: Emulator, config: int) -> Any:
-        """Return the one configuration."""
         if config != 0:
             raise IndexError(f"a Falcon has one configuration, number 0, not {config}")
         return SimpleNamespace(**_CONFIGURATION)
 
     def get_interface_descriptor(self, dev: Emulator, intf: int, alt: int, config: int) -> Any:
-        """Return the one interface."""
         if (intf, alt) != (0, 0):
             raise IndexError(f"a Falcon has one interface, number 0, not {intf}, {alt}")
         return SimpleNamespace(**_INTERFACE)
 
     def get_endpoint_descriptor(self, dev: Emulator, ep: int, intf: int, alt: int, config: int) -> Any:
-        """Return one of the two endpoints."""
         return SimpleNamespace(
             bLength=7,
             bDescriptorType=5,
@@ -172,7 +165,6 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         """Return no hub: it is connected directly."""
 
     def open_device(self, dev: Emulator) -> _Handle:
-        """Open a Falcon."""
         if dev.faults.is_on("unplugged"):
             _check(constants.ERROR_NO_DEVICE)
         if dev.faults.is_on("access_denied"):
@@ -188,16 +180,13 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
             del self._claims[id(dev_handle.emulator)]
 
     def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
-        """Choose the only configuration there is."""
         self._reach(dev_handle)
 
     def get_configuration(self, dev_handle: _Handle) -> int:
-        """Return the only configuration there is."""
         self._reach(dev_handle)
         return _CONFIGURATION_VALUE
 
     def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
-        """Claim the Falcon."""
         emulator = self._reach(dev_handle)
         if intf != 0:
             _check(constants.ERROR_NOT_FOUND)
@@ -208,31 +197,26 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         emulator.claimed()
 
     def release_interface(self, dev_handle: _Handle, intf: int) -> None:
-        """Release it."""
         emulator = self._reach(dev_handle)
         if self._claims.pop(id(emulator), None) is None:
             _check(constants.ERROR_NOT_FOUND)
 
     def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
-        """Return whether the kernel's driver is attached."""
         return self._reach(dev_handle).faults.is_on("kernel_driver")
 
     def detach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
-        """Detach the kernel's driver."""
         faults = self._reach(dev_handle).faults
         if faults.is_on("kernel_driver_stays"):
             _check(constants.ERROR_ACCESS)
         faults.off("kernel_driver")
 
     def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
-        """Transfer bytes out."""
         code, moved = self._claimed(dev_handle).write(bytes(data), timeout)
         if moved == 0 or code != constants.ERROR_TIMEOUT:  # what went before the time was out is reported, as by libusb
             _check(code)
         return moved
 
     def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
-        """Transfer bytes in."""
         code, data = self._claimed(dev_handle).read(len(buff) * buff.itemsize, timeout)
         if not data or code != constants.ERROR_TIMEOUT:
             _check(code)
@@ -249,7 +233,6 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         data: Any,
         timeout: int,
     ) -> int:
-        """Carry out a request of the bridge, or return a string descriptor."""
         emulator = self._reach(dev_handle)
         if bmRequestType == constants.REQUEST_TYPE:
             _check(emulator.control(bRequest, wValue))
@@ -334,11 +317,9 @@ class EmulatedFalcon(FalconDevice):
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:
-        """Return the device of a request, closed."""
         return cls(request.random, **cls._given(request))
 
     def take_fault(self, fault: str) -> None:
-        """Have a fault."""
         self.hand.take(fault)
 
     def open(self) -> None:
@@ -352,7 +333,6 @@ class EmulatedFalcon(FalconDevice):
         self._backend.follow_clock(self.context)  # FALCON begins with the time of the tick
 
     def close(self) -> None:
-        """Send zero torque several times and close it; a second call does nothing."""
         self._backend.follow_clock(0)
         super().close()
 

@@ -28,15 +28,12 @@ class EmulatedLink:
         service.connected()
 
     def calls(self) -> TransferCalls:
-        """Return it as compiled code sees it."""
         return TransferCalls(*service_calls(self._service))
 
     def send(self, data: bytes) -> None:
-        """Send all of it."""
         self._service.take_bytes(data)
 
     def receive(self, timeout_s: float) -> bytes:
-        """Return what came."""
         data = self._service.give_bytes()
         if not data and self._service.state.ended:
             raise FAILURES.failure("closed", "while it was opened")
@@ -45,11 +42,9 @@ class EmulatedLink:
         return data
 
     def now_s(self) -> float:
-        """Return the emulated time [s]."""
         return 1e-9 * float(self._service.state.now_ns)
 
     def close(self) -> None:
-        """Let the service see the end of the stream."""
         self._service.disconnected()
 
 
@@ -81,11 +76,9 @@ class EmulatedInverse3(Inverse3Device):
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:
-        """Return the device of a request, closed."""
         return cls(request.random, progress=request.progress, **request.limits)
 
     def take_fault(self, fault: str) -> None:
-        """Have a fault."""
         self.hand.take(fault, FAULT_AFTER)
 
     def open(self) -> None:
@@ -95,7 +88,6 @@ class EmulatedInverse3(Inverse3Device):
         self.hand.follow_clock(self.context)  # the record begins with the time of the tick
 
     def close(self) -> None:
-        """Send zero force and a close frame, and close the connection; a second call does nothing."""
         super().close()
         self.hand.follow_clock(0)
 

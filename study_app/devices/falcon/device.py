@@ -95,7 +95,6 @@ class FalconDevice(FramedDevice):
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:
-        """Return the device of a request, closed."""
         return cls(request.argument, **cls._given(request))
 
     @staticmethod
@@ -151,11 +150,9 @@ class FalconDevice(FramedDevice):
         return self.exchange.status.encoders.copy(), self.exchange.units.copy()
 
     def describe(self) -> dict[str, Any]:
-        """Return its record for the receipt."""
         return super().describe() | {"delay_ticks": int(self.exchange.delay)}
 
     def observed(self) -> tuple[str, ...]:
-        """Return what the doctor prints about it."""
         found, serial = self.found, self.found["serial"]
         used = found["calibration"]
         return (
@@ -168,7 +165,6 @@ class FalconDevice(FramedDevice):
         )
 
     def appeared(self, samples: Any) -> set[str]:
-        """Return the modes of failure that a run at rest shows in its samples."""
         if self.failure_mode is not None:
             return {self.failure_mode}
         moved_m = np.ptp(samples["position_m"][_BEGIN:], axis=0).max()
@@ -251,7 +247,6 @@ class FalconDevice(FramedDevice):
             self.exchange[name] = 0
 
     def _tick(self) -> None:
-        """Run a tick without force."""
         now_ns = round(1e9 * self.connection.now_s())
         self.read.ctypes(self.context, now_ns, int(self.reading.ctypes.data))
         self.write.ctypes(self.context, int(self._command.ctypes.data))

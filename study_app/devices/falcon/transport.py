@@ -37,16 +37,13 @@ _WRITE_S: Final = 0.1
 
 
 class Transport(Protocol):
-    """An open bridge; all methods raise `UsbFailure`."""
+    """An open bridge; all methods raise `UsbFailure`. ``serial`` is its serial number, if it reports one."""
+
+    serial: str | None
 
     @property
     def name(self) -> str:
         """The word by which `open_transport` opens it again."""
-        ...
-
-    @property
-    def serial(self) -> str | None:
-        """Its serial number, if it reports one."""
         ...
 
     def control(self, request: int, value: int) -> None:
@@ -70,11 +67,11 @@ class Transport(Protocol):
 
     def now_s(self) -> float:
         """Return the time on the clock that its time-outs run on [s]."""
-        ...
+        return time.monotonic()
 
     def pause(self, seconds: float) -> None:
         """Let that clock pass."""
-        ...
+        time.sleep(seconds)
 
     def reopen(self) -> None:
         """Close it and open it again, as new."""
@@ -140,7 +137,7 @@ _CODES: Final = {
 }
 
 
-class PyUsbTransport:
+class PyUsbTransport(Transport):
     """The bridge over pyusb.
 
     Parameters
@@ -162,11 +159,9 @@ class PyUsbTransport:
 
     @property
     def name(self) -> str:
-        """The word by which ``open_transport`` opens it again."""
         return self.serial or ""
 
     def reopen(self) -> None:
-        """Close it and open it again, as new."""
         self.close()
         with _failures("looking for it"):
             found = find_falcons(self._backend)
@@ -192,12 +187,10 @@ class PyUsbTransport:
         self._device, self.serial = device, serial
 
     def control(self, request: int, value: int) -> None:
-        """Send a control request with its value."""
         with _failures("setting the bridge"):
             self._open_device().ctrl_transfer(constants.REQUEST_TYPE, request, value, 0, None, _CONTROL_TIMEOUT_MS)
 
     def write(self, data: bytes, timeout_s: float) -> None:
-        """Send all of ``data``."""
         with _failures("sending"):
             sent = self._open_device().write(constants.ENDPOINT_OUT, data, constants.milliseconds(timeout_s))
         if sent < len(data):
@@ -216,7 +209,6 @@ class PyUsbTransport:
             raise
 
     def calls(self) -> BulkCalls:
-        """Return the bridge as compiled code sees it; good until `close` or `reopen`."""
         handle = self._open_device()._ctx.handle  # noqa: SLF001 - pyusb has no public way to it
         own = getattr(self._backend, "c_calls", None)
         if own is not None:
@@ -224,16 +216,13 @@ class PyUsbTransport:
         return libusb_calls(self._backend.lib, handle.handle)
 
     def now_s(self) -> float:
-        """Return the time on the backend's clock, or the machine's [s]."""
         own = getattr(self._backend, "now_s", None)
         return time.monotonic() if own is None else float(own())
 
     def pause(self, seconds: float) -> None:
-        """Let that clock pass."""
         getattr(self._backend, "pause", time.sleep)(seconds)
 
     def close(self) -> None:
-        """Let go of it; a second call does nothing."""
         device, self._device = self._device, None
         if device is not None:
             with suppress(usb.core.USBError, NotImplementedError):  # it may be gone
@@ -353,7 +342,7 @@ _SETTERS: Final[dict[int, Setter]] = {
 }
 
 
-class FtdiTransport:
+class FtdiTransport(Transport):
     """The bridge over D2XX.
 
     Parameters
@@ -372,11 +361,9 @@ class FtdiTransport:
 
     @property
     def name(self) -> str:
-        """The word by which ``open_transport`` opens it again."""
         return self.serial or ""
 
     def reopen(self) -> None:
-        """Close it and open it again, as new."""
         self.close()
         self._timeout_ms = 0
         for index, (serial, description) in enumerate(self._listed()):
@@ -388,11 +375,9 @@ class FtdiTransport:
         raise FalconNotFound("not-found", "looking for it with FTDI's driver")
 
     def control(self, request: int, value: int) -> None:
-        """Do what a control request with this value would do."""
         self._check(_SETTERS[request](self._library, self._opened(), value), "setting the bridge")
 
     def write(self, data: bytes, timeout_s: float) -> None:
-        """Send all of ``data``."""
         handle, sent = self._opened(), ctypes.c_uint32()
         self._set_timeout(milliseconds(timeout_s))
         self._check(self._library.FT_Write(handle, data, len(data), ctypes.byref(sent)), "sending")
@@ -410,23 +395,13 @@ class FtdiTransport:
         return bytes(constants.STATUS_BYTES) + data if data else b""
 
     def calls(self) -> BulkCalls:
-        """Return the bridge as compiled code sees it; good until `close` or `reopen`."""
         from study_app.devices.falcon.bulk import BulkCalls, bridge_record, transfer  # noqa: PLC0415 - likewise
 
         self._memory = bridge_record(self._library, self._opened())
         self._timeout_ms = 0  # the C function sets its own
         return BulkCalls(handle=int(self._memory.ctypes.data), transfer=int(transfer().address))
 
-    def now_s(self) -> float:
-        """Return the time on the machine's clock [s]."""
-        return time.monotonic()
-
-    def pause(self, seconds: float) -> None:
-        """Let that clock pass."""
-        time.sleep(seconds)
-
     def close(self) -> None:
-        """Let go of it; a second call does nothing."""
         handle, self._handle = self._handle, None
         if handle is not None:
             self._library.FT_Close(handle)

@@ -71,7 +71,6 @@ class ForceDimensionDevice(FramedDevice):
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:
-        """Return the device of a request, closed."""
         return cls(request.argument, library=request.options.get(OPTION), **request.limits)
 
     def _connect(self) -> Functions:
@@ -103,7 +102,6 @@ class ForceDimensionDevice(FramedDevice):
         return CAUSES.get(int(self.exchange.off_cause), "") if mode == "force-off" else ""
 
     def observed(self) -> tuple[str, ...]:
-        """Return what the doctor prints about it."""
         found, counters = self.found, self.counters
         watchdog_s = found.get("watchdog_s")
         return (

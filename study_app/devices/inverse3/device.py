@@ -76,7 +76,6 @@ class Inverse3Device(FramedDevice):
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:
-        """Return the device of a request, closed."""
         return cls(request.argument, progress=request.progress, **request.limits)
 
     def _connect(self) -> Link:
@@ -111,7 +110,6 @@ class Inverse3Device(FramedDevice):
         return 1e-9 * float(self.exchange.age_ns)
 
     def observed(self) -> tuple[str, ...]:
-        """Return what the doctor prints about it."""
         found = self.found
         return (
             f"opened, device {found['device_id']}, round trip {found['round_trip_ms']:.2f} ms",

@@ -161,7 +161,6 @@ class Messages:
         self._link.send(out[:size].tobytes())
 
     def receive(self) -> dict[str, Any]:
-        """Return the next message."""
         while True:
             data = np.frombuffer(self._came, np.uint8)
             size = parse_header(data, 0, data.size, self._header)
@@ -178,7 +177,6 @@ class Messages:
             self._came += self._link.receive(REPLY_S)
 
     def ask(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Send a message and return the answer."""
         self.send(message)
         return self.receive()
 

@@ -205,19 +205,16 @@ class SocketLink:
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def calls(self) -> TransferCalls:
-        """Return it as compiled code sees it; from then on nothing waits."""
         self._socket.setblocking(False)
         return TransferCalls(self._socket.fileno(), *_addresses())
 
     def send(self, data: bytes) -> None:
-        """Send all of it."""
         try:
             self._socket.sendall(data)
         except OSError as error:
             raise FAILURES.failure("closed", str(error.strerror or error)) from error
 
     def receive(self, timeout_s: float) -> bytes:
-        """Return what came, at least a byte."""
         self._socket.settimeout(timeout_s)
         try:
             data = self._socket.recv(1 << 16)
@@ -230,15 +227,9 @@ class SocketLink:
         return data
 
     def now_s(self) -> float:
-        """Return the monotonic time [s]."""
         return time.monotonic()
 
     def close(self) -> None:
-        """Close it once the service has read all, or after `CLOSE_S`; a second call does nothing.
-
-        A socket that is closed with bytes unread resets the connection, and some systems (Windows) then throw away what
-        the service has not read yet: zero force and the close frame.
-        """
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
             self._socket.settimeout(CLOSE_S)

@@ -99,7 +99,6 @@ class SpaceMouseDevice(PointedDevice):
             self._open_hid = None
 
     def describe(self) -> dict[str, Any]:
-        """Return name and numbers for the receipt."""
         own = {
             "model": None if self._model is None else self._model.name,
             "full_speed_mps": FULL_SPEED_MPS,
