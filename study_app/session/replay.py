@@ -42,26 +42,15 @@ from study_app.store.blinded.blinding import Key, as_recorded, opened, whole_pro
 from study_app.store.delivered import Delivered, delivered, delivered_error, judged
 from study_app.store.folders import locate
 from study_app.store.journals import journal
-from study_app.store.journals.journal_events import (
-    DeviceReconnected,
-    Event,
-    IntervalEnded,
-    IntervalStarted,
-    Recorded,
-    RecordingLost,
-    SessionResumed,
-    Stepped,
-    TrialEnded,
-    TrialStarted,
-    Which,
-    start_of,
-)
+from study_app.store.journals import journal_events as events
 from study_app.store.progress import named
 
 TOLERANCE: Final = 1e-9
 
 
-def scene_presented(protocol: Protocol, key: Key, started: TrialStarted, interval: int | None, link_seed: int) -> Scene:
+def scene_presented(
+    protocol: Protocol, key: Key, started: events.TrialStarted, interval: int | None, link_seed: int
+) -> Scene:
     """Return the presented scene: of a condition, or of an interval of a trial whose sealed line is opened.
 
     ``link_seed`` is that of jitter and loss of the force.
@@ -81,7 +70,7 @@ class Step:
 
 
 def steps_of(
-    protocol: Protocol, key: Key, started: TrialStarted, interval: int | None, lines: Sequence[Event]
+    protocol: Protocol, key: Key, started: events.TrialStarted, interval: int | None, lines: Sequence[events.Event]
 ) -> tuple[Step, ...]:
     """Return the steps of an interval that a force depends on, in order; none where no level was set.
 
@@ -91,7 +80,7 @@ def steps_of(
     if interval is None or started.level is None or interval != len(started.arrangement or ""):
         return ()
     presented = presented_by(protocol, key.codes, started.fields()).intervals[interval - 1]
-    made = [line for line in lines if isinstance(line, Stepped) and line.which == started.which]
+    made = [line for line in lines if isinstance(line, events.Stepped) and line.which == started.which]
     setting = adjusting_of(protocol, protocol.blocks[started.block], started.standard, started.level)
     if setting is None:
         return ()
@@ -132,7 +121,7 @@ def interval_samples(samples: Any, duration_s: float) -> Any:
 def delivered_again(
     protocol: Protocol,
     presented: Stimulated,
-    started: TrialStarted,
+    started: events.TrialStarted,
     interval: int,
     samples: Any,
     measured: Mapping[str, Any],
@@ -224,7 +213,7 @@ def replay(session_folder: Path) -> Replayed:
     protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
     _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code: no part of what is measured
     found = _Found()
-    ends = {line.which: line for line in lines if isinstance(line, TrialEnded | IntervalEnded)}
+    ends = {line.which: line for line in lines if isinstance(line, events.TrialEnded | events.IntervalEnded)}
     before: _Before | None = None
     resumed_at: str | None = None
     for started, which, line, resumed in _presented(lines):
@@ -233,7 +222,7 @@ def replay(session_folder: Path) -> Replayed:
         if resumed not in devices:
             raise StoreError(f"{session.receipt} lacks the device since {resumed}: restore it from a copy")
         name = named(*which)
-        if not isinstance(line, Recorded):
+        if not isinstance(line, events.Recorded):
             why = "the journal gives no reason" if line is None else line.reason
             found.uncompared.append(f"{name}: has no recording: {why}")
             continue
@@ -459,31 +448,31 @@ def _listed(seconds: list[int]) -> str:
 
 
 def _presented(
-    lines: Sequence[Event],
-) -> Iterator[tuple[TrialStarted, Which, Recorded | RecordingLost | None, str | None]]:
+    lines: Sequence[events.Event],
+) -> Iterator[tuple[events.TrialStarted, events.Which, events.Recorded | events.RecordingLost | None, str | None]]:
     """Yield the start of each trial or interval that was to be recorded, which it is, and the line about its recording.
 
     In the order of presentation, each with the time at which the session had been resumed, or its device connected
     again, last; None before that.
     """
-    ends = {line.which: line for line in lines if isinstance(line, Recorded | RecordingLost)}
-    if not lines or not start_of(lines).recordings:
+    ends = {line.which: line for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
+    if not lines or not events.start_of(lines).recordings:
         return
     resumed_at: str | None = None
-    started: TrialStarted | None = None
+    started: events.TrialStarted | None = None
     for line in lines:
-        if isinstance(line, SessionResumed | DeviceReconnected):
+        if isinstance(line, events.SessionResumed | events.DeviceReconnected):
             resumed_at = line.at
-        elif isinstance(line, TrialStarted):
+        elif isinstance(line, events.TrialStarted):
             started = line
             if not line.has_intervals:
                 yield line, line.which, ends.get(line.which), resumed_at
-        elif isinstance(line, IntervalStarted) and started is not None:
+        elif isinstance(line, events.IntervalStarted) and started is not None:
             yield started, line.which, ends.get(line.which), resumed_at
 
 
 def _ran(
-    path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[Event]
+    path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[events.Event]
 ) -> tuple[Protocol, dict[str | None, _Device], tuple[int, str]]:
     """Return what ran, by the receipt that was ``kept`` at ``path``: protocol, devices, and seed with participant.
 
@@ -491,7 +480,7 @@ def _ran(
     """
     try:
         described = {None: kept["device"]} | {entry["at"]: entry["device"] for entry in kept.get("resumed", ())}
-        described |= {line.at: line.described for line in lines if isinstance(line, DeviceReconnected)}
+        described |= {line.at: line.described for line in lines if isinstance(line, events.DeviceReconnected)}
         devices = {
             at: _Device(float(device.get("force_limit_n", np.inf)), dynamics_from(device), rules_from(device))
             for at, device in described.items()

@@ -12,40 +12,7 @@ from study_app.protocol.trials.methods import Heard
 from study_app.protocol.trials.presentation import arrangement_of, heard_of
 from study_app.protocol.trials.tracks import design_of
 from study_app.store.delivered import Broken, beyond_limits
-from study_app.store.journals.journal_events import (
-    UNDELIVERED,
-    Answer,
-    AnswerRemoved,
-    Broke,
-    Choice,
-    DeviceReconnected,
-    Event,
-    FormAnswered,
-    FormShown,
-    IntervalEnded,
-    IntervalStarted,
-    ItemShown,
-    LanguageChosen,
-    Note,
-    OutletLost,
-    PageLeft,
-    PageShown,
-    PassedOver,
-    Paused,
-    Recorded,
-    RecordingLost,
-    Repeat,
-    Responses,
-    Resumed,
-    SessionEnded,
-    SessionResumed,
-    SessionStarted,
-    TargetReached,
-    TrialEnded,
-    TrialStarted,
-    Which,
-    start_of,
-)
+from study_app.store.journals import journal_events as events
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,13 +57,13 @@ class Progress:
     every attempt that was not delivered as requested.
     """
 
-    start: SessionStarted | None = None
+    start: events.SessionStarted | None = None
     step: int = 0
     page: str | None = None
     trial: int | None = None
     attempt: int = 0
     task_done: bool = False
-    answers: dict[str, Answer] = field(default_factory=dict)
+    answers: dict[str, events.Answer] = field(default_factory=dict)
     invalid: int = 0
     presented: dict[int, int] = field(default_factory=dict)
     steps: dict[int, int] = field(default_factory=dict)
@@ -117,7 +84,7 @@ class Progress:
     lost: dict[int, str] = field(default_factory=dict)
     lacking: dict[int, int] = field(default_factory=dict)
     outlets_lost: dict[str, str] = field(default_factory=dict)
-    notes: list[Note] = field(default_factory=list)
+    notes: list[events.Note] = field(default_factory=list)
     repeats: int = 0
     paused: bool = False
     broke: str = ""
@@ -126,10 +93,10 @@ class Progress:
     repeated: dict[int, tuple[str, ...]] = field(default_factory=dict)
     undelivered: dict[int, tuple[str, ...]] = field(default_factory=dict)
     _reason: str = ""
-    _left_open: dict[tuple[int, int], dict[str, Answer]] = field(default_factory=dict)
+    _left_open: dict[tuple[int, int], dict[str, events.Answer]] = field(default_factory=dict)
 
     @property
-    def unconfirmed(self) -> dict[tuple[int, int], dict[str, Answer]]:
+    def unconfirmed(self) -> dict[tuple[int, int], dict[str, events.Answer]]:
         """The choices without a confirmation, by trial and attempt."""
         found = dict(self._left_open)
         chosen = {item: answer for item, answer in self.answers.items() if answer.given}
@@ -137,69 +104,69 @@ class Progress:
             found[self.trial, self.attempt] = chosen
         return found
 
-    def take(self, line: Event) -> None:
+    def take(self, line: events.Event) -> None:
         """Process one more line."""
         at_s = line.t_s
         match line:
-            case SessionStarted():
+            case events.SessionStarted():
                 self.start, self.language = line, line.language
-            case PageShown(page=page):
+            case events.PageShown(page=page):
                 self._show_page(page, at_s)
-            case FormShown(form=form):
+            case events.FormShown(form=form):
                 self._show_page(form, at_s)
                 self.answers = {}
-            case PageLeft():
+            case events.PageLeft():
                 self._leave()
-            case TrialStarted():
+            case events.TrialStarted():
                 self._start_trial(line)
-            case TrialEnded():
+            case events.TrialEnded():
                 self._end_trial(line)
-            case IntervalEnded(trial=trial, invalid=limits) if limits:
+            case events.IntervalEnded(trial=trial, invalid=limits) if limits:
                 self.undelivered[trial] = (*self.undelivered.get(trial, ()), *limits)
-            case TargetReached():
+            case events.TargetReached():
                 self.targets += 1
-            case ItemShown(item=item):
-                self.answers[item] = self.answers.get(item, Answer()).shown(at_s)
-            case Choice(item=item):
-                self.answers[item] = self.answers.get(item, Answer()).chosen(at_s, line.value)
-            case AnswerRemoved(item=item):
-                self.answers[item] = self.answers.get(item, Answer()).removed()
-            case Responses() | FormAnswered():
+            case events.ItemShown(item=item):
+                self.answers[item] = self.answers.get(item, events.Answer()).shown(at_s)
+            case events.Choice(item=item):
+                self.answers[item] = self.answers.get(item, events.Answer()).chosen(at_s, line.value)
+            case events.AnswerRemoved(item=item):
+                self.answers[item] = self.answers.get(item, events.Answer()).removed()
+            case events.Responses() | events.FormAnswered():
                 self._confirm(line)
-            case PassedOver():
+            case events.PassedOver():
                 self._go_to(line.page, line.trial)
                 self._leave()
-            case Recorded() if line.samples_unrecorded:
+            case events.Recorded() if line.samples_unrecorded:
                 self.lacking[line.trial] = line.samples_unrecorded
-            case RecordingLost():
+            case events.RecordingLost():
                 self.lost[line.trial] = line.reason
-            case OutletLost():
+            case events.OutletLost():
                 self.outlets_lost[line.outlet] = line.reason
-            case Note():
+            case events.Note():
                 self.notes.append(replace(line, t_s=at_s - self.away_s))
-            case Repeat():
+            case events.Repeat():
                 self._forget(line.trial)
                 self.repeats += 1
                 self._reason = line.reason
-            case Paused() | Resumed():
-                self.paused = isinstance(line, Paused)
-            case Broke():
+            case events.Paused() | events.Resumed():
+                self.paused = isinstance(line, events.Paused)
+            case events.Broke():
                 self.broke = line.what
-            case DeviceReconnected():
+            case events.DeviceReconnected():
                 self.broke = ""
-            case LanguageChosen():
+            case events.LanguageChosen():
                 self.language = line.language
-            case SessionResumed():
+            case events.SessionResumed():
                 self._resume(max(0.0, at_s - self.t_s))
-            case SessionEnded():
+            case events.SessionEnded():
                 self._close(at_s)
                 self.ended, self.fingerprint, self.paused = line.status, line.others.get("fingerprint", ""), False
         self.t_s = max(self.t_s, at_s)
 
-    def _confirm(self, line: Responses | FormAnswered) -> None:
+    def _confirm(self, line: events.Responses | events.FormAnswered) -> None:
         """Take the answers of a trial or a form as confirmed."""
-        self.answered[line.form if isinstance(line, FormAnswered) else line.trial] = len(line.items)
-        if isinstance(line, Responses) and line.trial == self.of_intervals:
+        self.answered[line.form if isinstance(line, events.FormAnswered) else line.trial] = len(line.items)
+        if isinstance(line, events.Responses) and line.trial == self.of_intervals:
             answer = line.items[0].answer
             seconds = None if answer.onset_s is None or answer.first_s is None else answer.first_s - answer.onset_s
             self.trial_answers[line.trial] = TrialAnswer(answer.value, seconds)
@@ -227,7 +194,7 @@ class Progress:
         self._enter(at_s)
         self.trial_since_s = self.trial_lasted_s = None
 
-    def _start_trial(self, line: TrialStarted) -> None:
+    def _start_trial(self, line: events.TrialStarted) -> None:
         """Present a trial, perhaps again; an earlier one is repeated if its whole block is."""
         trial = line.trial
         self._go_to(None, trial)
@@ -239,14 +206,14 @@ class Progress:
         self._enter(line.t_s)
         self.trial_since_s, self.trial_lasted_s, self.targets, self.paused = line.t_s, None, 0, False
         self.of_intervals = trial if line.has_intervals else None
-        if line.has_intervals and line.attempt > 1 and self._reason != UNDELIVERED:
+        if line.has_intervals and line.attempt > 1 and self._reason != events.UNDELIVERED:
             self.repeated[trial] = (*self.repeated.get(trial, ()), self._reason or "interrupted")
         self._reason = ""
 
-    def _end_trial(self, line: TrialEnded) -> None:
+    def _end_trial(self, line: events.TrialEnded) -> None:
         self.trial_lasted_s = None if self.trial_since_s is None else line.t_s - self.trial_since_s
         self.task_done = line.outcome in ("complete", "timeout")
-        self.invalid += line.outcome == UNDELIVERED
+        self.invalid += line.outcome == events.UNDELIVERED
         if self.task_done:
             self.broken[line.trial] = beyond_limits(line.others, {} if self.start is None else self.start.limits)
         else:
@@ -277,7 +244,7 @@ class Progress:
             self.durations_s[self.here] = at_s - self.here_since_s
 
 
-def progress_of(lines: Sequence[Event]) -> Progress:
+def progress_of(lines: Sequence[events.Event]) -> Progress:
     """Return the progress of a session from its journal's lines.
 
     Raises
@@ -285,24 +252,24 @@ def progress_of(lines: Sequence[Event]) -> Progress:
     StoreError
         They do not begin as a session's do.
     """
-    start_of(lines)
+    events.start_of(lines)
     now = Progress()
     for line in lines:
         now.take(line)
     return now
 
 
-def heard_in(protocol: Protocol, lines: Iterable[Event]) -> tuple[Heard, ...]:
+def heard_in(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[Heard, ...]:
     """Return the answered trials, each at the level that was presented, by number; the last answer counts.
 
     Lines that do not fit the study, or whose sealed fields are not opened, raise KeyError or ValueError.
     """
-    started: dict[tuple[int, int], TrialStarted] = {}
+    started: dict[tuple[int, int], events.TrialStarted] = {}
     found: dict[int, Heard] = {}
     for line in lines:
-        if isinstance(line, TrialStarted):
+        if isinstance(line, events.TrialStarted):
             started[line.trial, line.attempt] = line
-        elif isinstance(line, Responses):
+        elif isinstance(line, events.Responses):
             start = started[line.trial, line.attempt]
             block = protocol.blocks[start.block]
             if block.design is None:
@@ -316,12 +283,13 @@ def heard_in(protocol: Protocol, lines: Iterable[Event]) -> tuple[Heard, ...]:
     return tuple(found[number] for number in sorted(found))
 
 
-def recordable(lines: Iterable[Event]) -> list[Which]:
+def recordable(lines: Iterable[events.Event]) -> list[events.Which]:
     """Return trial, attempt and interval of all planned or existing recordings; the interval is None for a trial."""
     return [
         line.which
         for line in lines
-        if isinstance(line, IntervalStarted) or (isinstance(line, TrialStarted) and not line.has_intervals)
+        if isinstance(line, events.IntervalStarted)
+        or (isinstance(line, events.TrialStarted) and not line.has_intervals)
     ]
 
 

@@ -7,15 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study_app.devices.descriptor import (
-    DEFAULT_DEVICE,
-    DRIVER_READY,
-    NONE,
-    READY,
-    Backend,
-    DeviceDescriptor,
-    DeviceOption,
-)
+from study_app.devices import DEFAULT_DEVICE
+from study_app.devices.descriptor import DRIVER_READY, NONE, READY, Backend, DeviceDescriptor, DeviceOption
 from study_app.devices.registry import descriptor_of, discover, title_of
 from study_app.errors import DeviceError
 from study_app.store.workstation import REMEMBERED_OPTIONS, DeviceBench

@@ -16,6 +16,7 @@ from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.analysis.conftest import SAMPLE
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
@@ -37,8 +38,8 @@ def known(session: SessionFolder, folder: Path) -> list[dict[str, float]]:
     measured = ("limiter_", "force_", "path_", "mean_speed", "duration_")
     return [
         {name: it for name, it in line.items() if name.startswith(measured) and it is not None and name not in LATER}
-        for line in opened(journal.read(session.journal), read_key(folder))
-        if line.event == "trial_ended"
+        for line in raw(opened(journal.read(session.journal), read_key(folder)))
+        if line["event"] == "trial_ended"
     ]
 
 

@@ -59,10 +59,10 @@ class CutOff:
 def run(study: Protocol, store: SessionStore, kept: Kept, felt: ConditionFeatures, passed: SimulatedTime) -> None:
     """Answer a session from where its journal ends."""
     begun = store.lines[0]
-    own = session_protocol(store.place.study_folder, store.as_recorded(study), begun["participant"], begun["session"])
-    schedule = build_schedule(own, begun["participant"], begun["seed"])
+    own = session_protocol(store.place.study_folder, store.as_recorded(study), begun.participant, begun.session)
+    schedule = build_schedule(own, begun.participant, begun.seed)
     start = resume_at(own, schedule, store.lines, store.key)
-    state = open_session(own, schedule, store.key.codes, begun["language"], start, store.key.nonce)
+    state = open_session(own, schedule, store.key.codes, begun.language, start, store.key.nonce)
     Answering(study, state, kept, passed, lambda block, condition: felt[block, condition]).run()
 
 
@@ -91,7 +91,7 @@ def cut_off_and_resumed(study: Protocol, source: bytes, results: Path, felt: Con
     with reopen(store.folder.path, study, source, now=datetime.fromisoformat(lines[-1].at), **again) as store:
         run(study, store, store, felt, passed)
     ended = journal.read(store.folder.journal)[-1]
-    assert ended["status"] == "completed" or ended["reason"].startswith("the criterion of block")
+    assert ended.status == "completed" or ended.reason.startswith("the criterion of block")
 
 
 def check_outputs(study: Protocol, results: Path, to: Path) -> None:

@@ -23,6 +23,7 @@ from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 
 pytestmark = [pytest.mark.slow, needs_servo]
 
@@ -63,8 +64,8 @@ def test_sessions_are_complete_and_every_response_is_there_once(rehearsed: tuple
         assert [row["code"] for row in trials] == [trial.code for trial in schedule.trials]
         assert {row["outcome"] for row in trials} == {"complete"}
         assert {(row["samples_dropped"], row["overruns"]) for row in trials} == {("0", "0")}
-        lines = opened(journal.read(session.journal), read_key(folder.path))
-        measured = [line for line in lines if line.event == "trial_ended"]
+        lines = raw(opened(journal.read(session.journal), read_key(folder.path)))
+        measured = [line for line in lines if line["event"] == "trial_ended"]
         assert len(measured) == len(trials)
         assert {line["limiter_non_finite"] for line in measured} == {0}
         assert all(abs(line["delay_error_mean_ms"]) < 10 and line["frames"] > 100 for line in measured)
@@ -84,7 +85,7 @@ def test_a_rehearsed_study_is_sound_and_every_force_of_it_comes_out_again(rehear
 
 
 def journal_events(session: SessionFolder, name: str) -> list[dict[str, Any]]:
-    return [line for line in journal.read(session.journal) if line.event == name]
+    return [line for line in raw(journal.read(session.journal)) if line["event"] == name]
 
 
 def test_answers_follow_what_was_seen(rehearsal_of: Callable[[str], Path]) -> None:
@@ -148,9 +149,9 @@ def test_a_kill_during_part_2_leaves_every_earlier_answer_readable(tmp_path: Pat
                 break
     assert child.returncode == -signal.SIGKILL
     (session,) = StudyFolder(tmp_path / "rek2024").sessions()
-    lines = journal.read(session.journal)
+    lines = raw(journal.read(session.journal))
     choices: list[list[Any]] = [
-        ["choice", str(line.trial), line.item, str(line.value)] for line in lines if line.event == "choice"
+        ["choice", str(line["trial"]), line["item"], str(line["value"])] for line in lines if line["event"] == "choice"
     ]
     expected = [entry for entry in told if entry[0] == "choice"]
     assert choices[: len(expected)] == expected

@@ -70,8 +70,8 @@ def test_a_disk_that_fills_up_is_waited_for_and_nothing_is_lost_or_doubled(
         finish(each)
     assert len(answers(world)) == small.RESPONSES
     assert answers(world) == answers(undisturbed)
-    assert [line.n for line in world.lines] == list(range(1, len(world.lines) + 1))
-    assert [line.event for line in world.lines].count("note") == 1
+    assert [line["n"] for line in world.lines] == list(range(1, len(world.lines) + 1))
+    assert [line["event"] for line in world.lines].count("note") == 1
     assert verify(tmp_path / "two").errors == ()
 
 
@@ -87,7 +87,7 @@ def test_a_session_whose_last_line_meets_a_full_disk_is_finished_when_there_is_r
     world.run(RETRY_S + 0.1)
     assert world.runner.stalled is None
     assert isinstance(world.pages[-1], EndPage)
-    assert world.lines[-1].status == "completed"
+    assert world.lines[-1]["status"] == "completed"
     assert verify(tmp_path / "study").sound
 
 

@@ -14,6 +14,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 
 FROZEN_S = 1.5
 
@@ -42,9 +43,9 @@ def held_with_a_freeze(folder: Path, how: str) -> tuple[dict[str, str], dict[str
         program.kill()
         program.wait()
     (session,) = StudyFolder(folder / "results").sessions()
-    lines = journal.read(session.journal)
-    assert [line.by for line in lines if line.event == "paused"] == ["program"]
-    assert not any(line.event == "broke" for line in lines)
+    lines = raw(journal.read(session.journal))
+    assert [line["by"] for line in lines if line["event"] == "paused"] == ["program"]
+    assert not any(line["event"] == "broke" for line in lines)
     assert verify(folder / "results").errors == ()
     with session.table("demo", "trials").open(newline="", encoding="utf-8") as file:
         frozen, again = csv.DictReader(file)

@@ -16,6 +16,7 @@ from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.killer_runs import outcomes_of
+from tests.journal_lines import raw
 from tests.platforms import needs_fork
 
 TIMES = {"answered_at", "onset_s", "first_choice_s", "last_change_s", "attempt"}
@@ -76,12 +77,12 @@ def test_killed_at_random_moments_a_session_is_completed_as_if_nothing_had_been(
             continue
         assert outcome["resumed"] == 0, outcome["after_s"]
         interrupted += 1
-        lines = journal.read(session(study).journal)
+        lines = raw(journal.read(session(study).journal))
         *before, _torn = outcome["held"].split("\n")
         assert lines[: len(before)] == [json.loads(line) for line in before]
-        resumed = [line.event for line in lines].count("session_resumed")
+        resumed = [line["event"] for line in lines].count("session_resumed")
         assert resumed == ("\n" in outcome["held"] and "session_ended" not in outcome["held"])
-        assert lines[-1].status == "completed"
+        assert lines[-1]["status"] == "completed"
         assert answers(study) == answers(whole)
         assert last_attempts(study) == last_attempts(whole)
         assert len(answers(study)) == short.ANSWERS == orders_of(load(str(tmp_path / "short.toml"))).answers
@@ -95,5 +96,5 @@ def told_answers(held: list[str], found: list[dict[str, str]]) -> None:
     """Assert that every answer that was confirmed before the kill stands in the table, with the value it had."""
     table = {(row["trial"], row["attempt"], row["item"]): row["response"] for row in found}
     for line in map(json.loads, held):
-        for given in line.items if line.event == "responses" else ():
-            assert table[str(line.trial), str(line.attempt), given["item"]] == str(given["value"])
+        for given in line["items"] if line["event"] == "responses" else ():
+            assert table[str(line["trial"]), str(line["attempt"]), given["item"]] == str(given["value"])

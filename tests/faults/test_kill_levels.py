@@ -14,6 +14,7 @@ from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults.support.killer_runs import outcomes_of
+from tests.journal_lines import raw
 from tests.platforms import needs_fork
 from tests.session.pairs import short_text
 
@@ -37,11 +38,9 @@ def told(study: Path) -> dict[tuple[Any, ...], Any]:
     """
     (session,) = StudyFolder(study).sessions()
     found: dict[tuple[Any, ...], Any] = {}
-    for line in opened(journal.read(session.journal), read_key(study)):
-        if line.event in OF_TRIALS:
-            found[line.event, getattr(line, "trial", line.get("page")), getattr(line, "interval", None)] = comparable(
-                line
-            )
+    for line in raw(opened(journal.read(session.journal), read_key(study))):
+        if line["event"] in OF_TRIALS:
+            found[line["event"], line.get("trial", line.get("page")), line.get("interval")] = comparable(line)
     return found
 
 
@@ -100,6 +99,6 @@ def test_one_session_killed_again_and_again_equals_one_that_was_not(tmp_path: Pa
     assert outcome["kills"] > 0.8 * KILLS
     study = Path(outcome["folder"])
     (session,) = StudyFolder(study).sessions()
-    events = [line.event for line in journal.read(session.journal)]
+    events = [line["event"] for line in raw(journal.read(session.journal))]
     assert events.count("session_resumed") > 0.5 * KILLS
     equals(study, told(tmp_path / "whole"))

@@ -14,6 +14,7 @@ from study_app.store.journals import journal
 from study_app.store.tables.csv_files import unguarded
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.worlds import StoredWorld
+from tests.journal_lines import raw
 
 TEXTS = (
     'she said "oil, or tar"',
@@ -38,9 +39,9 @@ def test_a_free_text_survives_journal_tables_and_readers(tmp_path: Path, text: s
     world.runner.post(Note(world.clock(), "note", text))
     world.runner.post(RepeatAsked(world.clock(), f"again: {text}"))
     world.runner.post(EndAsked(world.clock(), "withdrawn", text))
-    lines = journal.read(world.store.folder.journal)
-    assert [line.text for line in lines if line.event == "note"] == [text]
-    assert lines[-1].reason == text
+    lines = raw(journal.read(world.store.folder.journal))
+    assert [line["text"] for line in lines if line["event"] == "note"] == [text]
+    assert lines[-1]["reason"] == text
     path = world.store.folder.table("small", "trials")
     with path.open(newline="", encoding="utf-8") as file:
         first, _ = list(csv.DictReader(file))

@@ -22,6 +22,7 @@ from study_app.store.journals import journal
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.racers import race
+from tests.journal_lines import raw
 from tests.platforms import needs_fork
 from tests.session import small
 from tests.studies import once, rehearsed
@@ -124,8 +125,8 @@ def test_of_two_programs_exactly_one_gets_each_id_and_both_have_the_same_key(tmp
         assert re.match(r"refused: participant P001 already has session 1.*nothing was changed", lost), raced
         assert free == [won, won]
         study = StudyFolder(tmp_path / str(number))
-        (line,) = journal.read(study.session("P001", 1).journal)
-        assert line.event == "session_started"
+        (line,) = raw(journal.read(study.session("P001", 1).journal))
+        assert line["event"] == "session_started"
         table = study.participants("small").read_text(encoding="utf-8").splitlines()
         assert [row.split(",")[1] for row in table[1:]] == ["P001", "P002", "P003"]
         assert not list(study.path.rglob("*.tmp"))

@@ -24,6 +24,7 @@ from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.watched_program import Person
+from tests.journal_lines import raw
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
 
@@ -51,7 +52,7 @@ def hold(folder: Path, watch: Any) -> tuple[int | str, list[dict[str, Any]]]:
     person.leave()
     (session,) = StudyFolder(results).sessions()
     assert verify(results).errors == ()
-    return code, journal.read(session.journal)
+    return code, raw(journal.read(session.journal))
 
 
 def in_tank(participant: ParticipantWindow) -> bool:
@@ -75,7 +76,7 @@ def test_the_participants_window_that_is_closed_is_a_pause(tmp_path: Path, machi
 
     code, lines = hold(tmp_path, watch)
     assert (code, done) == (0, ["closed", "paused"])
-    assert lines[-1].status == "completed"
+    assert lines[-1]["status"] == "completed"
 
 
 @pytest.mark.nightly
@@ -96,8 +97,8 @@ def test_escape_again_and_again_loses_nothing(tmp_path: Path) -> None:
 
     code, lines = hold(tmp_path, watch)
     assert code == 0
-    assert sum(len(line.items) for line in lines if line.event == "responses") == short.ANSWERS
-    assert any(line.event == "paused" for line in lines)
+    assert sum(len(line["items"]) for line in lines if line["event"] == "responses") == short.ANSWERS
+    assert any(line["event"] == "paused" for line in lines)
 
 
 def test_the_operators_window_that_is_closed_twice_leaves_the_session_unfinished(
@@ -114,7 +115,7 @@ def test_the_operators_window_that_is_closed_twice_leaves_the_session_unfinished
 
     _, lines = hold(tmp_path, watch)
     assert not any(forces)
-    assert "session_ended" not in [line.event for line in lines]
+    assert "session_ended" not in [line["event"] for line in lines]
 
 
 def test_a_request_to_terminate_in_a_trial_interrupts_it_and_can_be_resumed(
@@ -129,7 +130,7 @@ def test_a_request_to_terminate_in_a_trial_interrupts_it_and_can_be_resumed(
     code, lines = hold(tmp_path, watch)
     assert code == 128 + signal.SIGTERM
     ended, paused, _ = lines[-3:]
-    assert [line.event for line in lines[-3:]] == ["trial_ended", "paused", "recorded"]
+    assert [line["event"] for line in lines[-3:]] == ["trial_ended", "paused", "recorded"]
     assert (ended["outcome"], paused["by"]) == ("interrupted", "program")
     assert progress_of(lines).ended is None
     assert not machines[0].servo.force_is_on
@@ -156,4 +157,4 @@ def test_a_device_that_vanishes_is_a_calm_page_a_reason_and_a_broken_session(
     calm, reason = seen[0]
     assert "stopped responding" in reason
     assert "device" not in calm
-    assert lines[-1].status == "broken"
+    assert lines[-1]["status"] == "broken"

@@ -198,10 +198,10 @@ def test_an_interrupted_session_goes_on_with_the_sealed_liquid(
 ) -> None:
     kept, answered = SessionStore.append, count(1)
 
-    def interrupted(self: SessionStore, event: str, **fields: Any) -> None:
-        if event == "responses" and next(answered) == 2:
+    def interrupted(self: SessionStore, event: Any, **about: Any) -> None:
+        if event.event == "responses" and next(answered) == 2:
             raise KeyboardInterrupt
-        kept(self, event, **fields)
+        kept(self, event, **about)
 
     with monkeypatch.context() as patched:
         patched.setattr(SessionStore, "append", interrupted)

@@ -253,8 +253,8 @@ def present(store: SessionStore, schedule: Schedule) -> None:
     """Present every trial of a schedule and end the session."""
     for trial in schedule.trials:
         fields = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
-        store.append("trial_started", trial=trial.number, attempt=1, **fields)
-        store.append("trial_ended", trial=trial.number, attempt=1, outcome="complete")
+        store.append(event_of("trial_started", trial=trial.number, attempt=1, **fields))
+        store.append(event_of("trial_ended", trial=trial.number, attempt=1, outcome="complete"))
     store.finish("completed")
 
 

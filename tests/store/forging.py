@@ -13,6 +13,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import line_bytes, read
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.study_files import write_participants
+from tests.journal_lines import event_from, raw
 
 Lines = list[dict[str, Any]]
 
@@ -37,11 +38,11 @@ def cover_up(study: Path) -> None:
     folder.fingerprints.unlink(missing_ok=True)
     for session in folder.sessions():
         lines = read(session.journal)
-        name = lines[0]["study"]
+        name = lines[0].study
         for path, content in table_files(Place(folder, session, name), lines, None):
             path.write_bytes(content)
         session.checksums.unlink(missing_ok=True)
-        if lines[-1]["event"] == "session_ended":
+        if lines[-1].event == "session_ended":
             note_fingerprint(folder, session, fingerprint(write_checksums(session, {})))
         write_participants(folder, name)
 
@@ -54,9 +55,10 @@ def change(session: Path, edit: Callable[[Lines], None], after: Callable[[Lines]
     """Change the journal as somebody would who has the key, before and after it is sealed."""
     path = session / "journal.jsonl"
     key = read_key(session.parents[2])
-    lines: Lines = [dict(line) for line in opened(read(path), key)]
+    lines: Lines = raw(opened(read(path), key))
     edit(lines)
-    closed = [lines[0], *({**sealed(lines[0], line["event"], line, key)} for line in lines[1:])]
+    start, *rest = map(event_from, lines)
+    closed = raw([start, *(sealed(start, line, key) for line in rest)])
     after(closed)
     content = b""
     for number, line in enumerate(closed, start=1):

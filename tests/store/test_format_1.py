@@ -14,6 +14,7 @@ import pytest
 from study_app.store.blinded.blinding import Key, opened, read_key, sealed
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.columns import TABLES
+from tests.journal_lines import event_from, raw
 
 RECORDED: dict[str, dict[str, Any]] = json.loads((Path(__file__).parent / "format_1.json").read_text())
 UNEQUAL = ("at", "previous", "version", "sha256", "frames_sha256")
@@ -34,21 +35,28 @@ def sha256(content: object) -> str:
 
 def journal(path: Path, key: Key) -> list[dict[str, Any]]:
     """Return the lines without what differs from run to run; the recorder writes its own lines whenever it is done."""
-    lines = opened([json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()], key)
+    lines = raw(opened([event_from(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()], key))
     fields = (
         {name: value for name, value in line.items() if name not in UNEQUAL + ADDED and not MEASURED.match(name)}
         for line in lines
     )
-    kept = [sealed(lines[0], one["event"], one, key) for one in fields]
+    kept = [sealed_again(lines[0], one, key) for one in fields]
     told = [line for line in kept if line["event"] != "recorded"]
     saved = [{**line, "t_s": None} for line in kept if line["event"] == "recorded"]
     saved.sort(key=lambda line: (line["trial"], line["attempt"]))
     return [{**line, "n": number} for number, line in enumerate((*told, *saved), start=1)]
 
 
+def sealed_again(start: dict[str, Any], line: dict[str, Any], key: Key) -> dict[str, Any]:
+    """Return a line with its sealed values in one text, whatever is missing of it."""
+    fields = sealed(event_from(start), event_from(line), key).fields()
+    of_all = {name: value for name, value in line.items() if name in ("n", "event", "t_s", "at", "previous")}
+    return of_all | {name: value for name, value in fields.items() if name in line or name == "sealed"}
+
+
 def measured(path: Path, key: Key) -> list[float]:
     """Return what was measured in each trial."""
-    lines = opened([json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()], key)
+    lines = raw(opened([event_from(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()], key))
     return [
         value for line in lines for name, value in sorted(line.items()) if MEASURED.match(name) and value is not None
     ]

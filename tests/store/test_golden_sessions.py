@@ -19,6 +19,7 @@ from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.verification.verify_study import verify
 from tests import golden
 from tests.golden_values import changed, table_lines, value_lines
+from tests.journal_lines import event_of
 from tests.studies import made_up, once
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -99,7 +100,7 @@ def test_a_journal(tmp_path: Path, pytestconfig: pytest.Config) -> None:
     progress, told, before = Progress(), list[str](), list[str]()
     with begin(study, load("demo"), source_bytes("demo"), start) as session:
         for number, (event, fields) in enumerate(EVENTS):
-            session.append(event, t_s=float(number), **fields)
+            session.append(event_of(event, **fields), t_s=float(number))
             session.write_tables()
             after = [*lines_of(study), *value_lines(progress, "progress")]
             told += [f"== {event}", *changed(before, after)]

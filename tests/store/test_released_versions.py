@@ -19,6 +19,7 @@ from study_app.store.journals import journal
 from study_app.store.sessions.recovery import rebuild
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
@@ -89,7 +90,7 @@ def test_an_unfinished_session_is_resumed_to_its_end(tmp_path: Path) -> None:
     before = session.journal.read_bytes()
     rehearsal.resume(session.path, protocol=RELEASES / "0.2" / "demo.toml")
     assert session.journal.read_bytes().startswith(before)
-    assert journal.read(session.journal)[-1]["status"] == "completed"
+    assert raw(journal.read(session.journal))[-1]["status"] == "completed"
     assert verify(folder.path).errors == ()
 
 
@@ -127,10 +128,10 @@ def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path) ->
     before = folder.journal.read_bytes()
     rehearsal.resume(folder.path, protocol=HELD / "rek2024.toml")
     assert folder.journal.read_bytes().startswith(before)
-    lines = journal.read(folder.journal)
-    assert lines[-1].status == "completed"
-    resumed = next(line.n for line in lines if line.event == "session_resumed")
-    assert [line.n for line in lines if "previous" in line] == list(range(resumed, len(lines) + 1))
+    lines = raw(journal.read(folder.journal))
+    assert lines[-1]["status"] == "completed"
+    resumed = next(line["n"] for line in lines if line["event"] == "session_resumed")
+    assert [line["n"] for line in lines if "previous" in line] == list(range(resumed, len(lines) + 1))
     assert len(StudyFolder(study).fingerprints.read_text().splitlines()) == 1
     assert "data: 1 journal is of format 1" in warned(study)
     content = folder.journal.read_bytes()

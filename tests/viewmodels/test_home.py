@@ -68,7 +68,7 @@ def stop_at(results, participant, steps, *, screens=None, source="demo", then=()
         rows = [{"item": item, "number": number, **answer} for number, item in enumerate(step.items, 1)]
         store.append(event_of("responses", trial=step.number, attempt=1, items=rows))
     for event, said in then:
-        store.append(event, **said)
+        store.append(event_of(event, **said))
     store.close()
 
 

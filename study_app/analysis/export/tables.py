@@ -301,9 +301,9 @@ class QuestionCells:
 def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
     """Return the wide table of all answers that count, and what each of its columns holds.
 
-    Columns are ``item__condition``, or ``item__code`` until the key was opened; where a study has blocks that would
-    give the same name, ``block__item__condition``. A repeated setting gives the median, as in the analysis, of options
-    and texts the last one. Questions of forms are ``form__item``, scores ``form__score``.
+    Columns are ``item__condition``, or ``item__code`` until the key was opened; where blocks or a form would give the
+    same name, ``block__item__condition``. A repeated setting gives the median, as in the analysis, of options and texts
+    the last one. Questions of forms are ``form__item``, scores ``form__score``.
     """
     people, cells = list(study.people), _wide_cells(study)
     simulated = dict(zip(study.participants["participant"], study.participants["simulated"], strict=True))
@@ -328,10 +328,7 @@ def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:
         for setting in block.settings
         for item in block.items
     ]
-    often = Counter(name for name, _ in statements)
-    found: dict[str, Cells | QuestionCells] = {
-        name if often[name] == 1 else f"{one.block.id}__{name}": one for name, one in statements
-    }
+    found: dict[str, Cells | QuestionCells] = {}
     asked: tuple[AskedQuestion | AskedScore, ...] = (*study.others.questions, *study.others.scores)
     levels = {block.id for block in study.levels}  # their answers are pooled by no track: see the table of tracks
     for other in (one for one in asked if one.where.id not in levels):
@@ -339,7 +336,8 @@ def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:
         for about in other.where.settings or (None,):
             ending = "" if about is None else f"__{about.condition or about.code}"
             found[f"{other.where.id}__{called}{ending}"] = QuestionCells(other, about)
-    return found
+    often = Counter((*found, *(name for name, _ in statements)))
+    return {name if often[name] == 1 else f"{one.block.id}__{name}": one for name, one in statements} | found
 
 
 Answers: TypeAlias = tuple[pd.api.extensions.ExtensionArray, str, tuple[float | None, float | None]]

@@ -41,18 +41,7 @@ from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.journals.journal_events import (
-    Allocated,
-    Event,
-    IntervalEnded,
-    SessionStarted,
-    TrialEnded,
-    TrialStarted,
-    holds,
-    plain,
-    read_event,
-    start_of,
-)
+from study_app.store.journals import journal_events as events
 from study_app.store.tables.columns import SEALED
 
 Codes: TypeAlias = dict[str, dict[str, str]]
@@ -62,11 +51,11 @@ _FORMATS: Final = (1, 2)
 _OF_DESIGNS: Final = ("conditions", "standard", "stimulus", "standards", "method")
 _OF_RECEIPT: Final = ("codes", "slots", "order", "compares")
 """Keys that a receipt adds to a block with a design."""
-_SEALED_IN: Final[Mapping[type[Event], frozenset[str]]] = {
-    TrialStarted: frozenset({"level", "standard", "arrangement", "catch"}),
-    IntervalEnded: SEALED,
-    Allocated: frozenset({"group"}),
-    TrialEnded: SEALED,
+_SEALED_IN: Final[Mapping[type[events.Event], frozenset[str]]] = {
+    events.TrialStarted: frozenset({"level", "standard", "arrangement", "catch"}),
+    events.IntervalEnded: SEALED,
+    events.Allocated: frozenset({"group"}),
+    events.TrialEnded: SEALED,
 }
 """The fields that each event's lines hold sealed."""
 _TAG_BYTES = 16
@@ -241,7 +230,7 @@ def _is_reveal(record: object) -> bool:
     return (
         _is_texts(record)
         and isinstance(record, dict)
-        and holds("at", record.get("at"))
+        and events.holds("at", record.get("at"))
         and all(record.get(name, "").strip() for name in ("by", "reason", "key_hash"))
     )
 
@@ -317,7 +306,7 @@ def _published_hash(session: SessionFolder) -> str | None:
         return str(receipt.read(session.receipt)["key_hash"])
     with contextlib.suppress(StoreError):
         for line in journal.scan(session.journal).lines[:1]:
-            return line.key_hash if isinstance(line, SessionStarted) else None
+            return line.key_hash if isinstance(line, events.SessionStarted) else None
     return None
 
 
@@ -407,19 +396,19 @@ def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
     return Protocol.model_validate(whole)
 
 
-def sealed(start: SessionStarted, event: Event, key: Key) -> Event:
+def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> events.Event:
     """Return an event as the journal of a session that began with ``start`` holds it."""
     fields, names = event.fields(), _SEALED_IN.get(type(event), frozenset())
     measured = {name: value for name, value in fields.items() if name in names}
     if not start.measures_sealed or not measured:
         return event
     rest = {name: value for name, value in fields.items() if name not in names}
-    return read_event({"event": event.event, **rest, "sealed": seal(_whose(start, event), measured, key)})
+    return events.read_event({"event": event.event, **rest, "sealed": seal(_whose(start, event), measured, key)})
 
 
 def seal(whose: Sequence[object], values: Mapping[str, Any], key: Key) -> str:
     """Return values as a sealed text; ``whose`` identifies their owner, and is needed to open it."""
-    said = json.dumps(plain(values), allow_nan=False, separators=(",", ":")).encode()
+    said = json.dumps(events.plain(values), allow_nan=False, separators=(",", ":")).encode()
     said = said.ljust(-(-len(said) // _BLOCK_BYTES) * _BLOCK_BYTES)
     tag = _tag(whose, said, key)
     return (tag + _combined(said, tag, key)).hex()
@@ -436,7 +425,7 @@ def open_text(whose: Sequence[object], text: str, key: Key, names: frozenset[str
     return _measured(said, names) if hmac.compare_digest(tag, _tag(whose, said, key)) else None
 
 
-def opened(lines: Iterable[Event], key: Key | None) -> list[Event]:
+def opened(lines: Iterable[events.Event], key: Key | None) -> list[events.Event]:
     """Return a journal's lines with their sealed values; unchanged without a ``key``.
 
     Raises
@@ -447,7 +436,7 @@ def opened(lines: Iterable[Event], key: Key | None) -> list[Event]:
     lines = list(lines)
     if key is None or not lines:
         return lines
-    start = start_of(lines)
+    start = events.start_of(lines)
     if start.entry is not None:
         start = replace(start, group=group_of(key.groups, key.nonce, start.entry))
     return [start, *(_opened(start, line, key) for line in lines[1:])]
@@ -464,7 +453,7 @@ def opened_key(folder: StudyFolder) -> Key | None:
     return read_key(folder.path) if reveals(folder.path) else None
 
 
-def _opened(start: SessionStarted, line: Event, key: Key) -> Event:
+def _opened(start: events.SessionStarted, line: events.Event, key: Key) -> events.Event:
     text = getattr(line, "sealed", None)
     if text is None:
         return line
@@ -474,7 +463,7 @@ def _opened(start: SessionStarted, line: Event, key: Key) -> Event:
             f"line {line.n} of the journal cannot be decrypted with the study's key: it was changed; restore it "
             "from a copy"
         )
-    return read_event({**line.line(), **measured, "sealed": None})
+    return events.read_event({**line.line(), **measured, "sealed": None})
 
 
 def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
@@ -484,16 +473,16 @@ def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
     except ValueError:
         return {}
     items = measured.items() if isinstance(measured, dict) else ()
-    return {name: value for name, value in items if name in names and holds(name, value)}
+    return {name: value for name, value in items if name in names and events.holds(name, value)}
 
 
-def _whose(start: SessionStarted, line: Any) -> list[object]:
+def _whose(start: events.SessionStarted, line: Any) -> list[object]:
     """Return the owner of a line's sealed text: an attempt at a trial, or a participant's entry."""
-    if isinstance(line, Allocated):
+    if isinstance(line, events.Allocated):
         return ["allocated", line.entry, start.participant]
     trial, attempt, interval = line.which
     whose = [start.participant, start.session, trial, attempt]
-    return whose if isinstance(line, TrialEnded) else [*whose, line.event, interval]
+    return whose if isinstance(line, events.TrialEnded) else [*whose, line.event, interval]
 
 
 def _tag(whose: Sequence[object], said: bytes, key: Key) -> bytes:

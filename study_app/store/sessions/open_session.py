@@ -21,15 +21,8 @@ from study_app.store import receipt
 from study_app.store.blinded.blinding import Key, as_recorded, opened, opened_key, sealed
 from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Journal
-from study_app.store.journals.journal_events import (
-    Event,
-    OutletLost,
-    SessionEnded,
-    SessionResumed,
-    SessionStarted,
-    start_of,
-)
 from study_app.store.recorder import LEAVING_S, Kept, Recorder, hashes_of
 from study_app.store.sessions.folder_lock import Opening
 from study_app.store.tables import csv_files, session_tables
@@ -64,7 +57,7 @@ class SessionStore:
         session_receipt: dict[str, Any],
         opening: Opening,
         *,
-        lines: Sequence[Event] = (),
+        lines: Sequence[events.Event] = (),
         recorder: Recorder | None = None,
     ) -> None:
         self.place = place
@@ -76,7 +69,7 @@ class SessionStore:
         self.journal = journal
         self._receipt = session_receipt
         self.opening = opening
-        self._lines: list[Event] = list(lines)
+        self._lines: list[events.Event] = list(lines)
         self._tables = GrowingTables(lambda name: place.folder.table(place.study, name))
         self._kept: list[Kept] = []
         self._over = False
@@ -91,7 +84,7 @@ class SessionStore:
         return self.place.folder
 
     @property
-    def lines(self) -> tuple[Event, ...]:
+    def lines(self) -> tuple[events.Event, ...]:
         """The journal so far."""
         return tuple(self._lines)
 
@@ -108,9 +101,15 @@ class SessionStore:
     def attach(self, outlets: Outlets) -> None:
         """Send markers of the session's events from now on, first of its beginning or resumption."""
         self.outlets = outlets
-        self._mark(next(line for line in reversed(self._lines) if isinstance(line, SessionStarted | SessionResumed)))
+        self._mark(
+            next(
+                line
+                for line in reversed(self._lines)
+                if isinstance(line, events.SessionStarted | events.SessionResumed)
+            )
+        )
 
-    def append(self, event: Event, *, t_s: float | None = None, waits: bool = True) -> None:
+    def append(self, event: events.Event, *, t_s: float | None = None, waits: bool = True) -> None:
         """Add an event to the journal; with ``waits`` it is on the disk when this returns, else soon after.
 
         ``t_s`` is its time [s since the clock's origin], by default now. Fields that reveal a condition are sealed.
@@ -121,13 +120,13 @@ class SessionStore:
             It was not written, or is not on the disk; the journal is as before and can be tried again.
         """
         if self._lines:
-            event = sealed(start_of(self._lines), event, self.key)
+            event = sealed(events.start_of(self._lines), event, self.key)
         event = replace(event, t_s=self.clock.seconds() if t_s is None else t_s)
         self._mark(event)
         self._lines.append(self.journal.append(event, t_s=event.t_s, waits=waits))
         self._marked = None
 
-    def _mark(self, event: Event) -> None:
+    def _mark(self, event: events.Event) -> None:
         """Send the marker of an event, before waiting for the disk; only once, even if its line is written again."""
         if self.outlets is None:
             return
@@ -178,7 +177,7 @@ class SessionStore:
             self._ended_s = (
                 self.clock.seconds() if self._ended_s is None else self._ended_s
             )  # the same when tried again
-            self.append(SessionEnded(status=status, reason=reason), t_s=self._ended_s)
+            self.append(events.SessionEnded(status=status, reason=reason), t_s=self._ended_s)
             self.journal.close()
             self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1].at}
         self.write_tables()
@@ -244,7 +243,7 @@ class SessionStore:
             del self._kept[0]
         for outlet, reason in ({} if self.outlets is None else self.outlets.lost).items():
             if outlet not in self._outlets_lost:
-                self.append(OutletLost(outlet=outlet, reason=reason), waits=False)
+                self.append(events.OutletLost(outlet=outlet, reason=reason), waits=False)
                 self._outlets_lost.add(outlet)
 
     def __enter__(self) -> SessionStore:
@@ -261,7 +260,7 @@ class SessionStore:
             error.add_note(str(failed))
 
 
-def table_files(place: Place, lines: Sequence[Event], key: Key | None) -> tuple[tuple[Path, bytes], ...]:
+def table_files(place: Place, lines: Sequence[events.Event], key: Key | None) -> tuple[tuple[Path, bytes], ...]:
     """Return the session's tables as files: paths and contents, from the journal's lines alone.
 
     ``key`` is the study's once it was opened; without it the sealed columns are left out.

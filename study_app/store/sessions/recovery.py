@@ -36,17 +36,8 @@ from study_app.store.checksums import (
 )
 from study_app.store.folders import RECORDING_NAME, SessionFolder, StudyFolder, locate
 from study_app.store.journals import journal
+from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Contents, Journal, SessionClock
-from study_app.store.journals.journal_events import (
-    Event,
-    Recorded,
-    RecordingLost,
-    SessionEnded,
-    SessionResumed,
-    SessionStarted,
-    start_of,
-    unknown_events,
-)
 from study_app.store.progress import progress_of, recordable
 from study_app.store.recorder import hashes_of, lost, recorded, recording_files
 from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, surroundings
@@ -146,7 +137,9 @@ def reopen(
         failing.callback(store.close)
         at_s = round(clock.seconds(), 6)
         version, name = study_app.__version__, device.get("name")
-        store.append(SessionResumed(**gap, torn_bytes=contents.torn_bytes, device=name, version=version), t_s=at_s)
+        store.append(
+            events.SessionResumed(**gap, torn_bytes=contents.torn_bytes, device=name, version=version), t_s=at_s
+        )
         note_allocation(store)
         sweep(folder.path)
         if is_there(folder.recordings):
@@ -208,7 +201,7 @@ def rebuild(session_folder: Path) -> Rebuilt:
     study_folder, folder = locate(session_folder)
     with open_alone(folder.path):
         contents = journal.whole(folder.journal)
-        place = Place(study_folder, folder, start_of(contents.lines).study)
+        place = Place(study_folder, folder, events.start_of(contents.lines).study)
         refuse_if_cut(place, contents.lines)
         swept = sweep(folder.path) + (sweep(folder.recordings) if is_there(folder.recordings) else ())
         table = study_folder.participants(place.study)
@@ -221,15 +214,15 @@ def rebuild(session_folder: Path) -> Rebuilt:
         rewritten += _renew_receipt(folder, contents.lines)
         write_participants(study_folder, place.study, whole=True)
         rewritten += [table] if _content(table) != before else []
-        ended = isinstance(contents.lines[-1], SessionEnded)
+        ended = isinstance(contents.lines[-1], events.SessionEnded)
         if ended:
             rewritten += _renew_proof(place, contents.lines, rewritten)
         return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
 
 
-def refuse_if_cut(place: Place, lines: Sequence[Event]) -> None:
+def refuse_if_cut(place: Place, lines: Sequence[events.Event]) -> None:
     """Reject a journal with less information than the session's other files, which would be replaced."""
-    for name in unknown_events(lines):
+    for name in events.unknown_events(lines):
         raise StoreError(
             f"{place.folder.journal} has events {name!r}, which this version does not know: use the version that wrote "
             "them"
@@ -238,18 +231,18 @@ def refuse_if_cut(place: Place, lines: Sequence[Event]) -> None:
         raise StoreError(f"{path} {what}: {RESTORE}")
 
 
-def beyond(place: Place, lines: Sequence[Event]) -> Iterator[tuple[Path, str]]:
+def beyond(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:
     """Yield each of receipt, checksums and tables that contains more than the journal, with a description.
 
     A session that has ended has a complete journal. After a power cut the trials table may have one more trial, since
     the line of a trial's start is not flushed at once; answers are.
     """
     folder = place.folder
-    ended = isinstance(lines[-1], SessionEnded)
+    ended = isinstance(lines[-1], events.SessionEnded)
     held = receipt.read(folder.receipt) if is_there(folder.receipt) else {}
     if not ended and (status := held.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
         yield folder.receipt, f"its status is {status!r}, the journal's {receipt.UNFINISHED!r}"
-    if len(held.get("resumed", ())) > sum(isinstance(line, SessionResumed) for line in lines):
+    if len(held.get("resumed", ())) > sum(isinstance(line, events.SessionResumed) for line in lines):
         yield folder.receipt, "says that the session was resumed more often than the journal does"
     if ended:
         return
@@ -265,10 +258,10 @@ def beyond(place: Place, lines: Sequence[Event]) -> Iterator[tuple[Path, str]]:
             yield path, f"has {there} rows, and the journal gives {len(rows)}"
 
 
-def _ended_or_recorded(place: Place, lines: Sequence[Event]) -> Iterator[tuple[Path, str]]:
+def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:
     """Yield the study's fingerprints and the recordings that contain more than a journal without an end."""
     folder, study = place.folder, place.study_folder
-    if isinstance(lines[-1], SessionEnded):
+    if isinstance(lines[-1], events.SessionEnded):
         return
     if place_of(study, folder) in {session for _, session in listed(study.fingerprints)}:
         yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but its journal has no end"
@@ -294,7 +287,7 @@ class _Left:
 
     place: Place
     contents: Contents
-    start: SessionStarted
+    start: events.SessionStarted
     receipt: dict[str, Any]
     key: Key
 
@@ -313,7 +306,7 @@ def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, 
     return _Left(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))
 
 
-def _unfinished(folder: SessionFolder, lines: list[Event]) -> SessionStarted:
+def _unfinished(folder: SessionFolder, lines: list[events.Event]) -> events.SessionStarted:
     """Return the first line of a session that can be resumed."""
     if not lines:
         raise StoreError(
@@ -325,11 +318,11 @@ def _unfinished(folder: SessionFolder, lines: list[Event]) -> SessionStarted:
             f"{folder.path} is finished ({done.ended}) and cannot be resumed; use a new session number for another "
             "visit"
         )
-    return start_of(lines)
+    return events.start_of(lines)
 
 
 def _same_protocol(
-    place: Place, first: Mapping[str, Any], start: SessionStarted, protocol: Protocol, source: bytes
+    place: Place, first: Mapping[str, Any], start: events.SessionStarted, protocol: Protocol, source: bytes
 ) -> None:
     """Reject a protocol whose file is not the one the session began with, with the differences."""
     if protocol_hash(source) == start.protocol_hash:
@@ -347,7 +340,9 @@ def _same_protocol(
     )
 
 
-def _go_on(lines: list[Event], now_ns: Callable[[], int], now: datetime | None) -> tuple[float | None, SessionClock]:
+def _go_on(
+    lines: list[events.Event], now_ns: Callable[[], int], now: datetime | None
+) -> tuple[float | None, SessionClock]:
     """Return the gap since the last line, if known [s], and the clock that continues after it."""
     now = now if now is not None else datetime.now().astimezone()
     gap_s = (now - datetime.fromisoformat(lines[-1].at)).total_seconds()
@@ -357,11 +352,11 @@ def _go_on(lines: list[Event], now_ns: Callable[[], int], now: datetime | None) 
     return (round(gap_s, 3) if known else None), clock
 
 
-def _recordings_found(folder: SessionFolder, lines: list[Event]) -> Iterator[Event]:
+def _recordings_found(folder: SessionFolder, lines: list[events.Event]) -> Iterator[events.Event]:
     """Yield the lines about recordings that the ended program did not write: complete or lost."""
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
-    known = {line.which for line in lines if isinstance(line, Recorded | RecordingLost)}
+    known = {line.which for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
     for which in recordable(lines):
         if which in known:
             continue
@@ -377,10 +372,10 @@ def _recordings_found(folder: SessionFolder, lines: list[Event]) -> Iterator[Eve
             yield lost(which, "the program ended before it was complete")
 
 
-def _renew_receipt(folder: SessionFolder, lines: list[Event]) -> list[Path]:
+def _renew_receipt(folder: SessionFolder, lines: list[events.Event]) -> list[Path]:
     """Set the receipt's end from the journal; a missing receipt cannot be recreated."""
     last = lines[-1]
-    if not isinstance(last, SessionEnded) or not is_there(folder.receipt):
+    if not isinstance(last, events.SessionEnded) or not is_there(folder.receipt):
         return []
     held = receipt.read(folder.receipt)
     ended = {"status": last.status, "reason": last.reason, "ended_at": last.at}
@@ -390,7 +385,7 @@ def _renew_receipt(folder: SessionFolder, lines: list[Event]) -> list[Path]:
     return [folder.receipt]
 
 
-def _renew_proof(place: Place, lines: list[Event], rewritten: list[Path]) -> list[Path]:
+def _renew_proof(place: Place, lines: list[events.Event], rewritten: list[Path]) -> list[Path]:
     """Renew the checksums, and list the fingerprint where it is missing; return what was written.
 
     Sessions of format 1 have none.

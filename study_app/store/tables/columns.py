@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any, Final, Literal
 
 from study_app.haptics.model.layout import LIMITERS
+from study_app.protocol.questions import KINDS
 from study_app.store.tables.csv_files import Column, optional
 
 STUDY = Column("study", "text", "Short name of the study, from its protocol.")
@@ -138,7 +139,7 @@ RESPONSES_2: tuple[Column, ...] = (
     optional("form", "text", "Id of the questionnaire that was presented on its own; n/a after a trial."),
     *(replace(column, may_miss=True) for column in (*TRIAL_COLUMNS, CODE)),
     replace(_RESPONSES_BY_NAME["item"], description="Id of the question; its words are in the session's receipt."),
-    Column("kind", "text", "Kind of the question: statement, rating, slider, number, choice, text."),
+    Column("kind", "text", f"Kind of the question: {', '.join(KINDS)}."),
     replace(_RESPONSES_BY_NAME["number"], description="Place of the question on its page, from 1, as shown."),
     optional(
         "response",

@@ -13,29 +13,7 @@ from study_app.errors import StoreError
 from study_app.store.atomic import write_file
 from study_app.store.blinded.blinding import Key, opened
 from study_app.store.delivered import within_limits
-from study_app.store.journals.journal_events import (
-    CAUSE_WITHHELD,
-    UNDELIVERED,
-    Broke,
-    DeviceReconnected,
-    Event,
-    FormAnswered,
-    IntervalEnded,
-    IntervalStarted,
-    Note,
-    OfAttempt,
-    Recorded,
-    RecordingLost,
-    Repeat,
-    Response,
-    Responses,
-    SessionEnded,
-    SessionResumed,
-    SessionStarted,
-    TrialEnded,
-    TrialStarted,
-    start_of,
-)
+from study_app.store.journals import journal_events as events
 from study_app.store.progress import progress_of
 from study_app.store.tables.columns import DELIVERED, INTERVALS, TRIALS, VIDEO, tables_of
 from study_app.store.tables.csv_files import Column, Row, header, header_bytes, records, unsealed
@@ -60,18 +38,18 @@ class SessionRows:
     with a design, ``changed_intervals`` is likewise the first of them that was added or changed.
     """
 
-    def __init__(self, lines: Sequence[Event]) -> None:
+    def __init__(self, lines: Sequence[events.Event]) -> None:
         self.responses: list[Row] = []
         self.trials: list[Row] = []
         self.intervals: list[Row] = []
         self.changed = 0
         self.changed_intervals = 0
-        self._start = start_of(lines)
+        self._start = events.start_of(lines)
         self._session = _session(self._start)
         self._group = _group(self._start)
         self._measured_names = (*_MEASURED, *header(VIDEO)) if self._group else _MEASURED
         self._limits = self._start.limits
-        self._started: dict[tuple[int, int], TrialStarted] = {}
+        self._started: dict[tuple[int, int], events.TrialStarted] = {}
         self._places: dict[tuple[int, int], int] = {}  # in trials
         self._intervals: dict[tuple[int, int, int], int] = {}  # in intervals
         self._broke = self._reconnected = ""
@@ -82,10 +60,10 @@ class SessionRows:
         """Return the rows of the table of a name."""
         return {"responses": self.responses, "trials": self.trials, "intervals": self.intervals}[name]
 
-    def take(self, line: Event) -> None:
+    def take(self, line: events.Event) -> None:
         """Process one more line."""
         match line:
-            case TrialStarted():
+            case events.TrialStarted():
                 self._interrupt()
                 which = line.trial, line.attempt
                 repeats = bool(self.trials) and self.trials[-1]["trial"] == line.trial
@@ -95,46 +73,46 @@ class SessionRows:
                 if self._reconnected and repeats:
                     _note(self.trials[-1], f"presented again: {self._reconnected}")
                 self._reconnected = ""
-            case TrialEnded(outcome=outcome):
+            case events.TrialEnded(outcome=outcome):
                 row = self._row_of(line)
                 row |= self._measured(line)
-                valid = within_limits(row, self._start.limits) if outcome != UNDELIVERED else False
+                valid = within_limits(row, self._start.limits) if outcome != events.UNDELIVERED else False
                 row |= {"outcome": outcome, "valid": valid}
-            case Responses():
+            case events.Responses():
                 if (trial := self._started.get((line.trial, line.attempt))) is None:
                     raise _never_started(line)
                 about = {name: getattr(trial, name) for name in _TRIAL_COLUMNS}
                 self.responses += [_response(self._session, about, answer, line.at) for answer in line.items]
-            case FormAnswered():
+            case events.FormAnswered():
                 about = {**dict.fromkeys(_TRIAL_COLUMNS), "form": line.form}
                 self.responses += [_response(self._session, about, answer, line.at) for answer in line.items]
-            case SessionEnded() | SessionResumed():
+            case events.SessionEnded() | events.SessionResumed():
                 self._interrupt()
-            case IntervalStarted():
+            case events.IntervalStarted():
                 self._begin_interval(line)
-            case IntervalEnded(outcome=outcome):
+            case events.IntervalEnded(outcome=outcome):
                 row, reasons = self._row_of(line), line.invalid or ()
                 row |= {name: line.others.get(name) for name in (*self._measured_names, *_DELIVERED)}
                 row["ended_s"] = line.t_s
                 row |= {"outcome": outcome, "invalid_reasons": " ".join(reasons) or None}
                 row |= {"valid": within_limits(row, self._start.limits) if not reasons else False}
-            case Recorded():
+            case events.Recorded():
                 self._row_of(line).update((name, getattr(line, name)) for name in _RECORDED)
-            case RecordingLost():
+            case events.RecordingLost():
                 self._row_of(line)["recording_lost"] = line.reason
-            case Broke():
+            case events.Broke():
                 self._broke = line.what
-            case DeviceReconnected() if self.trials:
-                withheld = self._broke == CAUSE_WITHHELD
+            case events.DeviceReconnected() if self.trials:
+                withheld = self._broke == events.CAUSE_WITHHELD
                 failed = f"the device failed and was connected again ({self._broke})"
-                self._reconnected = f"{CAUSE_WITHHELD} and continued" if withheld else failed
+                self._reconnected = f"{events.CAUSE_WITHHELD} and continued" if withheld else failed
                 _note(self._last(), self._reconnected)
-            case Note() if self.trials:
+            case events.Note() if self.trials:
                 _note(self._last(), line.text, mark=line.kind == "mark")
-            case Repeat() if self.trials:
+            case events.Repeat() if self.trials:
                 _note(self._last(), f"repeated: {line.reason}")
 
-    def _row_of(self, line: OfAttempt) -> Row:
+    def _row_of(self, line: events.OfAttempt) -> Row:
         """Return the row that a line is about: of an interval, or of a trial."""
         trial, attempt, interval = line.which
         known = self._places.get((trial, attempt))
@@ -147,7 +125,7 @@ class SessionRows:
         self.changed_intervals = min(self.changed_intervals, place)
         return self.intervals[place]
 
-    def _begin_interval(self, line: IntervalStarted) -> None:
+    def _begin_interval(self, line: events.IntervalStarted) -> None:
         which, number = (line.trial, line.attempt), line.interval
         if which not in self._places:
             raise _never_started(line)
@@ -164,7 +142,7 @@ class SessionRows:
         trial["intervals"] += 1
         self.intervals.append(_interval_row(trial, self._started[which], line, earlier))
 
-    def _measured(self, line: TrialEnded) -> Row:
+    def _measured(self, line: events.TrialEnded) -> Row:
         """Return the measures of a trial that ended; with a design, from all its intervals."""
         which = line.trial, line.attempt
         if not self._started[which].has_intervals:
@@ -195,7 +173,7 @@ class GrowingTables:
         self._taken = 0  # lines of the journal
         self._opened = False
 
-    def write(self, lines: Sequence[Event], key: Key | None, *, whole: bool = False) -> None:
+    def write(self, lines: Sequence[events.Event], key: Key | None, *, whole: bool = False) -> None:
         """Bring the tables up to date with the journal's ``lines``, which are those of before and new ones.
 
         Parameters
@@ -230,30 +208,30 @@ class GrowingTables:
         rows.changed, rows.changed_intervals = len(rows.trials), len(rows.intervals)
 
 
-def responses(lines: Sequence[Event]) -> list[Row]:
+def responses(lines: Sequence[events.Event]) -> list[Row]:
     """Return one row per response, in the order of confirmation."""
     return SessionRows(lines).responses
 
 
-def trials(lines: Sequence[Event]) -> list[Row]:
+def trials(lines: Sequence[events.Event]) -> list[Row]:
     """Return one row per presentation of a trial, in order; the running one has no outcome yet."""
     return SessionRows(lines).trials
 
 
-def table_columns(lines: Sequence[Event], *, opened: bool) -> dict[str, tuple[Column, ...]]:
+def table_columns(lines: Sequence[events.Event], *, opened: bool) -> dict[str, tuple[Column, ...]]:
     """Return the columns of a session's tables by name: without the sealed ones where they are sealed, not ``opened``.
 
     Only a study with designs has a table of intervals.
     """
-    tables = tables_of(start_of(lines).protocol_format or 1)
-    names = ("responses", "trials", "intervals") if start_of(lines).intervals else ("responses", "trials")
-    shows = opened or not start_of(lines).measures_sealed
+    tables = tables_of(events.start_of(lines).protocol_format or 1)
+    names = ("responses", "trials", "intervals") if events.start_of(lines).intervals else ("responses", "trials")
+    shows = opened or not events.start_of(lines).measures_sealed
     return {name: tables[name] if shows else unsealed(tables[name]) for name in names}
 
 
-def participant(lines: Sequence[Event]) -> Row:
+def participant(lines: Sequence[events.Event]) -> Row:
     """Return the session's row of the participants table."""
-    start, rows, done = start_of(lines), SessionRows(lines), progress_of(lines)
+    start, rows, done = events.start_of(lines), SessionRows(lines), progress_of(lines)
     main = [row for row in latest(rows.trials) if row["phase"] == "main" and row["outcome"] in ("complete", "timeout")]
     after_main = latest(row for row in rows.responses if row["phase"] == "main")
     in_forms = (row for row in rows.responses if row.get("form") is not None)
@@ -264,7 +242,7 @@ def participant(lines: Sequence[Event]) -> Row:
         **_group(start),
         "status": "unfinished" if done.ended is None else done.ended,
         "session_started_at": start.at,
-        "session_ended_at": next((line.at for line in reversed(lines) if isinstance(line, SessionEnded)), None),
+        "session_ended_at": next((line.at for line in reversed(lines) if isinstance(line, events.SessionEnded)), None),
         "resumed": done.resumed,
         "device": start.device,
         "language": done.language,
@@ -290,7 +268,7 @@ def response_text(value: Any) -> str | None:
     return None if value is None else str(value)
 
 
-def _interval_row(trial: Row, started: TrialStarted, line: IntervalStarted, before: Row | None) -> Row:
+def _interval_row(trial: Row, started: events.TrialStarted, line: events.IntervalStarted, before: Row | None) -> Row:
     """Return the row of an interval that begins."""
     row: Row = {name: trial.get(name) for name in header(INTERVALS)} | dict.fromkeys(_OF_THE_END)
     number = line.interval
@@ -323,16 +301,16 @@ def _combined(name: str, values: list[Any]) -> Any:
     return round(found, 6) if isinstance(found, float) else found
 
 
-def _session(start: SessionStarted) -> Row:
+def _session(start: events.SessionStarted) -> Row:
     return {name: getattr(start, name) for name in _SESSION_COLUMNS}
 
 
-def _group(start: SessionStarted) -> Row:
+def _group(start: events.SessionStarted) -> Row:
     """Return the group of the session's participant, where it was opened; nothing in format 1."""
     return {"group": start.group} if (start.protocol_format or 1) > 1 else {}
 
 
-def _response(session: Row, about: Row, response: Response, answered_at: str) -> Row:
+def _response(session: Row, about: Row, response: events.Response, answered_at: str) -> Row:
     """Return the row of an answer; only in format 2 it says its kind, and the answer as text and as number."""
     answer, value = response.answer, response.answer.value
     row = {
@@ -354,13 +332,13 @@ def _response(session: Row, about: Row, response: Response, answered_at: str) ->
     return {name: row[name] for name in header(tables_of(2 if response.kind else 1)["responses"])}
 
 
-def _trial(session: Row, line: TrialStarted) -> Row:
+def _trial(session: Row, line: events.TrialStarted) -> Row:
     row: Row = dict.fromkeys(header(TRIALS)) | session
     row |= {name: getattr(line, name) for name in (*_TRIAL_COLUMNS, "of")}
     return row | {"trial_started_at": line.at, "trial_started_s": line.t_s, "marked": False}
 
 
-def _never_started(line: OfAttempt) -> StoreError:
+def _never_started(line: events.OfAttempt) -> StoreError:
     return StoreError(
         f"the journal's line {line.n} is about trial {line.trial}, which never started: restore it from a copy"
     )

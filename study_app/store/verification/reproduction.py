@@ -23,16 +23,7 @@ from study_app.store import receipt
 from study_app.store.blinded.blinding import opened, read_key, whole_protocol
 from study_app.store.folders import StudyFolder, locate
 from study_app.store.journals import journal
-from study_app.store.journals.journal_events import (
-    Event,
-    IntervalEnded,
-    OfAttempt,
-    PassedOver,
-    Responses,
-    Stepped,
-    TrialStarted,
-    start_of,
-)
+from study_app.store.journals import journal_events as events
 from study_app.store.progress import heard_in
 
 
@@ -70,12 +61,12 @@ def reproduced(session_folder: Path) -> Reproduced:
     except (KeyError, TypeError) as error:
         raise StoreError(f"{folder.path}: receipt or journal lack {error}: verify the study's folder") from error
     found = Reproduced([*differences])
-    if lines and start_of(lines).intervals:
+    if lines and events.start_of(lines).intervals:
         _levels(study, ran, lines, found)
     return found
 
 
-def _levels(study: StudyFolder, ran: Mapping[str, Any], lines: list[Event], found: Reproduced) -> None:
+def _levels(study: StudyFolder, ran: Mapping[str, Any], lines: list[events.Event], found: Reproduced) -> None:
     """Compare what each trial of intervals presented with what was due."""
     try:
         key = read_key(study.path)
@@ -113,18 +104,18 @@ class _Compared:
         self._schedule = schedule
         self._planned = {trial.number: trial for trial in self._schedule.trials}
 
-    def take(self, line: Event, before: Sequence[Event]) -> None:
+    def take(self, line: events.Event, before: Sequence[events.Event]) -> None:
         """Compare one line with what follows from those before it."""
-        if isinstance(line, IntervalEnded | Responses):
+        if isinstance(line, events.IntervalEnded | events.Responses):
             self._take_setting(line, before)
-        if not isinstance(line, TrialStarted | PassedOver) or line.trial not in self._planned:
+        if not isinstance(line, events.TrialStarted | events.PassedOver) or line.trial not in self._planned:
             return
         trial = self._planned[line.trial]
         block = self._protocol.blocks[trial.block]
         if block.design is None:
             return
         due = next_level(self._protocol, self._key, self._schedule, trial, heard_in(self._protocol, before))
-        if isinstance(line, PassedOver):
+        if isinstance(line, events.PassedOver):
             if due is not None:
                 self.differences.append(f"trial {trial.number}: passed over, though it was due by the answers")
             return
@@ -142,25 +133,25 @@ class _Compared:
             self.differences.append(f"trial {trial.number}, attempt {line.attempt}: {what}")
         self._note(block, trial.number, follows)
 
-    def _take_setting(self, line: IntervalEnded | Responses, before: Sequence[Event]) -> None:
+    def _take_setting(self, line: events.IntervalEnded | events.Responses, before: Sequence[events.Event]) -> None:
         """Compare the level that a participant set with the steps from where it started, and the answer with their sum.
 
         A line that is not about a setting is left alone.
         """
         set_to = line.others.get("setting")
-        if isinstance(line, IntervalEnded) and set_to is None:
+        if isinstance(line, events.IntervalEnded) and set_to is None:
             return
         which = line.trial, line.attempt
-        own = [one for one in before if isinstance(one, OfAttempt) and (one.trial, one.attempt) == which]
-        started = next(one for one in own if isinstance(one, TrialStarted))
+        own = [one for one in before if isinstance(one, events.OfAttempt) and (one.trial, one.attempt) == which]
+        started = next(one for one in own if isinstance(one, events.TrialStarted))
         block = self._protocol.blocks[started.block]
         if block.stimulus is None or started.level is None:
             return
         setting = adjusting_of(self._protocol, block, started.standard, started.level)
         if setting is None:
             return
-        steps = [one.steps for one in own if isinstance(one, Stepped)]
-        if isinstance(line, Responses):
+        steps = [one.steps for one in own if isinstance(one, events.Stepped)]
+        if isinstance(line, events.Responses):
             follows = line.items[0].answer.value == sum(steps)
         else:
             follows = set_to == setting.level(setting.reached(steps))
@@ -173,16 +164,16 @@ class _Compared:
         of_block[trial] = follows and of_block.get(trial, True)
 
 
-def _group(study: StudyFolder, lines: Sequence[Event]) -> str | None:
+def _group(study: StudyFolder, lines: Sequence[events.Event]) -> str | None:
     """Return the group that the participant's entry gives, None in a study without groups."""
-    entry = start_of(lines).entry
+    entry = events.start_of(lines).entry
     if entry is None:
         return None
     key = read_key(study.path)
     return group_of(key.groups, key.nonce, entry)
 
 
-def recorded_trials(lines: Iterable[Event]) -> tuple[RecordedTrial | int, ...]:
+def recorded_trials(lines: Iterable[events.Event]) -> tuple[RecordedTrial | int, ...]:
     """Return what the lines of a journal say was presented: every attempt, in the order of time.
 
     A trial that was passed over is its number alone. KeyError says that a line answers a trial that never started.
@@ -190,15 +181,15 @@ def recorded_trials(lines: Iterable[Event]) -> tuple[RecordedTrial | int, ...]:
     attempts: list[RecordedTrial | int] = []
     place: dict[tuple[int, int], tuple[int, RecordedTrial]] = {}
     for line in lines:
-        if isinstance(line, TrialStarted):
+        if isinstance(line, events.TrialStarted):
             told = RecordedTrial(line.trial, line.block, line.phase, line.part, line.index, line.of, line.code)
             place[line.trial, line.attempt] = len(attempts), told
             attempts.append(told)
-        elif isinstance(line, Responses):
+        elif isinstance(line, events.Responses):
             rows = sorted(line.items, key=lambda row: row.number)
             index, told = place[line.trial, line.attempt]
             items, may_hide = tuple(row.item for row in rows), any(row.kind is not None for row in rows)
             attempts[index] = replace(told, items=items, may_hide=may_hide)
-        elif isinstance(line, PassedOver) and line.trial is not None:
+        elif isinstance(line, events.PassedOver) and line.trial is not None:
             attempts.append(line.trial)
     return tuple(attempts)

@@ -23,19 +23,8 @@ from study_app.store.blinded.blinding import Key, opened, opened_key
 from study_app.store.checksums import files, fingerprint, hashed, read_checksums
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
+from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Contents
-from study_app.store.journals.journal_events import (
-    Answer,
-    Event,
-    FormAnswered,
-    Recorded,
-    RecordingLost,
-    Responses,
-    SessionEnded,
-    shortened,
-    start_of,
-    unknown_events,
-)
 from study_app.store.progress import Progress, named, progress_of, recordable
 from study_app.store.recorder import recording_files
 from study_app.store.sessions.folder_lock import is_open, never_begun
@@ -154,7 +143,7 @@ def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, rec
         _receipt(folder, lines, key.hash if key else None, found)
     if not lines:
         return Checked(place, readable=running or never_begun(folder.path), running=running)
-    start = start_of(lines)
+    start = events.start_of(lines)
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
         if (told := getattr(start, name)) != value:
@@ -163,7 +152,7 @@ def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, rec
         opened(lines, key)
     for wrong in wrong_responses(lines):
         found.error(folder.journal, wrong)
-    ended = isinstance(lines[-1], SessionEnded)
+    ended = isinstance(lines[-1], events.SessionEnded)
     hashes = {}
     if ended or not running:
         hashes = {name: _hash(folder, name) for name in files(folder) if recordings or not name.endswith(".parquet")}
@@ -176,7 +165,7 @@ def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, rec
     if is_there(folder.rebuilt):
         with found.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
-                found.warning(folder.rebuilt, f"{shortened(line)}; only a copy of {FINGERPRINTS} proves more")
+                found.warning(folder.rebuilt, f"{events.shortened(line)}; only a copy of {FINGERPRINTS} proves more")
     return Checked(
         place,
         readable=True,
@@ -217,7 +206,7 @@ def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Conten
         elif contents.damage is None:
             found.error(folder.journal, f"has no complete line, {_BEGUN}")
         return nothing
-    for name in unknown_events(contents.lines):
+    for name in events.unknown_events(contents.lines):
         found.warning(folder.journal, f"has events {name!r}, which this version does not know")
     try:
         done = progress_of(contents.lines)
@@ -227,12 +216,12 @@ def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Conten
     if done.ended is None:
         if not running:
             found.warning(folder.path, "is unfinished: resume it, or leave it unfinished")
-    elif not isinstance(contents.lines[-1], SessionEnded):
+    elif not isinstance(contents.lines[-1], events.SessionEnded):
         found.error(folder.journal, "lines follow the session's end")
     return contents
 
 
-def _receipt(folder: SessionFolder, lines: list[Event], key_hash: str | None, found: Gathered) -> None:
+def _receipt(folder: SessionFolder, lines: list[events.Event], key_hash: str | None, found: Gathered) -> None:
     path = folder.receipt
     if not lines and not is_there(path):
         return  # claimed and never begun
@@ -247,7 +236,7 @@ def _receipt(folder: SessionFolder, lines: list[Event], key_hash: str | None, fo
         found.error(path, "contains the hash of another key")
     if not lines:
         return
-    start = start_of(lines)
+    start = events.start_of(lines)
     compared = [name for name in (*receipt.FACTS, "row_of") if name in held or name == "row_of"]
     if differing := [name for name in compared if held.get(name) != getattr(start, name)]:
         found.error(path, f"{', '.join(differing)}: differ from the journal")
@@ -256,21 +245,21 @@ def _receipt(folder: SessionFolder, lines: list[Event], key_hash: str | None, fo
             folder.journal, f"has another format than {path.name} states: it was changed; restore it from a copy"
         )
     last = lines[-1]
-    if isinstance(last, SessionEnded) and held.get("status") != last.status:
+    if isinstance(last, events.SessionEnded) and held.get("status") != last.status:
         found.error(path, f"its status is {held.get('status')!r}, the journal's {last.status!r}; rebuild renews it")
 
 
-def wrong_responses(lines: Sequence[Event]) -> Iterator[str]:
+def wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
     """Yield a sentence on each answer in ``responses`` that is not the one given by the choices before it."""
     now = Progress()
     for line in lines:
-        if isinstance(line, Responses | FormAnswered):
+        if isinstance(line, events.Responses | events.FormAnswered):
             chosen = dict(now.answers)
-            where = f"form {line.form}" if isinstance(line, FormAnswered) else f"trial {line.trial}"
+            where = f"form {line.form}" if isinstance(line, events.FormAnswered) else f"trial {line.trial}"
             line_name = f"line {line.n} ({line.event})"
             hides = any(row.kind is not None for row in line.items)  # format 2: it may have been shown for a while
             for row in line.items:
-                if not _same_answer(row.answer, chosen.pop(row.item, Answer())):
+                if not _same_answer(row.answer, chosen.pop(row.item, events.Answer())):
                     wrong = "another answer than was chosen before: it was changed"
                     yield f"{line_name} has for {row.item!r} in {where} {wrong}"
             for item, answer in chosen.items():
@@ -279,7 +268,7 @@ def wrong_responses(lines: Sequence[Event]) -> Iterator[str]:
         now.take(line)
 
 
-def _same_answer(listed_answer: Answer, given: Answer) -> bool:
+def _same_answer(listed_answer: events.Answer, given: events.Answer) -> bool:
     """Return whether a confirmed answer is what was chosen; moments of a line are rounded to 1 µs."""
     moments = ((getattr(listed_answer, name), getattr(given, name)) for name in ("onset_s", "first_s", "last_s"))
     return (listed_answer.value, listed_answer.changes) == (given.value, given.changes) and all(
@@ -287,7 +276,7 @@ def _same_answer(listed_answer: Answer, given: Answer) -> bool:
     )
 
 
-def _tables(place: Place, lines: list[Event], found: Gathered, *, ended: bool) -> None:
+def _tables(place: Place, lines: list[events.Event], found: Gathered, *, ended: bool) -> None:
     """Compare the tables with what the journal gives; one that tells more than the journal is named as such."""
     telling: set[Path] = set()
     with contextlib.suppress(StoreError):  # said of receipt or journal already
@@ -361,15 +350,15 @@ def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Gathered
 
 
 def _recordings(
-    folder: SessionFolder, lines: list[Event], hashes: Mapping[str, str], found: Gathered, *, ended: bool
+    folder: SessionFolder, lines: list[events.Event], hashes: Mapping[str, str], found: Gathered, *, ended: bool
 ) -> None:
     """Check that every recording the journal tells of is there, whole and of this trial, and no other."""
     listed: set[str] = set()
-    known = {line.which for line in lines if isinstance(line, Recorded | RecordingLost)}
+    known = {line.which for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
     for line in lines:
-        if isinstance(line, RecordingLost):
+        if isinstance(line, events.RecordingLost):
             found.warning(folder.recordings, f"{named(*line.which)} has none: {line.reason}")
-        if not isinstance(line, Recorded):
+        if not isinstance(line, events.Recorded):
             continue
         which = named(*line.which)
         if line.samples_unrecorded:
@@ -385,7 +374,7 @@ def _recordings(
             if hashes[name] != digest:
                 found.error(folder.path / name, f"has changed since it was recorded ({which})")
             _facts(folder, line, kind, name, rows, found)
-    if start_of(lines).recordings:
+    if events.start_of(lines).recordings:
         for planned in recordable(lines)[: None if ended else -1]:
             if planned not in known:
                 found.warning(folder.recordings, f"{named(*planned)} has none, and the journal gives no reason")
@@ -402,7 +391,7 @@ def _recordings(
             found.warning(folder.path / name, f"is in no line of the journal{then}")
 
 
-def _facts(folder: SessionFolder, line: Recorded, kind: str, name: str, rows: int, found: Gathered) -> None:
+def _facts(folder: SessionFolder, line: events.Recorded, kind: str, name: str, rows: int, found: Gathered) -> None:
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     path = folder.path / name

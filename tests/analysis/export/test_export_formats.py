@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from study_app.protocol.simulated_observer import NO_FEATURES
 
 from study_app.analysis.export import spss
 from study_app.analysis.export.export import export
@@ -18,6 +19,8 @@ from study_app.analysis.export.spss import CANNOT_JUDGE, NOT_ANSWERED, names_of
 from study_app.analysis.export.table_files import Extra
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store.blinded.unblinding import unblind
 from tests.analysis.conftest import HIDDEN, SMALL, Results, make_results
 from tests.analysis.export.described import undescribed
 
@@ -81,6 +84,29 @@ def test_blocks_that_ask_the_same_keep_their_columns_apart(tmp_path: Path, to: P
     assert "feel__smooth__heavyzembla" in names
     assert "again__smooth__heavyzembla" in names
     assert len(set(names)) == 8
+
+
+def test_a_statement_and_a_form_that_give_one_name_have_a_column_each(tmp_path: Path, to: Path) -> None:
+    form = """
+[questionnaires.smooth]
+intro = { nl = "Nog iets. (nl)", en = "One more." }
+[[questionnaires.smooth.items]]
+id = "heavyzembla"
+kind = "number"
+from = 1
+to = 3
+text = { nl = "Hoe vaak?", en = "How often?" }
+short = { nl = "Vaak", en = "Often" }
+"""
+    text = SMALL.replace("format = 1", "format = 2").replace('"try", "feel"]', '"try", "feel", "smooth"]')
+    (tmp_path / "small.toml").write_text(text.replace("[blocks.try]", f"{form}[blocks.try]", 1), encoding="utf-8")
+    features = dict.fromkeys((("try", "learn"), ("feel", "heavyzembla"), ("feel", "lightquorn")), (NO_FEATURES,))
+    folder = rehearse_answers(tmp_path / "small.toml", participants=2, seed=1, results=tmp_path / "r", felt=features)
+    unblind(folder, "AB", "to analyse")
+    export(folder, to, extras=["wide"])
+    rows = cells(table(to, "small", "wide", "csv"))
+    assert {"smooth__heavyzembla", "feel__smooth__heavyzembla", "smooth__lightquorn"} <= rows[0].keys()
+    assert all(row["smooth__heavyzembla"] == "n/a" or float(row["smooth__heavyzembla"]) <= 3 for row in rows)
 
 
 def test_texts_of_any_script_and_length_survive_in_sav(small: Results, to: Path) -> None:

@@ -19,6 +19,7 @@ from study_app.store.journals import journal
 from study_app.store.receipt import read
 from study_app.store.tables.columns import INTERVALS
 from study_app.store.verification.leaks import certain_telltales, presented_numbers
+from tests.journal_lines import raw
 
 pytestmark = pytest.mark.slow
 
@@ -48,13 +49,13 @@ def answered(folder: Path, block: str) -> list[Answered]:
     key = read_key(folder)
     for session in StudyFolder(folder).sessions():
         started: dict[int, dict[str, Any]] = {}
-        for line in opened(journal.read(session.journal), key):
-            if line.event == "trial_started" and line.block == block:
-                started[line.trial] = line
-            elif line.event == "responses" and line.trial in started:
-                (item,) = line.items
+        for line in raw(opened(journal.read(session.journal), key)):
+            if line["event"] == "trial_started" and line["block"] == block:
+                started[line["trial"]] = line
+            elif line["event"] == "responses" and line["trial"] in started:
+                (item,) = line["items"]
                 seconds = item["first_s"] - item["onset_s"]
-                found.append(Answered(session.participant, started[line.trial], item["value"], seconds))
+                found.append(Answered(session.participant, started[line["trial"]], item["value"], seconds))
     return found
 
 
@@ -74,10 +75,10 @@ def test_tracks_have_a_row_per_trial_with_what_it_presented(opened_levels: Path,
     for block in BLOCKS:
         for one in answered(opened_levels, block):
             row, line = of_trial[one.participant, str(one.started["trial"])], one.started
-            assert (row["block"], row["arrangement"]) == (block, line.arrangement)
-            assert row["track"] == key.codes[block][line.code]
-            assert row["level_asked"] == ("n/a" if line.level is None else str(line.level))
-            assert row["standard"] == ("n/a" if line.standard is None else str(line.standard))
+            assert (row["block"], row["arrangement"]) == (block, line["arrangement"])
+            assert row["track"] == key.codes[block][line["code"]]
+            assert row["level_asked"] == ("n/a" if line["level"] is None else str(line["level"]))
+            assert row["standard"] == ("n/a" if line["standard"] is None else str(line["standard"]))
             assert row["response_s"] == str(round(one.response_s, 6))
             judged = block in ("viscosity", "pairs", "detect", "odd")
             assert row["right"] == (str(one.right).lower() if judged else "n/a"), block
@@ -115,7 +116,7 @@ def test_the_report_of_a_sealed_study_shows_counts_and_times_by_code_and_no_leve
     assert sum(times["numbers"]["n"] for one in held for times in one["times"]) == 3 * 54
     assert not list(tmp_path.glob("levels-*"))
     key = read_key(sealed_levels)
-    published = read(StudyFolder(sealed_levels).sessions()[0].receipt)["protocol"]
+    published = raw(read(StudyFolder(sealed_levels).sessions()[0].receipt))["protocol"]
     levels = presented_numbers(whole_protocol(published, key))
     assert levels == presented_numbers(load(str(sealed_levels.parent / "levels.toml")))
     words = certain_telltales(key.tables, published, levels)

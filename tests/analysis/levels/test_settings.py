@@ -23,6 +23,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.analysis.levels.level_studies import matching_file
 from tests.analysis.report.read_report import run_in_r
+from tests.journal_lines import raw
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 LOG = Stimulus(vary="damping_nspm", level="value", levels=(2, 18), standards=(6,))
@@ -105,7 +106,7 @@ def test_before_unblinding_there_are_steps_and_no_level(sealed: Path, tmp_path: 
     key = read_key(sealed)
     levels: list[Any] = []
     for session in StudyFolder(sealed).sessions():
-        levels += [line["setting"] for line in opened(journal.read(session.journal), key) if line.get("setting")]
+        levels += [line["setting"] for line in raw(opened(journal.read(session.journal), key)) if line.get("setting")]
     assert levels
     assert not [level for level in levels if f"{level:.5g}" in text]
     assert "Not yet revealed" in text

@@ -11,6 +11,7 @@ from study_app.session.transitions.state import Phase
 from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
+from tests.journal_lines import raw
 from tests.session import small
 from tests.session.fakes import World
 
@@ -44,7 +45,7 @@ class StoredWorld(World):
 
     @property
     def lines(self) -> tuple[dict[str, Any], ...]:
-        return self.store.lines
+        return tuple(raw(self.store.lines))
 
     def start(self) -> None:
         self.runner.post(Begin(self.clock()))

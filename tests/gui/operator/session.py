@@ -14,6 +14,7 @@ from study_app.store.progress import Progress
 from study_app.viewmodels.operator import OperatorView, Session, operator_view
 from study_app.viewmodels.servo_health import ServoHealth
 from study_app.viewmodels.session import stages
+from tests.journal_lines import event_of
 
 
 @dataclass
@@ -28,7 +29,7 @@ class Told:
 
     def tell(self, event: str, after_s: float = 0.0, **fields: Any) -> None:
         self.now_s += after_s
-        self.progress.take({"event": event, "t_s": self.now_s, **fields})
+        self.progress.take(event_of(event, t_s=self.now_s, **fields))
 
     def welcome(self) -> None:
         self.tell("session_started", limits=self.protocol.limits.model_dump())

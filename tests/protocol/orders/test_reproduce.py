@@ -11,8 +11,10 @@ from study_app.errors import StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, orders_of, orders_of_receipt
-from study_app.protocol.orders.schedule import RecordedTrial, Trial, build_schedule, recorded_trials, reproduce
+from study_app.protocol.orders.schedule import RecordedTrial, Trial, build_schedule, reproduce
 from study_app.store.receipt import without_conditions
+from study_app.store.verification.reproduction import recorded_trials
+from tests.journal_lines import event_from, event_of
 from tests.protocol.sound import EVERY_ORDER, ORDER, SOUND
 
 REK = load("rek2024")
@@ -140,7 +142,7 @@ def journal(trials: tuple[Trial, ...]) -> Iterator[dict[str, Any]]:
 
 def test_what_was_run_is_read_from_a_journal():
     trials = build_schedule(SHUFFLED, "P001", 3).trials
-    recorded = recorded_trials(journal(trials))
+    recorded = recorded_trials(map(event_from, journal(trials)))
     assert [(trial.number, trial.code) for trial in recorded] == [
         (trial.number, trial.code) for trial in (*trials[:3], trials[2], trials[3])
     ]
@@ -150,7 +152,7 @@ def test_what_was_run_is_read_from_a_journal():
 
 def test_a_line_that_is_none_of_a_journal_is_refused():
     with pytest.raises(KeyError):
-        recorded_trials([{"event": "responses", "trial": 1, "attempt": 1, "items": []}])
+        recorded_trials([event_of("responses", trial=1, attempt=1)])
 
 
 PROTOCOLS = [load("rek2024"), load("demo"), parse(SOUND.encode(), "small"), parse(EVERY_ORDER.encode(), "everything")]

@@ -28,6 +28,7 @@ from study_app.store.journals import journal
 from study_app.store.sessions.recovery import reopen
 from tests.compiled import needs_servo
 from tests.faults.support import short
+from tests.journal_lines import raw
 from tests.session import small
 from tests.session.replay.recorded_sessions import STRESSED, begun, held, rewrite, session, stressed, troubled
 
@@ -114,8 +115,8 @@ def test_the_error_of_the_force_sent_comes_out_again_and_another_is_named(
     rehearsed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = StudyFolder(rehearsed)
-    lines = opened(journal.read(session(rehearsed) / "journal.jsonl"), read_key(study.path))
-    errors = [line["delivered_error"] for line in lines if line.event == "trial_ended"]
+    lines = raw(opened(journal.read(session(rehearsed) / "journal.jsonl"), read_key(study.path)))
+    errors = [line["delivered_error"] for line in lines if line["event"] == "trial_ended"]
     felt = [error for error in errors if error is not None]  # some of its trials are shorter than the fade-in
     assert len(felt) > 0
     assert all(0.005 < error < 1.0 for error in felt)

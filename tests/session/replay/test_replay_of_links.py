@@ -20,6 +20,7 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 
 pytestmark = [pytest.mark.slow, needs_servo]
 
@@ -92,13 +93,13 @@ def test_another_seed_of_the_link_is_found(rehearsed: Path, monkeypatch: pytest.
 def test_the_session_measures_the_delays_that_were_requested(rehearsed: Path) -> None:
     (session,) = StudyFolder(rehearsed).sessions()
     key, protocol = read_key(rehearsed), parse(STUDY.encode(), "late.toml")
-    lines = opened(journal.read(session.journal), key)
-    started = {line.trial: line for line in lines if line.event == "trial_started"}
-    ended = [line for line in lines if line.event == "interval_ended"]
+    lines = raw(opened(journal.read(session.journal), key))
+    started = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
+    ended = [line for line in lines if line["event"] == "interval_ended"]
     assert len(ended) == 6
     errors_ms = []
     for line in ended:
-        interval = presented_by(protocol, key.codes, started[line.trial]).intervals[line.interval - 1]
+        interval = presented_by(protocol, key.codes, started[line["trial"]]).intervals[line["interval"] - 1]
         assert "invalid" not in line
         if interval.vary == "force_delay_ms":
             errors_ms.append(line["value_delivered"] - interval.value)

@@ -16,6 +16,7 @@ from study_app.store.verification.leaks import certain_telltales, find_leaks, re
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 from tests.protocol.trials.matching import ALONE, DELAY, text_of
 from tests.store.forging import Lines, change, cut
 
@@ -57,7 +58,7 @@ def session_of(study: Path) -> Path:
 
 
 def lines_of(session: Path) -> list[dict[str, Any]]:
-    return opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2]))
+    return raw(opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2])))
 
 
 def test_settings_follow_every_force_is_computed_again_and_the_study_is_sound(study: Path) -> None:
@@ -126,10 +127,10 @@ def test_a_session_that_was_killed_and_resumed_is_set_as_one_that_was_not(
 ) -> None:
     def kept() -> tuple[list[Any], list[Any]]:
         lines = lines_of(session)
-        last = {line.trial: line for line in lines if line.event == "trial_started"}
-        sets = {line.trial: line["setting"] for line in lines if line.get("setting") is not None}
-        answers = {line.trial: line.items[0]["value"] for line in lines if line.event == "responses"}
-        return [(n, line.level, sets[n]) for n, line in sorted(last.items())], sorted(answers.items())
+        last = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
+        sets = {line["trial"]: line["setting"] for line in lines if line.get("setting") is not None}
+        answers = {line["trial"]: line["items"][0]["value"] for line in lines if line["event"] == "responses"}
+        return [(n, line["level"], sets[n]) for n, line in sorted(last.items())], sorted(answers.items())
 
     whole = kept()
     cut(session, round(share * (session / "journal.jsonl").stat().st_size))
@@ -152,20 +153,20 @@ def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tm
     proved = replay(session)
     assert (proved.differences, proved.uncompared) == ((), ())
     lines = lines_of(session)
-    scenes = {line.scene is None for line in lines if line.event == "stepped"}
+    scenes = {line["scene"] is None for line in lines if line["event"] == "stepped"}
     assert scenes == {DELAY in edits}
-    assert sum(line.event == "responses" for line in lines) == 3
+    assert sum(line["event"] == "responses" for line in lines) == 3
 
 
 def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: Path) -> None:
     lines, key = lines_of(session_of(study)), read_key(study)
-    protocol = whole_protocol(read(session_of(study) / "receipt.json")["protocol"], key)
+    protocol = whole_protocol(raw(read(session_of(study) / "receipt.json"))["protocol"], key)
     numbers = recorded_numbers(protocol, lines)
     assert {line["setting"] for line in lines if line.get("setting") is not None} <= numbers
-    assert len(numbers) > sum(line.event == "trial_started" for line in lines) + 6
+    assert len(numbers) > sum(line["event"] == "trial_started" for line in lines) + 6
     words = certain_telltales(key.tables, {}, numbers)
     assert find_leaks(study, words) == []
-    assert words.in_text(f"{lines[-1].n} {max(numbers - {18.0})!r}")
+    assert words.in_text(f"{lines[-1]['n']} {max(numbers - {18.0})!r}")
 
 
 def test_a_level_that_was_set_is_found_in_a_note(session: Path) -> None:

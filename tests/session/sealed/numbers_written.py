@@ -8,7 +8,6 @@ import numpy as np
 from scipy.stats import binomtest
 
 from study_app.store.folders import SessionFolder
-from study_app.store.journals.journal import Line
 
 ABOUT_ANSWERS = frozenset({"item_shown", "choice", "responses"})
 ABOUT_RECORDINGS = frozenset({"samples_recorded", "samples_unrecorded", "frames_recorded"})
@@ -23,7 +22,10 @@ Trials: TypeAlias = dict[tuple[str, int], tuple[str, Numbers]]
 
 
 def every_number(
-    session: SessionFolder, study: str, lines: Iterable[Line], presented: Callable[[Line], str | None]
+    session: SessionFolder,
+    study: str,
+    lines: Iterable[dict[str, Any]],
+    presented: Callable[[dict[str, Any]], str | None],
 ) -> Trials:
     """Return what a session's files hold about each trial beside answers, times of actions, recordings.
 
@@ -31,7 +33,7 @@ def every_number(
     ----------
     session, study
         The session's folder, and the study's name.
-    lines : iterable of Line
+    lines : iterable of dict[str, Any]
         The lines of its journal, as they were written.
     presented : callable
         Returns what the trial that a line begins presented, None for a trial that is left out.

@@ -3,6 +3,7 @@
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,8 +13,8 @@ from study_app.store.blinded import blinding
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.journals.journal import Line
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 from tests.session.sealed.numbers_written import Trials, every_number, told
 
 pytestmark = [pytest.mark.slow, needs_servo]
@@ -37,12 +38,12 @@ def numbers_of(folder: Path, block: str) -> Trials:
     """Return what a study's folder holds about each trial of a block, with its condition."""
     codes = blinding.read_key(folder).codes[block]
 
-    def condition(line: Line) -> str | None:
-        return codes[line.code] if line.block == block else None
+    def condition(line: dict[str, Any]) -> str | None:
+        return codes[line["code"]] if line["block"] == block else None
 
     found: Trials = {}
     for session in StudyFolder(folder).sessions():
-        found |= every_number(session, "demo", journal.read(session.journal), condition)
+        found |= every_number(session, "demo", raw(journal.read(session.journal)), condition)
     return found
 
 

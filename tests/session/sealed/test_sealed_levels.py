@@ -27,6 +27,7 @@ from study_app.viewmodels.operator import Session, operator_view
 from study_app.viewmodels.servo_health import Vitals
 from study_app.viewmodels.session import stages
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 from tests.outlets.collector import collecting
 from tests.protocol import edited_studies
 from tests.protocol.trials.level_studies import SHORT, text_of
@@ -130,16 +131,16 @@ def operator_views(folder: Path, protocol: Path) -> list[Any]:
     progress = Progress()
     views = []
     (place,) = StudyFolder(folder).sessions()
-    for line in journal.read(place.journal):
+    for line in raw(journal.read(place.journal)):
         progress.take(line)
-        views.append(operator_view(session, progress, Vitals(), now_s=line.t_s, force_on=True))
+        views.append(operator_view(session, progress, Vitals(), now_s=line["t_s"], force_on=True))
     return views
 
 
 def levels(folder: Path) -> list[Any]:
     (place,) = StudyFolder(folder).sessions()
-    lines = blinding.opened(journal.read(place.journal), read_key(folder))
-    return [(line.level, line.arrangement) for line in lines if line.event == "trial_started"]
+    lines = raw(blinding.opened(journal.read(place.journal), read_key(folder)))
+    return [(line["level"], line["arrangement"]) for line in lines if line["event"] == "trial_started"]
 
 
 def test_sessions_under_two_keys_present_different_levels(first: Path, second: Path) -> None:
@@ -183,9 +184,9 @@ def numbers_of(folder: Path, what: str) -> Trials:
     key = read_key(folder)
     found: Trials = {}
     for session in StudyFolder(folder).sessions():
-        lines = journal.read(session.journal)
-        presented = {line.n: line for line in blinding.opened(lines, key)}
-        found |= every_number(session, "levels", lines, lambda line, of=presented: str(of[line.n][what]))
+        lines = raw(journal.read(session.journal))
+        presented = {line["n"]: line for line in raw(blinding.opened(lines, key))}
+        found |= every_number(session, "levels", lines, lambda line, of=presented: str(of[line["n"]][what]))
     return found
 
 

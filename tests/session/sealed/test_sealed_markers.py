@@ -12,6 +12,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.leaks import telltales
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 from tests.outlets.collector import Collector, collecting
 
 pytestmark = [pytest.mark.slow, needs_servo]
@@ -54,14 +55,14 @@ def words_found(collector: Collector, protocol: Path) -> list[str]:
 def test_markers_are_the_journals_events_with_their_codes(rehearsed: tuple[Path, Collector]) -> None:
     folder, collector = rehearsed
     (session,) = StudyFolder(folder).sessions()
-    lines = journal.read(session.journal)
-    marked = [line for line in lines if line.event not in {"recorded", "preflight"}]
-    assert collector.events == [line.event for line in marked]
+    lines = raw(journal.read(session.journal))
+    marked = [line for line in lines if line["event"] not in {"recorded", "preflight"}]
+    assert collector.events == [line["event"] for line in marked]
     assert {"trial_started", "trial_ended", "choice", "responses", "target_reached"} < set(collector.events)
     for marker, line in zip(collector.markers, marked, strict=True):
         said = json.loads(marker.text)
-        assert said["t_s"] == line.t_s
-        assert said.get("code") == getattr(line, "code", None)
+        assert said["t_s"] == line["t_s"]
+        assert said.get("code") == line.get("code")
     assert not any("sealed" in marker.text or "value" in marker.text for marker in collector.markers)
 
 

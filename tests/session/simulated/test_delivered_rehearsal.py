@@ -10,6 +10,7 @@ from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 
 pytestmark = needs_servo
 
@@ -71,8 +72,8 @@ def test_every_interval_is_delivered_as_requested(tmp_path: Path, tables: str) -
     path.write_text(HEAD + tables, encoding="utf-8")
     study = rehearse(path, participants=1, seed=1, results=tmp_path / "results")
     session = StudyFolder(study).sessions()[0]
-    lines = opened(journal.read(session.journal), read_key(study))
-    intervals = [line for line in lines if line.event == "interval_ended"]
+    lines = raw(opened(journal.read(session.journal), read_key(study)))
+    intervals = [line for line in lines if line["event"] == "interval_ended"]
     assert intervals
     for line in intervals:
         assert "invalid" not in line
@@ -80,5 +81,5 @@ def test_every_interval_is_delivered_as_requested(tmp_path: Path, tables: str) -
         assert line["force_share"] == pytest.approx(1.0, abs=0.02)
         assert 0.0888 * 0.6 < line["pace_mps"] < 0.0888 * 1.4
         assert (line["value_delivered"] is None) == (tables is DELAYS)
-    assert {line.outcome for line in lines if line.event == "trial_ended"} == {"complete"}
+    assert {line["outcome"] for line in lines if line["event"] == "trial_ended"} == {"complete"}
     assert replay(session.path).proved

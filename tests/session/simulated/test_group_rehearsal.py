@@ -13,6 +13,7 @@ from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
 pytestmark = [pytest.mark.slow, needs_servo]
@@ -20,10 +21,10 @@ pytestmark = [pytest.mark.slow, needs_servo]
 
 def told(study: Path, session: SessionFolder) -> tuple[str, list[tuple[Any, ...]], list[Any]]:
     """Return the group, the trials and the answers of a session."""
-    lines = opened(journal.read(session.journal), read_key(study))
-    trials = {line.trial: (line.block, line.code) for line in lines if line.event == "trial_started"}
-    answers = {line.trial: line.items[0]["value"] for line in lines if line.event == "responses"}
-    return lines[0].group, sorted(trials.items()), sorted(answers.items())
+    lines = raw(opened(journal.read(session.journal), read_key(study)))
+    trials = {line["trial"]: (line["block"], line["code"]) for line in lines if line["event"] == "trial_started"}
+    answers = {line["trial"]: line["items"][0]["value"] for line in lines if line["event"] == "responses"}
+    return lines[0]["group"], sorted(trials.items()), sorted(answers.items())
 
 
 @pytest.fixture(scope="module")

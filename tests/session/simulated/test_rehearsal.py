@@ -30,6 +30,7 @@ from study_app.store.journals import journal
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.study_files import write_description
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 from tests.session import small
 
 HALF_M = (0.05, 0.03, 0.03)
@@ -114,10 +115,10 @@ def test_the_folder_of_another_study_is_named_before_an_id_that_is_used_in_it(tm
 @pytest.mark.slow
 @needs_servo
 def test_a_disk_that_fails_ends_the_rehearsal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(self: SessionStore, event: str, **fields: Any) -> None:
-        if event == "choice":
+    def full(self: SessionStore, event: Any, **about: Any) -> None:
+        if event.event == "choice":
             raise StoreError("no space left")
-        kept(self, event, **fields)
+        kept(self, event, **about)
 
     kept = SessionStore.append
     monkeypatch.setattr(SessionStore, "append", full)
@@ -142,7 +143,10 @@ def test_a_servo_that_is_ended_from_outside_ends_the_rehearsal(monkeypatch: Any)
 def confirmed(lines: Iterable[Any]) -> dict[tuple[int, str], int]:
     """Return the answers by trial and item, those of the last attempt."""
     return {
-        (line.trial, item["item"]): item["value"] for line in lines if line.event == "responses" for item in line.items
+        (line["trial"], item["item"]): item["value"]
+        for line in lines
+        if line["event"] == "responses"
+        for item in line["items"]
     }
 
 
@@ -157,17 +161,17 @@ def test_a_rehearsal_that_was_interrupted_and_resumed_answers_like_one_that_was_
     rehearsal.rehearse("demo", participants=1, seed=seed, results=whole.path, recordings=False)
     kept, pages = SessionStore.append, count(1)
 
-    def interrupted(self: SessionStore, event: str, **fields: Any) -> None:
+    def interrupted(self: SessionStore, event: Any, **about: Any) -> None:
         if event == "responses" and next(pages) == page:
             raise KeyboardInterrupt
-        kept(self, event, **fields)
+        kept(self, event, **about)
 
     with monkeypatch.context() as patched:
         patched.setattr(SessionStore, "append", interrupted)
         with pytest.raises(KeyboardInterrupt):
             rehearsal.rehearse("demo", participants=1, seed=seed, results=parted.path, recordings=False)
     rehearsal.resume(parted.session("P001", 1).path)
-    answers, others = (confirmed(journal.read(folder.session("P001", 1).journal)) for folder in (whole, parted))
+    answers, others = (confirmed(raw(journal.read(folder.session("P001", 1).journal))) for folder in (whole, parted))
     assert answers == others
 
 
@@ -182,10 +186,10 @@ def test_a_resumed_session_goes_on_with_the_model_that_it_began_with(
     file.write_text(re.sub(r"^effects = \[.*?\]", 'effects = "auto"', text, flags=re.MULTILINE), encoding="utf-8")
     results, kept, used = StudyFolder(tmp_path / "results"), SessionStore.append, []
 
-    def interrupted(self: SessionStore, event: str, **fields: Any) -> None:
+    def interrupted(self: SessionStore, event: Any, **about: Any) -> None:
         if event == "responses":
             raise KeyboardInterrupt
-        kept(self, event, **fields)
+        kept(self, event, **about)
 
     def noting(protocol: Protocol, *rest: Any) -> Any:
         used.append(protocol)

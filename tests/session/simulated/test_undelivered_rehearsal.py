@@ -16,6 +16,7 @@ from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 from tests.protocol.edited_studies import text_of
 from tests.store.forging import change, cut
 
@@ -45,7 +46,7 @@ def session(study: Path, tmp_path: Path) -> Path:
 
 
 def lines_of(session: Path) -> list[dict[str, Any]]:
-    return [dict(line) for line in opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2]))]
+    return [dict(line) for line in raw(opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2])))]
 
 
 def rows_of(session: Path, table: str) -> list[dict[str, str]]:
@@ -56,17 +57,17 @@ def rows_of(session: Path, table: str) -> list[dict[str, str]]:
 def by_trial(lines: list[dict[str, Any]], event: str) -> dict[int, list[dict[str, Any]]]:
     found: dict[int, list[dict[str, Any]]] = {}
     for line in lines:
-        if line.event == event:
-            found.setdefault(line.trial, []).append(line)
+        if line["event"] == event:
+            found.setdefault(line["trial"], []).append(line)
     return found
 
 
 def outcomes(lines: list[dict[str, Any]]) -> list[tuple[int, int, str]]:
-    return [(line.trial, line.attempt, line.outcome) for line in lines if line.event == "trial_ended"]
+    return [(line["trial"], line["attempt"], line["outcome"]) for line in lines if line["event"] == "trial_ended"]
 
 
 def answers(lines: list[dict[str, Any]]) -> list[tuple[int, Any]]:
-    return [(line.trial, line.items[0]["value"]) for line in lines if line.event == "responses"]
+    return [(line["trial"], line["items"][0]["value"]) for line in lines if line["event"] == "responses"]
 
 
 def test_clipped_intervals_are_invalid_and_their_trials_come_again_and_are_not_asked_about(session: Path) -> None:
@@ -77,20 +78,20 @@ def test_clipped_intervals_are_invalid_and_their_trials_come_again_and_are_not_a
     assert len(strong) == 2
     assert answered == set(started) - strong
     for trial in strong:
-        assert [line.outcome for line in ended[trial]] == ["invalid"] * ATTEMPTS
-        assert len({(line.level, line.standard, line.arrangement) for line in started[trial]}) == 1
-    invalid = [line for line in lines if line.event == "interval_ended" and "invalid" in line]
+        assert [line["outcome"] for line in ended[trial]] == ["invalid"] * ATTEMPTS
+        assert len({(line["level"], line["standard"], line["arrangement"]) for line in started[trial]}) == 1
+    invalid = [line for line in lines if line["event"] == "interval_ended" and "invalid" in line]
     assert len(invalid) == ATTEMPTS * len(strong)
     for line in invalid:
-        arrangement = started[line.trial][0]["arrangement"]
-        assert arrangement[line.interval - 1] == "C"
-        assert line.invalid == ["level_error_percent", "force_limit_n"]
+        arrangement = started[line["trial"]][0]["arrangement"]
+        assert arrangement[line["interval"] - 1] == "C"
+        assert line["invalid"] == ["level_error_percent", "force_limit_n"]
         assert line["limiter_norm"] > 0
 
 
 def test_what_was_delivered_as_requested_is_within_its_limit(session: Path) -> None:
     for line in lines_of(session):
-        if line.event == "interval_ended" and "invalid" not in line:
+        if line["event"] == "interval_ended" and "invalid" not in line:
             asked = min((4.0, 4.4), key=lambda one: abs(one - line["value_delivered"]))
             assert line["value_delivered"] == pytest.approx(asked, rel=0.05)
             assert line["force_share"] == pytest.approx(1.0, abs=0.02)
@@ -118,7 +119,7 @@ def test_journal_recordings_and_answers_agree(study: Path) -> None:
 
 def test_a_delivered_value_that_is_not_the_recordings_is_found(session: Path) -> None:
     def edit(lines: list[dict[str, Any]]) -> None:
-        next(line for line in lines if line.event == "interval_ended")["value_delivered"] += 1e-6
+        next(line for line in lines if line["event"] == "interval_ended")["value_delivered"] += 1e-6
 
     change(session, edit)
     assert any("value_delivered differs" in one for one in replay(session).differences)
@@ -126,7 +127,7 @@ def test_a_delivered_value_that_is_not_the_recordings_is_found(session: Path) ->
 
 def test_a_session_ended_between_two_attempts_goes_on_to_the_same_answers(session: Path, protocol: Path) -> None:
     whole = lines_of(session)
-    invalid = [index for index, line in enumerate(whole) if getattr(line, "outcome", None) == "invalid"]
+    invalid = [index for index, line in enumerate(whole) if line.get("outcome") == "invalid"]
     content = (session / "journal.jsonl").read_bytes()
     cut(session, len(b"".join(content.splitlines(keepends=True)[: invalid[1] + 1])))
     resume(session, protocol=protocol)

@@ -29,6 +29,7 @@ from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.killer import die, forked
 from tests.faults.support.racers import race
+from tests.journal_lines import raw
 from tests.platforms import needs_fork
 from tests.protocol.groups.grouped import GROUPS, STUDY, grouped
 
@@ -93,11 +94,11 @@ def test_no_file_names_a_group_of_a_participant(tmp_path: Path) -> None:
         study = StudyFolder(tmp_path / f"s{number}")
         with begun(study.path, "P001") as store:
             found = allocated(study, store.key, "P001")
-            line = next(line for line in store.lines if line.event == "allocated")
+            line = next(line for line in raw(store.lines) if line["event"] == "allocated")
             (claim,) = (json.loads(path.read_text()) for path in study.allocated.iterdir())
         assert found is not None
         assert set(line) == {"n", "event", "t_s", "at", "entry", "sealed", "previous"}
-        assert (claim.pop("sealed"), line.sealed) == (found.sealed, found.sealed)
+        assert (claim.pop("sealed"), line["sealed"]) == (found.sealed, found.sealed)
         assert claim == {"entry": 1, "participant": "P001"}
         readable[found.group] = found.sealed
         receipt = json.loads(store.folder.receipt.read_text())
@@ -213,7 +214,7 @@ def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> N
         found = allocated(study, key, session.participant)
         assert found is not None
         own = own_protocol(grouped(), found.group, 1)
-        trials = [line.code for line in journal.read(session.journal) if line.event == "trial_started"]
+        trials = [line["code"] for line in raw(journal.read(session.journal)) if line["event"] == "trial_started"]
         assert trials == [trial.code for trial in build_schedule(own, session.participant, 3).trials]
         assert reproduced(session.path).differences == []
     assert not verify(folder).errors

@@ -18,7 +18,7 @@ from study_app.store.tables.columns import SEALED, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, header, read_table, unsealed
 from study_app.store.tables.study_files import description_bytes
 from study_app.store.verification.verify_study import verify
-from tests.journal_lines import event_of
+from tests.journal_lines import event_of, raw
 from tests.store.conftest import SOURCE, Attend, Start, ticking_clock
 from tests.store.forging import Lines, cover_up, forge
 
@@ -155,7 +155,7 @@ def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start
     again.append(journal_events.TrialStarted(trial=6, attempt=1, **told))
     again.append(event_of("trial_ended", trial=6, attempt=1, outcome="complete", force_mean_n=1.25))
     again.finish("completed")
-    assert "sealed" in journal.read(again.folder.journal)[-2]
+    assert journal.read(again.folder.journal)[-2].sealed
     assert b",1.25," in again.folder.table("brackish", "trials").read_bytes().splitlines()[-1]
     assert sound(tmp_path / "study")
 
@@ -179,7 +179,7 @@ def test_a_sealed_text_that_was_changed_is_found(tmp_path: Path, finished: Start
 
 def in_clear(store: SessionStore, study: StudyHead) -> None:
     """Make of a finished session one of an earlier version, which sealed nothing."""
-    lines = opened(journal.read(store.folder.journal), store.key)
+    lines = raw(opened(journal.read(store.folder.journal), store.key))
     del lines[0]["measures_sealed"]
 
     def clear(held: Lines) -> None:

@@ -179,7 +179,7 @@ def test_a_power_cut_takes_no_answer_and_leaves_no_hole(
         for waits, fails in lines:
             disk.fails = int(fails)
             try:
-                kept.append(journal.append("counted" if waits else "seen", waits=waits))
+                kept.append(journal.append(event_of("counted" if waits else "seen"), waits=waits))
             except StoreError:
                 continue
             if waits:

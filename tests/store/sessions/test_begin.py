@@ -78,8 +78,8 @@ def test_the_receipt_holds_what_reproduces_the_session(start: Start) -> None:
     after = receipt.read(store.folder.receipt)
     ended = journal.read(store.folder.journal)[-1]
     assert {key for key in after if after[key] != before[key]} == {"status", "reason", "ended_at"}
-    assert (after["status"], after["reason"], after["ended_at"]) == ("withdrawn", "tired, went home", ended["at"])
-    assert (ended["event"], ended["status"], ended["reason"]) == ("session_ended", "withdrawn", "tired, went home")
+    assert (after["status"], after["reason"], after["ended_at"]) == ("withdrawn", "tired, went home", ended.at)
+    assert (ended.event, ended.status, ended.reason) == ("session_ended", "withdrawn", "tired, went home")
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,9 @@ def test_recordings_are_kept_beside_the_journal_and_linked_from_the_trials_row(
     lines = [line for line in journal.read(store.folder.journal) if line.event == "recorded"]
     for line in lines:
         for name, digest in (("recording", "sha256"), ("recording_frames", "frames_sha256")):
-            assert hashlib.sha256((store.folder.path / line[name]).read_bytes()).hexdigest() == line[digest]
+            assert hashlib.sha256((store.folder.path / getattr(line, name)).read_bytes()).hexdigest() == getattr(
+                line, digest
+            )
     facts = read_facts(store.folder.path / lines[0].recording)
     assert (facts["participant"], facts["origin_ns"]) == ("P007", 5_000_000_000)
 

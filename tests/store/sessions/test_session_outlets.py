@@ -49,7 +49,7 @@ def test_a_marker_does_not_wait_for_the_disk_and_is_not_sent_again(
     store: SessionStore, outlets: Collector, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     full = mock.Mock(side_effect=StoreError("the disk is full"))
-    started = partial(store.append, "trial_started", t_s=1.25, **TRIAL)
+    started = partial(store.append, journal_events.TrialStarted(**TRIAL), t_s=1.25)
     for act in (started, partial(store.finish, "completed")):
         with monkeypatch.context() as patch:
             patch.setattr(store.journal, "append", full)
@@ -58,7 +58,7 @@ def test_a_marker_does_not_wait_for_the_disk_and_is_not_sent_again(
                     act()
         act()
     assert outlets.events == ["session_started", "trial_started", "session_ended"]
-    assert journal.read(store.folder.journal)[-1]["t_s"] == round(outlets.markers[-1].t_s, 6)
+    assert journal.read(store.folder.journal)[-1].t_s == round(outlets.markers[-1].t_s, 6)
 
 
 def test_an_outlet_that_fails_is_journalled_once_and_its_last_count_is_in_the_receipt(

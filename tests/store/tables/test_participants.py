@@ -16,6 +16,7 @@ from study_app.store.sessions.recovery import rebuild
 from study_app.store.tables import study_files
 from study_app.store.verification.verify_study import verify
 from study_app.viewmodels.sessions import sessions
+from tests.journal_lines import raw
 from tests.store.conftest import Start
 
 pytestmark = pytest.mark.slow
@@ -51,7 +52,7 @@ def beginning_late(lines: list[dict[str, Any]]) -> None:
 
 
 def about_a_trial_that_never_started(lines: list[dict[str, Any]]) -> None:
-    next(line for line in lines if line.event == "trial_ended")["trial"] = 99
+    next(line for line in lines if line["event"] == "trial_ended")["trial"] = 99
 
 
 @pytest.mark.parametrize(
@@ -61,7 +62,7 @@ def test_a_journal_that_gives_no_row_stops_no_other_session_and_is_marked(
     tmp_path: Path, start: Start, damage: Callable[[list[dict[str, Any]]], None], finished: Start
 ) -> None:
     store = finished("P001")
-    lines = journal.read(store.folder.journal)
+    lines = raw(journal.read(store.folder.journal))
     damage(lines)
     store.folder.journal.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
     start("P002").finish("completed")

@@ -22,6 +22,7 @@ from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.journal_lines import raw
 from tests.protocol.trials.level_studies import BLOCK, HEAD
 from tests.session.pairs import short_text
 from tests.store.forging import Lines, change, cut, nothing
@@ -70,7 +71,7 @@ def other_arrangement(lines: Lines) -> None:
 
 def passed_over_too_early(lines: Lines) -> None:
     later = [line for line in lines if line.get("trial") == 5]
-    lines[lines["index"](later[0])] = {
+    lines[lines.index(later[0])] = {
         **{name: later[0][name] for name in ("n", "t_s", "at")},
         **{"event": "passed_over", "trial": 5, "reason": "track_ended"},
     }
@@ -139,10 +140,10 @@ def test_a_session_that_was_killed_and_resumed_presents_and_is_answered_as_one_t
     session: Path, protocol: Path, share: float
 ) -> None:
     def told() -> tuple[list[Any], list[Any]]:
-        lines = opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2]))
-        last = {line.trial: line for line in lines if line.event == "trial_started"}
-        levels = [(n, line.level, line.standard, line.arrangement) for n, line in sorted(last.items())]
-        answers = {line.trial: line.items[0]["value"] for line in lines if line.event == "responses"}
+        lines = raw(opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2])))
+        last = {line["trial"]: line for line in lines if line["event"] == "trial_started"}
+        levels = [(n, line["level"], line["standard"], line["arrangement"]) for n, line in sorted(last.items())]
+        answers = {line["trial"]: line["items"][0]["value"] for line in lines if line["event"] == "responses"}
         return levels, sorted(answers.items())
 
     whole = told()

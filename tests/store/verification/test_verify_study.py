@@ -233,6 +233,15 @@ def test_a_description_of_an_earlier_version_is_a_warning_and_a_column_it_never_
         assert "differs from what this version writes" in told(verify(study))
 
 
+def test_a_column_that_earlier_versions_did_not_write_cannot_be_taken_from_a_table_of_today(study: Path) -> None:
+    """The table reads as one of an earlier version; its checksum says that it was changed."""
+    (path,) = (study / "data" / "sub-P007" / "ses-01").glob("*trials_data.csv")
+    rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
+    at = rows[0].index("loop_delay_changes")
+    path.write_text("".join(f"{','.join([*row[:at], *row[at + 1 :]])}\n" for row in rows), encoding="utf-8")
+    assert f"{path.name}: has changed since the session ended" in told(verify(study))
+
+
 @pytest.mark.parametrize(
     ("damage", "sentence"),
     [

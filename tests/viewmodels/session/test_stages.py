@@ -5,6 +5,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.delivered import within_limits
 from study_app.store.progress import Progress
 from study_app.viewmodels.session import stages
+from tests.journal_lines import event_of
 
 
 def test_trials_are_done_interrupted_judged_and_repeated(told):
@@ -49,8 +50,8 @@ def test_a_resumed_session_is_where_its_journal_says_and_an_attempt_takes_back_t
     assert (told.progress.answered, told.progress.broken) == ({}, {})
     assert told.session.trial(told.progress).number == 1
     again = Progress()
-    again.take({"event": "page_shown", "t_s": 1.0, "page": "welcome"})
-    again.take({"event": "note", "t_s": 2.0, "kind": "mark", "text": ""})
+    again.take(event_of("page_shown", t_s=1.0, page="welcome"))
+    again.take(event_of("note", t_s=2.0, kind="mark", text=""))
     assert (again.here, [note.kind for note in again.notes], again.t_s) == (0, ["mark"], 2.0)
 
 

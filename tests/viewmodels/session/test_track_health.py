@@ -8,6 +8,7 @@ from study_app.protocol.model import Limits, Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.progress import Progress
 from study_app.viewmodels.session import UNDELIVERED, track_words, unanswered_words
+from tests.journal_lines import event_of
 from tests.protocol.trials.level_studies import study
 
 CHOICES = {"first": "First", "second": "Second"}
@@ -22,7 +23,7 @@ class Told:
 
     def tell(self, event: str, at_s: float, **fields: Any) -> None:
         sealed = {"sealed": "00"} if event == "trial_started" else {}
-        self.progress.take({"event": event, "t_s": at_s, **sealed, **fields})
+        self.progress.take(event_of(event, t_s=at_s, **sealed, **fields))
 
     def trial(self, number: int, answer: str, seconds: float = 1.0, attempt: int = 1) -> None:
         self.tell("trial_started", number * 10, trial=number, attempt=attempt)
@@ -90,7 +91,7 @@ def test_tracks_are_counted_apart(told: Told) -> None:
 def test_a_trial_without_intervals_has_no_track(told: Told) -> None:
     told.trial(1, "first")
     assert told.progress.of_intervals == 1
-    told.progress.take({"event": "trial_started", "t_s": 30.0, "trial": 2, "attempt": 1})
+    told.progress.take(event_of("trial_started", t_s=30.0, trial=2, attempt=1))
     assert told.progress.of_intervals is None
 
 
