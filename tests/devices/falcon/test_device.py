@@ -136,8 +136,8 @@ class TestOpening:
     @pytest.mark.parametrize(
         ("at", "happens", "error", "words"),
         [
-            (PULL_OUT, lambda emulator: emulator.hold(0.0, 0.0, 0.0), "pull it fully out"),
-            (STROKES, lambda emulator: emulator.power(False), "power adapter"),
+            (PULL_OUT, lambda emulator: emulator.hold(0.0, 0.0, 0.0), DeviceFailure, "pull it fully out"),
+            (STROKES, lambda emulator: emulator.power(False), DeviceFailure, "power adapter"),
             (PULL_OUT, lambda emulator: emulator.faults.on("unplugged"), UsbFailure, "no longer there"),
         ],
     )
