@@ -46,4 +46,4 @@ def made_up(name: str) -> ConditionFeatures:
 
 def rehearsed(results: Path, name: str = "demo", *, people: int = 3) -> Path:
     """Rehearse answers of a study under a results folder; return the study's folder."""
-    return rehearse_answers(name, participants=people, seed=1, results=results / name, felt=made_up(name))
+    return rehearse_answers(name, participants=people, seed=1, results=results / name, features=made_up(name))

@@ -158,18 +158,18 @@ def _servo(facts: Facts, protocol: Protocol) -> Iterator[Check]:
     else:
         yield Check("Device", "ok", "responding", about)
 
-    about, asked = "assumed: the device does not measure its delay", protocol.device.rate_hz
+    about, requested_hz = "assumed: the device does not measure its delay", protocol.device.rate_hz
     if facts.dynamics.delay_s is not None:
         about = f"delay until a force acts: {1e3 * facts.dynamics.delay_s:.2f} ms, measured by the device"
-        if facts.delay_ticks > facts.dynamics.delay_ticks(asked):
+        if facts.delay_ticks > facts.dynamics.delay_ticks(requested_hz):
             about += " when it was opened; it measured more since"
     well = facts.dynamics.delay_s is None or facts.delay_ticks <= BELIEVED_TICKS
     advice = "Forces are limited more strictly: connect the device without a hub."
     yield _warned("Loop delay", counted(facts.delay_ticks, "tick"), about, advice, well=well)
 
-    value, about = f"{facts.timing.rate_hz:.1f} Hz", f"requested: {asked:g} Hz"
-    error = abs(facts.timing.rate_hz / asked - 1)
-    refusal = refuses(asked) or (f"{value}, {about}: close other programs" if error > RATE_FAILURE else None)
+    value, about = f"{facts.timing.rate_hz:.1f} Hz", f"requested: {requested_hz:g} Hz"
+    error = abs(facts.timing.rate_hz / requested_hz - 1)
+    refusal = refuses(requested_hz) or (f"{value}, {about}: close other programs" if error > RATE_FAILURE else None)
     if refusal is not None:
         yield Check("Servo rate", "failure", value, about, refusal)
     else:

@@ -30,7 +30,7 @@ from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import start_of
 from study_app.store.progress import progress_of
-from study_app.store.sessions.begin import SessionStart, begin, check_participant, check_unused, refuse_never_begun
+from study_app.store.sessions.begin import SessionStart, begin, check_participant, refuse_never_begun, used_ids
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import check_can_go_on, reopen
 from study_app.store.tables.study_files import check_study
@@ -212,7 +212,7 @@ def check(chosen: NewSession, study: Protocol) -> None:
     check_participant(chosen.participant, pilot=chosen.pilot)
     check_row(chosen.row_of, study)
     check_study(folder, study.study.name)
-    check_unused(folder, chosen.participant, chosen.session)
+    used_ids(folder).check_unused(chosen.participant, chosen.session)
     check_session(folder, study, chosen.participant, chosen.session)
     check_conditions(folder.path, study)
 

@@ -199,8 +199,8 @@ def undelivered(
     if presented.vary is not None and presented.vary not in OF_CONDITION and most is not None:
         fitted = varies_damping(presented) and not adjusted
         measured = found.value_delivered if fitted else found.force_share
-        asked = presented.value if fitted else 1.0
-        if abs((measured or 0.0) - asked) > abs(asked) * most / 100:  # nothing was delivered to a hand at rest
+        requested = presented.value if fitted else 1.0
+        if abs((measured or 0.0) - requested) > abs(requested) * most / 100:  # nothing was delivered to a hand at rest
             yield "level_error_percent"
     if presented.vary not in {None, DELAY} and most is not None and found.clipped:
         yield "force_limit_n"

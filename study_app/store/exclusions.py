@@ -112,9 +112,9 @@ def include(
         rows = exclusions(folder)
         taken = next((row for row in rows if row.what == (participant, session, trial)), None)
         if taken is None:
-            asked = named(Exclusion(participant, session, trial, "", "", ""))
+            name = named(Exclusion(participant, session, trial, "", "", ""))
             listed = "; ".join(named(row) for row in rows) or "nothing"
-            raise StoreError(f"{asked} is not excluded; excluded: {listed}")
+            raise StoreError(f"{name} is not excluded; excluded: {listed}")
         at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
         record = {"at": at, "by": by.strip(), "reason": reason.strip(), "exclusion": asdict(taken)}
         append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")

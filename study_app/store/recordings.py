@@ -442,7 +442,12 @@ class _Half:
         )
 
     def write(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        arrays = [_array(columns[field.name], field.type) for field in self._schema]
+        arrays = []
+        for field in self._schema:  # without a copy, and without the library that Arrow would load to look at them
+            values = columns[field.name]
+            packs = pa.types.is_boolean(field.type)
+            kept = np.packbits(values, bitorder="little") if packs else np.ascontiguousarray(values)
+            arrays.append(pa.Array.from_buffers(field.type, len(values), [None, pa.py_buffer(kept)]))
         self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
 
     def finish(self, facts: Mapping[str, Any], rows: int) -> Written:
@@ -481,9 +486,3 @@ def _encoding(of: pa.DataType) -> str:
     if pa.types.is_boolean(of):
         return "RLE"
     return "BYTE_STREAM_SPLIT" if pa.types.is_floating(of) else "DELTA_BINARY_PACKED"
-
-
-def _array(values: NDArray[Any], of: pa.DataType) -> pa.Array:
-    """Return ``values`` for Arrow without a copy, and without the library that it would load to look at them."""
-    kept = np.packbits(values, bitorder="little") if pa.types.is_boolean(of) else np.ascontiguousarray(values)
-    return pa.Array.from_buffers(of, len(values), [None, pa.py_buffer(kept)])

@@ -142,7 +142,9 @@ def withdraw(
             elif _erase(copy, replace(tombstone, at=at)):
                 erased.append(copy.path)
                 left += _names(copy, participant)
-            reached += [copy.path] if _is_buried(copy, tombstone) else []
+            known, begun = tombstones(copy).get(participant), {one.begun for one in tombstone.sessions if one.begun}
+            if known is not None and any(one.begun in begun for one in known.sessions):
+                reached.append(copy.path)
     for merged in dict.fromkeys(filter(None, map(merged_above, reached))):
         of_merged, merged_elsewhere = _outputs(merged)
         outputs, elsewhere = (*outputs, *of_merged), (*elsewhere, *merged_elsewhere)
@@ -256,13 +258,6 @@ def _others(copy: StudyFolder, tombstone: Tombstone) -> list[Path]:
     ]
 
 
-def _is_buried(copy: StudyFolder, tombstone: Tombstone) -> bool:
-    """Return whether a copy held the sessions that were erased, and now has a tombstone for them."""
-    known = tombstones(copy).get(tombstone.participant)
-    begun = {one.begun for one in tombstone.sessions if one.begun}
-    return known is not None and any(one.begun in begun for one in known.sessions)
-
-
 def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
     """Write the tombstone, then erase folder and rows of a participant; return whether anything was there."""
     participant = tombstone.participant
@@ -281,10 +276,14 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
             sync_folder(study.data)
     except OSError as error:
         raise cannot_write(person, error) from error
+    rows = exclusions(study.path)
+    kept = tuple(row for row in rows if row.participant != participant)
+    if kept != rows:
+        write_file(study.exclusions, exclusion_bytes(kept))
     changed = [
+        kept != rows,
         _keep_lines(study.fingerprints, lambda line: not _lists(line, study, participant)),
         _keep_lines(study.reversed_exclusions, lambda line: not _reverses(line, participant)),
-        _keep_exclusions(study, participant),
     ]
     name = described_study(study)
     if name is not None:
@@ -311,14 +310,6 @@ def _reverses(line: bytes, participant: str) -> bool:
         return bool(parse_json(line)["exclusion"]["participant"] == participant)
     except (ValueError, KeyError, TypeError):
         return False
-
-
-def _keep_exclusions(study: StudyFolder, participant: str) -> bool:
-    rows = exclusions(study.path)
-    kept = tuple(row for row in rows if row.participant != participant)
-    if kept != rows:
-        write_file(study.exclusions, exclusion_bytes(kept))
-    return kept != rows
 
 
 def _outputs(study: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:

@@ -190,7 +190,7 @@ def test_the_process_answers_stops_and_is_gone_when_closed(study: Path, tmp_path
 
 
 def test_a_merged_study_is_found_read_decided_on_and_opened(whole: Path, tmp_path: Path) -> None:
-    other = rehearse_answers("demo", participants=2, seed=2, results=tmp_path / "labs/demo", felt=made_up("demo"))
+    other = rehearse_answers("demo", participants=2, seed=2, results=tmp_path / "labs/demo", features=made_up("demo"))
     pooled = tmp_path / "results" / "pooled"
     merge({"A": whole, "B": other}, pooled)
     (found,) = of_kind(StudiesFound, told(FindStudies(pooled.parent)))

@@ -56,7 +56,7 @@ def rehearsed(make: Callable[[Path], Path], people: int, *, seed: int = 3, felt:
     def study(folder: Path) -> Path:
         file = make(folder)
         moved = made_up(str(file)) if felt else {}
-        results = rehearse_answers(file, participants=people, seed=seed, results=folder / "r", felt=moved)
+        results = rehearse_answers(file, participants=people, seed=seed, results=folder / "r", features=moved)
         unblind(results, "AB", "to analyse")
         return results
 
@@ -75,7 +75,7 @@ def adaptive_file(folder: Path) -> Path:
 def grouped(folder: Path) -> Path:
     (folder / "grouped.toml").write_text(STUDY + GROUPS)
     felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
-    results = rehearse_answers(folder / "grouped.toml", participants=4, seed=2, results=folder / "r", felt=felt)
+    results = rehearse_answers(folder / "grouped.toml", participants=4, seed=2, results=folder / "r", features=felt)
     unblind(results, "AB", "to analyse")
     return results
 
@@ -83,7 +83,7 @@ def grouped(folder: Path) -> Path:
 def sites_of_statements(folder: Path) -> Path:
     felt = made_up("rek2024")
     folders = {
-        site: rehearse_answers("rek2024", participants=2, seed=seed, results=folder / site, felt=felt)
+        site: rehearse_answers("rek2024", participants=2, seed=seed, results=folder / site, features=felt)
         for seed, site in enumerate("AB", start=1)
     }
     merge(folders, folder / "pooled")
@@ -94,7 +94,7 @@ def sites_of_statements(folder: Path) -> Path:
 QUICK = {"one_sealed": one_sealed, "unfinished": unfinished}
 SLOW = {
     "matching": rehearsed(matching_file, 2), "excluded": excluded, "mixed": rehearsed(mixed_file, 2),
-    "grouped": grouped, "adaptive": rehearsed(adaptive_file, 2, felt=False),
+    "grouped": grouped, "adaptive": rehearsed(adaptive_file, 2, features=False),
     "sites_of_statements": sites_of_statements,
 }  # fmt: skip
 EXTRAS = {"mixed": ["wide", "psych-ds", "sav"]}

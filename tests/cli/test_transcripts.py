@@ -131,7 +131,7 @@ def workspace(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, monkeypa
     """A workspace with a study of two people, its copy, and files that are no protocols."""
 
     def make(folder: Path) -> None:
-        rehearse_answers("demo", participants=2, seed=7, results=folder / "demo", felt=made_up("demo"))
+        rehearse_answers("demo", participants=2, seed=7, results=folder / "demo", features=made_up("demo"))
 
     for name in ("demo", "copied"):
         shutil.copytree(once(tmp_path_factory, "cli-demo", make) / "demo", tmp_path / "results" / name)

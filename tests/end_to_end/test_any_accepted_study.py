@@ -114,7 +114,7 @@ def test_any_accepted_study_can_be_held_resumed_verified_exported_and_reported(n
     file, results = tmp_path / "drawn.toml", tmp_path / "results"
     file.write_text(text, encoding="utf-8")
     felt = made_up(str(file))
-    rehearse_answers(file, participants=2, seed=number, results=results, felt=felt)
+    rehearse_answers(file, participants=2, seed=number, results=results, features=felt)
     cut_off_and_resumed(study, file.read_bytes(), results, felt, number)
     for session in StudyFolder(results).sessions():
         assert reproduced(session.path).differences == []

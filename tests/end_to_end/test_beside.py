@@ -55,14 +55,14 @@ class Stepwise:
 @pytest.mark.usefixtures("quick_pdf")
 def test_a_report_beside_a_running_session_is_of_the_sessions_that_ended_and_disturbs_none(tmp_path: Path) -> None:
     results = rehearsed(tmp_path / "results", people=2)
-    study, passed, felt = load("demo"), SimulatedTime(), made_up("demo")
+    study, passed, features = load("demo"), SimulatedTime(), made_up("demo")
     start = SessionStart(
         "P003", seed=3, operator="", language="en", device=DEVICE, screens=REHEARSED_SCREENS, simulated=True
     )
     with begin(results, study, source_bytes("demo"), start, clock=SessionClock(passed.ns)) as store:
         kept, schedule = Stepwise(store), build_schedule(study, "P003", 3)
         state = open_session(study, schedule, store.key.codes, "en", secret=store.key.nonce)
-        answering = Answering(study, state, kept, passed, lambda block, condition: felt[block, condition])
+        answering = Answering(study, state, kept, passed, lambda block, condition: features[block, condition])
         session = threading.Thread(target=answering.run)
         session.start()
         kept.write(10)

@@ -39,7 +39,7 @@ def outputs(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     def make(folder: Path) -> None:
         protocol = name if name not in FILES else str(FILES[name](folder))
         results = folder / "results"
-        rehearse_answers(protocol, participants=PEOPLE[name], seed=7, results=results, felt=made_up(protocol))
+        rehearse_answers(protocol, participants=PEOPLE[name], seed=7, results=results, features=made_up(protocol))
         unblind_folder(results, by="AB", reason="golden")
         with figures_as_lines():
             report(results, folder / "outputs", failed=pytest.fail)

@@ -54,7 +54,7 @@ def lines_of(folder: Path) -> Iterator[str]:
 @pytest.mark.parametrize("name", [*STUDIES[:2], *(pytest.param(name, marks=pytest.mark.slow) for name in STUDIES[2:])])
 def test_files(name: str, tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config) -> None:
     def make(folder: Path) -> None:
-        rehearse_answers(name, participants=1, seed=11, results=folder / name, felt=made_up(name))
+        rehearse_answers(name, participants=1, seed=11, results=folder / name, features=made_up(name))
 
     study = once(tmp_path_factory, f"golden-session-{name}", make) / name
     golden.compare(GOLDEN / f"{name}.txt", lines_of(study), pytestconfig)
@@ -62,7 +62,7 @@ def test_files(name: str, tmp_path_factory: pytest.TempPathFactory, pytestconfig
 
 def test_handling(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config) -> None:
     def make(folder: Path) -> None:
-        rehearse_answers("demo", participants=2, seed=7, results=folder / "demo", felt=made_up("demo"))
+        rehearse_answers("demo", participants=2, seed=7, results=folder / "demo", features=made_up("demo"))
 
     study = Path(shutil.copytree(once(tmp_path_factory, "handled-demo", make) / "demo", tmp_path / "demo"))
     steps: dict[str, Any] = {

@@ -70,7 +70,7 @@ def rehearse_answers(
     participants: int,
     seed: int,
     results: Path | None = None,
-    felt: ConditionFeatures | None = None,
+    features: ConditionFeatures | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> Path:
     """Answer for P001, P002 … and return the study folder.
@@ -85,7 +85,7 @@ def rehearse_answers(
         All randomness comes from it, the key's too.
     results : Path, optional
         Study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace.
-    felt : ConditionFeatures, optional
+    features : ConditionFeatures, optional
         What each condition feels like; by default rehearsed first.
     progress : callable, optional
         Called with a line now and then.
@@ -104,26 +104,26 @@ def rehearse_answers(
     folder = rehearsal_folder(workspace().results, study.study.name) if results is None else Path(results)
     people = tuple(f"P{number:03d}" for number in range(1, participants + 1))
     kept = SimulatedStudy(folder, study, source, people, seed=seed, device=DEVICE, screens=REHEARSED_SCREENS)
-    if felt is None:
-        felt = condition_features(study, seed=seed, people=REHEARSED_PEOPLE, progress=progress)
+    if features is None:
+        features = condition_features(study, seed=seed, people=REHEARSED_PEOPLE, progress=progress)
     said_s = time.monotonic()
     with kept:
         for number, person in enumerate(people, start=1):
-            _answer(study, person, seed, kept, felt)
+            _answer(study, person, seed, kept, features)
             if progress is not None and (time.monotonic() - said_s >= SAY_EVERY_S or number == participants):
                 said_s = time.monotonic()
                 progress(f"{person}: {number} of {participants} answered (simulated)")
     return folder
 
 
-def _answer(study: Protocol, who: str, seed: int, kept: SimulatedStudy, felt: ConditionFeatures) -> None:
+def _answer(study: Protocol, who: str, seed: int, kept: SimulatedStudy, features: ConditionFeatures) -> None:
     """Answer one session of a study."""
     time_passed = SimulatedTime()
     store = kept.begin(who, SessionClock(time_passed.ns, datetime.now().astimezone()))
     own = store.protocol
     schedule = build_schedule(own, who, seed)
     state = open_session(own, schedule, kept.key.codes, study.study.languages[0], secret=kept.key.nonce)
-    Answering(study, state, store, time_passed, lambda block, condition: felt[block, condition]).run()
+    Answering(study, state, store, time_passed, lambda block, condition: features[block, condition]).run()
 
 
 class Kept(typing.Protocol):
@@ -153,9 +153,9 @@ class Answering(SimulatedParticipant):
         state: SessionState,
         kept: Kept,
         time_passed: SimulatedTime,
-        felt: Callable[[str, str], Sequence[TrialFeatures]],
+        features: Callable[[str, str], Sequence[TrialFeatures]],
     ) -> None:
-        self._felt_in = felt
+        self._features_of = features
         self._feels = NO_FEATURES
         self._sensed_in: dict[int, list[float]] = {}  # by trial, interval by interval
         self._time = time_passed
@@ -217,8 +217,8 @@ class Answering(SimulatedParticipant):
         if presented.vary is not None:
             self._sensed_in.setdefault(trial, []).append(as_requested(presented))
             return
-        felt = self._felt_in(block, presented.condition)
-        self._feels = felt[int(len(felt) * self._stream(f"{trial}/felt")())]
+        features = self._features_of(block, presented.condition)
+        self._feels = features[int(len(features) * self._stream(f"{trial}/felt")())]
         if self.state.due is not None:
             attended = Comparison.of(self._study, self._study.blocks[block], self.observer)
             self._sensed_in.setdefault(trial, []).append(attended.sensed(self._feels))

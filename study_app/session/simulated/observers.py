@@ -296,12 +296,12 @@ class Choice:
     after_s: float
 
 
-def filled_in(page: QuestionnairePage, felt: TrialFeatures, person: Rater, draw: Draw) -> list[Choice]:
+def filled_in(page: QuestionnairePage, features: TrialFeatures, person: Rater, draw: Draw) -> list[Choice]:
     """Return how a page is answered by what was felt."""
-    judged = judgements([item.id for item in page.items], felt, person, draw)
+    judged = judgements([item.id for item in page.items], features, person, draw)
     answers = {item.id: item.simulated(judged[item.id], draw) for item in page.items}
-    asked = shown(page.items, answers)
-    return choices([item for item in page.items if item.id in asked], answers, draw)
+    visible = shown(page.items, answers)
+    return choices([item for item in page.items if item.id in visible], answers, draw)
 
 
 def choices(

@@ -57,7 +57,7 @@ from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event as Line
 from study_app.store.journals.journal_events import start_of
-from study_app.store.sessions.begin import SessionStart, begin, check_unused
+from study_app.store.sessions.begin import SessionStart, begin, used_ids
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen
 from study_app.store.tables.study_files import check_study
@@ -132,19 +132,19 @@ class RehearsedSession(SimulatedParticipant):
         rig: Rig,
         store: KeptSession,
         start: Start = FIRST,
-        felt: Callable[[int, tuple[TrialFeatures, ...]], object] | None = None,
+        features: Callable[[int, tuple[TrialFeatures, ...]], object] | None = None,
         known: Mapping[int, tuple[TrialFeatures, ...]] | None = None,
         observer: Observer = OBSERVER,
     ) -> None:
         super().__init__(study, schedule, observer)
         self._known = known or {}
-        self._tell_felt = felt
+        self._tell_features = features
         self.rig = rig
         hand = hand_of(rig.device)
         assert hand is not None  # noqa: S101 - `rehearsal_rig` has looked
         self._hand = hand
         self._now_s = store.clock.seconds
-        self._felt_in: dict[int, tuple[TrialFeatures, ...]] = {}
+        self._features_of: dict[int, tuple[TrialFeatures, ...]] = {}
         self._touch = rig.servo.telemetry.reader()
         self._next_frame_ns = 0
         self._period_s = 1 / study.device.rate_hz if delays_force(study) else None
@@ -229,10 +229,10 @@ class RehearsedSession(SimulatedParticipant):
             if wants_to_go_on and page is self.page:
                 self._post(Continue(self._now_s()))
         rest(page.task, arm)
-        earlier = () if interval is None or interval.number == 1 else self._felt_in.get(page.trial, ())
-        self._felt_in[page.trial] = (*earlier, senses.features())
-        if self._tell_felt is not None:
-            self._tell_felt(page.trial, self._felt_in[page.trial])
+        earlier = () if interval is None or interval.number == 1 else self._features_of.get(page.trial, ())
+        self._features_of[page.trial] = (*earlier, senses.features())
+        if self._tell_features is not None:
+            self._tell_features(page.trial, self._features_of[page.trial])
 
     def _set(self, page: TaskPage, setting: _Setting, view: TankView, samples: Any) -> None:
         """Adjust what is felt by what was sensed since the last steps, and confirm where that is done."""
@@ -266,13 +266,15 @@ class RehearsedSession(SimulatedParticipant):
         return view
 
     def _felt(self, trial: int | None) -> TrialFeatures:
-        return NO_FEATURES if trial is None else {**self._felt_in, **self._known}[trial][-1]
+        return NO_FEATURES if trial is None else {**self._features_of, **self._known}[trial][-1]
 
     def _sensed(self, block: Block) -> Mapping[int, Sequence[float]]:
         sensed = Comparison.of(self._study, block, self.observer).sensed
-        felt_in = {**self._felt_in, **self._known}
+        of_trials = {**self._features_of, **self._known}
         return {
-            number: [*map(sensed, felt)] for number, felt in felt_in.items() if self._trials[number].block == block.id
+            number: [*map(sensed, features)]
+            for number, features in of_trials.items()
+            if self._trials[number].block == block.id
         }
 
 
@@ -296,16 +298,18 @@ def condition_features(
         schedule = build_schedule(protocol, person, seed)
         places = {trial.number: _presented(protocol, key, schedule, trial) for trial in schedule.trials}
 
-        def feel(trial: int, felt: tuple[TrialFeatures, ...], places: Mapping[int, tuple[Where, ...]] = places) -> None:
-            found.setdefault(places[trial][len(felt) - 1], []).append(felt[-1])
+        def feel(
+            trial: int, features: tuple[TrialFeatures, ...], places: Mapping[int, tuple[Where, ...]] = places
+        ) -> None:
+            found.setdefault(places[trial][len(features) - 1], []).append(features[-1])
 
         with rehearsal_rig(protocol, person, seed, "scripted") as machine:
             RehearsedSession(
-                protocol, schedule, machine, DiscardingStore(machine.servo.now_ns, codes, key.secret), felt=feel
+                protocol, schedule, machine, DiscardingStore(machine.servo.now_ns, codes, key.secret), features=feel
             ).run()
         if progress is not None:
             progress(f"{number} of {people} sessions simulated")
-    return {where: tuple(felt) for where, felt in found.items()}
+    return {where: tuple(features) for where, features in found.items()}
 
 
 def _presented(protocol: Protocol, key: LevelKey, schedule: Schedule, trial: Trial) -> tuple[Where, ...]:
@@ -369,7 +373,7 @@ def rehearse(
     check_study(StudyFolder(folder), study.study.name)
     people = [f"P{number:03d}" for number in range(1, participants + 1)]
     for person in people:
-        check_unused(StudyFolder(folder), person, 1)
+        used_ids(StudyFolder(folder)).check_unused(person, 1)
     for person in people:
         began = time.perf_counter()
         with rehearsal_rig(study, person, seed, device) as rig:
@@ -442,20 +446,20 @@ def _run(
         known = (
             {}
             if start is FIRST
-            else _felt_in_whole_session(study, schedule, rig.device.name, store.key.codes, store.key.nonce)
+            else _features_of_whole_session(study, schedule, rig.device.name, store.key.codes, store.key.nonce)
         )
         rehearsal = RehearsedSession(study, schedule, rig, store, start, known=known, observer=observer)
         rehearsal.run()
     return store.clock.seconds(), rehearsal.answers
 
 
-def _felt_in_whole_session(
+def _features_of_whole_session(
     study: Protocol, schedule: Schedule, device: str, codes: dict[str, dict[str, str]], secret: bytes
 ) -> dict[int, tuple[TrialFeatures, ...]]:
     """Return what is felt in each trial (by number) of a session that is not interrupted."""
-    felt: dict[int, tuple[TrialFeatures, ...]] = {}
+    features: dict[int, tuple[TrialFeatures, ...]] = {}
     with rehearsal_rig(study, schedule.participant, schedule.seed, device) as rig:
         RehearsedSession(
-            study, schedule, rig, DiscardingStore(rig.servo.now_ns, codes, secret), felt=felt.__setitem__
+            study, schedule, rig, DiscardingStore(rig.servo.now_ns, codes, secret), features=features.__setitem__
         ).run()
-    return felt
+    return features

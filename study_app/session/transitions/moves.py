@@ -215,8 +215,8 @@ def repeat(state: SessionState, event: RepeatAsked) -> Result:
     """Present the trial again, keeping the attempt that was."""
     if not event.reason.strip():
         raise SessionError("repeating a trial needs a reason: enter one")
-    asked = Write(journal.Repeat(trial=state.trial.number, reason=event.reason), waits=True)
-    return start_trial(replace(state, attempt=state.attempt + 1), (*break_off(state), asked), event.at_s)
+    repeated = Write(journal.Repeat(trial=state.trial.number, reason=event.reason), waits=True)
+    return start_trial(replace(state, attempt=state.attempt + 1), (*break_off(state), repeated), event.at_s)
 
 
 def note(state: SessionState, event: Note) -> Result:

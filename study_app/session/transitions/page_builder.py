@@ -87,7 +87,7 @@ def consent_hash(state: SessionState, text: PageText) -> str:
 def _task_page(state: SessionState, trial: Trial) -> pages.TaskPage:
     protocol = state.plan.protocol
     block = protocol.blocks[trial.block]
-    task, asked = protocol.tasks[block.task], protocol.questionnaire_of(block.id)
+    task, questionnaire = protocol.tasks[block.task], protocol.questionnaire_of(block.id)
     set_by_hand = block.design is not None and design_of(protocol, block).adjusts
     return pages.TaskPage(
         trial=trial.number,
@@ -96,7 +96,7 @@ def _task_page(state: SessionState, trial: Trial) -> pages.TaskPage:
         workspace_m=protocol.device.workspace_m,
         body_radius_m=protocol.scene_for(_drawn_condition(state, trial)).body.diameter_m / 2 / protocol.scene.scale,
         progress=_progress(state, trial),
-        question=_text(state, asked.intro) if set_by_hand and asked is not None else "",
+        question=_text(state, questionnaire.intro) if set_by_hand and questionnaire is not None else "",
     )
 
 
@@ -286,11 +286,11 @@ def previewed_page(
     if moment.kind == "text":
         made = page(replace(state, phase=Phase.READING))
         return replace(made, coming=None) if isinstance(made, pages.TextPage) else made
-    asked = {question.id: question for question in state.questions}
+    questions = {question.id: question for question in state.questions}
     kept = {
         item: Answer(onset_s=0.0, first_s=0.0, last_s=0.0, value=value)
         for item, value in (answers or {}).items()
-        if item in asked and asked[item].problem(value, state.context) is None
+        if item in questions and questions[item].problem(value, state.context) is None
     }
     return page(replace(state, phase=Phase.ANSWERING, answers=kept))
 

@@ -118,7 +118,7 @@ def begin(
     study_folder = StudyFolder(Path(results))
     check_participant(start.participant, pilot=start.pilot)
     check_study(study_folder, protocol.study.name)
-    check_unused(study_folder, start.participant, start.session)
+    used_ids(study_folder).check_unused(start.participant, start.session)
     check_session(study_folder, protocol, start.participant, start.session)
     clock = clock if clock is not None else SessionClock()
     make_folder(study_folder.path)
@@ -334,11 +334,6 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
         )
 
 
-def check_unused(folder: StudyFolder, participant: str, number: int) -> None:
-    """Refuse a session that exists (see `UsedIds.check_unused`); nothing is touched."""
-    used_ids(folder).check_unused(participant, number)
-
-
 def refuse_never_begun(session: SessionFolder) -> None:
     """Refuse to resume a session that was claimed and never begun.
 
@@ -354,11 +349,6 @@ def refuse_never_begun(session: SessionFolder) -> None:
         )
 
 
-def used_id(folder: StudyFolder, participant: str, number: int) -> StoreError:
-    """Return the refusal of a used id, with the three ways to go on."""
-    return used_ids(folder).refusal(participant, number)
-
-
 def _claim(place: Place) -> Opening:
     """Create the session's folder, which must not have been begun, locked for this program from the start."""
     path = place.folder.path
@@ -372,7 +362,7 @@ def _claim(place: Place) -> Opening:
         _take_away_empty(path.parent)
         raise
     if opening is None:
-        raise used_id(place.study_folder, place.folder.participant, place.folder.number)
+        raise used_ids(place.study_folder).refusal(place.folder.participant, place.folder.number)
     return opening
 
 

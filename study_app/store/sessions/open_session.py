@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -182,7 +183,8 @@ class SessionStore:
             self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1].at}
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
-        for write in (self._write_receipt, self._write_participants, self._write_checksums):
+        table = partial(write_participants, self.place.study_folder, self.place.study)
+        for write in (self._write_receipt, table, self._write_checksums):
             try:
                 write()
             except StoreError as error:
@@ -224,9 +226,6 @@ class SessionStore:
             since = (self._receipt, *self._receipt.get("resumed", ()))[-1]
             since["outlets_lost"] = dict(lost)
         receipt.write(self.folder.receipt, self._receipt)
-
-    def _write_participants(self) -> None:
-        write_participants(self.place.study_folder, self.place.study)
 
     def _write_checksums(self) -> None:
         found = fingerprint(write_checksums(self.folder, hashes_of(self._lines)))

@@ -26,14 +26,7 @@ from study_app.store.checksums import checksum_bytes, fingerprint, note_fingerpr
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import SessionClock, line_bytes, line_of
 from study_app.store.journals.journal_events import Allocated, Event, SessionEnded, plain, read_event, start_of
-from study_app.store.sessions.begin import (
-    SessionStart,
-    check_participant,
-    check_unused,
-    first_words,
-    make_folder,
-    used_id,
-)
+from study_app.store.sessions.begin import SessionStart, check_participant, first_words, make_folder, used_ids
 from study_app.store.sessions.folder_lock import Opening, open_alone
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables import csv_files, session_tables
@@ -85,7 +78,7 @@ class SimulatedStudy:
         for person in participants:
             check_participant(person)
             if self.folder.data.exists():
-                check_unused(self.folder, person, 1)
+                used_ids(self.folder).check_unused(person, 1)
         make_folder(self.folder.path)
         self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random, unbundled(source)[1])
         self.protocol = protocol
@@ -135,7 +128,7 @@ class SimulatedStudy:
         except OSError as error:
             raise cannot_write(path, error) from error
         if not create_folder(path, {**files, place.folder.checksums.name: checksum_bytes(sums)}, waits=False):
-            raise used_id(self.folder, place.folder.participant, place.folder.number)
+            raise used_ids(self.folder).refusal(place.folder.participant, place.folder.number)
         note_fingerprint(self.folder, place.folder, fingerprint(sums), waits=False)
         self._rows[path] = session_tables.participant(opened(lines, key))
 

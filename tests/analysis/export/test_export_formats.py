@@ -101,7 +101,9 @@ short = { nl = "Vaak", en = "Often" }
     text = SMALL.replace("format = 1", "format = 2").replace('"try", "feel"]', '"try", "feel", "smooth"]')
     (tmp_path / "small.toml").write_text(text.replace("[blocks.try]", f"{form}[blocks.try]", 1), encoding="utf-8")
     features = dict.fromkeys((("try", "learn"), ("feel", "heavyzembla"), ("feel", "lightquorn")), (NO_FEATURES,))
-    folder = rehearse_answers(tmp_path / "small.toml", participants=2, seed=1, results=tmp_path / "r", felt=features)
+    folder = rehearse_answers(
+        tmp_path / "small.toml", participants=2, seed=1, results=tmp_path / "r", features=features
+    )
     unblind(folder, "AB", "to analyse")
     export(folder, to, extras=["wide"])
     rows = cells(table(to, "small", "wide", "csv"))

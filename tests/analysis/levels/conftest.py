@@ -19,7 +19,9 @@ def opened_adaptive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     def make(folder: Path) -> None:
         (folder / "adaptive.toml").write_text(text_of_damper("adaptive", ADAPTIVE, (4, 8)))
-        study = rehearse_answers(folder / "adaptive.toml", participants=3, seed=1, results=folder / "study", felt={})
+        study = rehearse_answers(
+            folder / "adaptive.toml", participants=3, seed=1, results=folder / "study", features={}
+        )
         assert unblind(study, "AB", "to analyse").left == ()
 
     return once(tmp_path_factory, "adaptive", make) / "study"
@@ -37,7 +39,7 @@ def opened_catch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("catch")
     more = ADAPTIVE.replace('method = "', 'catch = { share = 0.2, wrong_most = 1 }\nmethod = "').replace("24", "48")
     (folder / "catch.toml").write_text(text_of_damper("catch", more, (4, 8)))
-    study = rehearse_answers(folder / "catch.toml", participants=2, seed=1, results=folder / "study", felt={})
+    study = rehearse_answers(folder / "catch.toml", participants=2, seed=1, results=folder / "study", features={})
     assert unblind(study, "AB", "to analyse").left == ()
     return study
 
@@ -46,7 +48,7 @@ def opened_catch(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def sealed_levels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     def make(folder: Path) -> None:
         file = levels_file(folder)
-        rehearse_answers(file, participants=3, seed=2, results=folder / "study", felt=made_up(str(file)))
+        rehearse_answers(file, participants=3, seed=2, results=folder / "study", features=made_up(str(file)))
 
     return once(tmp_path_factory, "levels", make) / "study"
 

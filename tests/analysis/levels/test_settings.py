@@ -70,7 +70,7 @@ def test_settings_that_do_not_count_and_trials_without_one_are_left_out() -> Non
 @pytest.fixture(scope="module")
 def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("matching")
-    return rehearse_answers(matching_file(folder), participants=3, seed=3, results=folder / "study", felt={})
+    return rehearse_answers(matching_file(folder), participants=3, seed=3, results=folder / "study", features={})
 
 
 @pytest.fixture(scope="module")

@@ -32,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     felt = {
         ("stir", name): (TrialFeatures(0.5 + n, 4.0, 0.1, 0.02, 0.03, 0.0),) for n, name in enumerate(study.conditions)
     }
-    return rehearse_answers(protocol, participants=PEOPLE, seed=1, results=place / "results", felt=felt)
+    return rehearse_answers(protocol, participants=PEOPLE, seed=1, results=place / "results", features=felt)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None
     felt = {
         ("stir", name): (TrialFeatures(0.5 + n, 4.0, 0.1, 0.02, 0.03, 0.0),) for n, name in enumerate(("thin", "thick"))
     }
-    folder = rehearse_answers(protocol, participants=8, seed=1, results=tmp_path / "results", felt=felt)
+    folder = rehearse_answers(protocol, participants=8, seed=1, results=tmp_path / "results", features=felt)
     sessions = StudyFolder(folder).sessions()
     asked = len(load_study(folder).answered.query("item == 'pleasant'"))
     assert 0 < asked < 2 * len(sessions)  # hidden from some

@@ -57,7 +57,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("grouped")
     (path / "grouped.toml").write_text(STUDY + GROUPS)
     felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
-    return rehearse_answers(path / "grouped.toml", participants=6, seed=2, results=path / "r", felt=felt)
+    return rehearse_answers(path / "grouped.toml", participants=6, seed=2, results=path / "r", features=felt)
 
 
 def test_groups_are_reported_after_unblinding_alone(folder: Path, tmp_path: Path) -> None:

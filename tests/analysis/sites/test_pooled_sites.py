@@ -36,7 +36,7 @@ def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a merged study of two sites with three participants each; do not change it."""
     root = tmp_path_factory.mktemp("labs")
     folders = {
-        site: rehearse_answers("rek2024", participants=3, seed=seed, results=root / site, felt=made_up("rek2024"))
+        site: rehearse_answers("rek2024", participants=3, seed=seed, results=root / site, features=made_up("rek2024"))
         for seed, site in enumerate("AB", start=1)
     }
     merge(folders, root / "pooled")
@@ -242,7 +242,7 @@ def test_a_merged_study_of_levels_is_reported_sealed_and_opened(tmp_path: Path) 
     (tmp_path / "adaptive.toml").write_text(text_of_damper("adaptive", ADAPTIVE, (4, 8)))
     folders = {
         site: rehearse_answers(
-            tmp_path / "adaptive.toml", participants=2, seed=seed, results=tmp_path / site / "adaptive", felt={}
+            tmp_path / "adaptive.toml", participants=2, seed=seed, results=tmp_path / site / "adaptive", features={}
         )
         for seed, site in enumerate("AB", start=1)
     }

@@ -47,13 +47,13 @@ def tables(folder: Path) -> dict[str, list[dict[str, str]]]:
 @pytest.fixture(scope="module")
 def twelve(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("answers") / "rek2024"
-    return rehearse_answers("rek2024", participants=12, seed=1, results=folder, felt=made_up())
+    return rehearse_answers("rek2024", participants=12, seed=1, results=folder, features=made_up())
 
 
 def test_by_default_it_keeps_apart_from_participants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for number in (1, 2):
-        folder = rehearse_answers("rek2024", participants=1, seed=1, felt=made_up())
+        folder = rehearse_answers("rek2024", participants=1, seed=1, features=made_up())
         assert folder == Path("results") / f"rek2024-rehearsal-{number}"
 
 
@@ -67,7 +67,7 @@ def test_the_folder_is_sound_and_every_row_says_simulated(twelve: Path) -> None:
 
 def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Path, tmp_path: Path) -> None:
     again, other = (
-        rehearse_answers("rek2024", participants=12, seed=seed, results=tmp_path / str(seed), felt=made_up())
+        rehearse_answers("rek2024", participants=12, seed=seed, results=tmp_path / str(seed), features=made_up())
         for seed in (1, 2)
     )
     assert tables(again) == tables(twelve)
@@ -75,7 +75,7 @@ def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Pa
 
 
 def test_fewer_participants_answer_as_the_first_of_many(twelve: Path, tmp_path: Path) -> None:
-    few = tables(rehearse_answers("rek2024", participants=3, seed=1, results=tmp_path / "few", felt=made_up()))
+    few = tables(rehearse_answers("rek2024", participants=3, seed=1, results=tmp_path / "few", features=made_up()))
     many = tables(twelve)
     assert all(many[name] == held for name, held in few.items() if "sub-" in name)
 
@@ -85,7 +85,7 @@ def test_who_feels_what_was_felt_in_a_rehearsal_answers_as_in_it(tmp_path: Path)
     held = rehearse("demo", participants=1, seed=3, results=tmp_path / "held", recordings=False)
     felt = condition_features(load("demo"), seed=3, people=1)
     assert all(len(once) == 1 for once in felt.values()), "otherwise which of them is felt is drawn"
-    answered = rehearse_answers("demo", participants=1, seed=3, results=tmp_path / "answered", felt=felt)
+    answered = rehearse_answers("demo", participants=1, seed=3, results=tmp_path / "answered", features=felt)
     asked = ("trial", "code", "item", "number", "response", "changes")
     one, other = (
         [
@@ -113,17 +113,17 @@ def test_what_is_felt_is_what_each_condition_gives(tmp_path: Path) -> None:
 
 
 def test_a_used_id_is_refused_and_nothing_is_touched(tmp_path: Path) -> None:
-    folder = rehearse_answers("rek2024", participants=2, seed=1, results=tmp_path / "rek2024", felt=made_up())
+    folder = rehearse_answers("rek2024", participants=2, seed=1, results=tmp_path / "rek2024", features=made_up())
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     with pytest.raises(StoreError, match="P001"):
-        rehearse_answers("rek2024", participants=5, seed=1, results=folder, felt=made_up())
+        rehearse_answers("rek2024", participants=5, seed=1, results=folder, features=made_up())
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
 
 
 def test_the_folder_of_another_study_is_refused(tmp_path: Path) -> None:
-    folder = rehearse_answers("rek2024", participants=1, seed=1, results=tmp_path / "a", felt=made_up())
+    folder = rehearse_answers("rek2024", participants=1, seed=1, results=tmp_path / "a", features=made_up())
     with pytest.raises(StoreError, match="holds the study"):
-        rehearse_answers("demo", participants=1, seed=1, results=folder, felt=made_up("demo"))
+        rehearse_answers("demo", participants=1, seed=1, results=folder, features=made_up("demo"))
 
 
 def test_ended_by_the_user_it_leaves_whole_sessions_and_their_table(
@@ -136,7 +136,7 @@ def test_ended_by_the_user_it_leaves_whole_sessions_and_their_table(
     monkeypatch.setattr(answers_only, "SAY_EVERY_S", 0.0)
     folder = tmp_path / "rek2024"
     with pytest.raises(KeyboardInterrupt):
-        rehearse_answers("rek2024", participants=9, seed=1, results=folder, felt=made_up(), progress=enough)
+        rehearse_answers("rek2024", participants=9, seed=1, results=folder, features=made_up(), progress=enough)
     found = verify(folder)
     assert (found.errors, found.sessions) == ((), 3)
     assert load_study(folder).n == 3

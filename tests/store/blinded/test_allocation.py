@@ -207,7 +207,7 @@ def test_a_session_that_the_group_does_not_have_is_refused_before_anything_is_cl
 def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> None:
     source = tmp_path / "grouped.toml"
     source.write_bytes(SOURCE)
-    folder = rehearse_answers(str(source), participants=4, seed=3, results=tmp_path / "r", felt=_felt())
+    folder = rehearse_answers(str(source), participants=4, seed=3, results=tmp_path / "r", features=_felt())
     study = StudyFolder(folder)
     key = open_or_draw_key(folder, grouped(), stream(3, "blinding").random)
     for session in study.sessions():

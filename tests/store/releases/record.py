@@ -50,7 +50,7 @@ def found(folder: StudyFolder) -> dict[str, tuple[str, int]]:
     for session in folder.sessions():
         lines = journal.read(session.journal)
         answers = sum(len(line.items) for line in lines if line.event == "responses")
-        counts[session.participant] = (str(lines[-1].get("status", "unfinished")), answers)
+        counts[session.participant] = (str(getattr(lines[-1], "status", "unfinished")), answers)
     return counts
 
 

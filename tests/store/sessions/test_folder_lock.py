@@ -14,7 +14,7 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store.folders import StudyFolder, locate, study_folder
-from study_app.store.sessions.begin import check_participant, check_unused, used_ids
+from study_app.store.sessions.begin import check_participant, used_ids
 from study_app.store.sessions.folder_lock import is_open, markers, open_alone, process_began
 from tests.faults.support.racers import race
 from tests.platforms import needs_fork
@@ -167,13 +167,13 @@ def test_the_next_free_id_is_suggested(tmp_path: Path) -> None:
 def test_a_used_session_is_refused_with_three_ways_to_go_on(tmp_path: Path) -> None:
     folder = with_sessions(tmp_path, "sub-P002/ses-01", "sub-P002/ses-02")
     with pytest.raises(StoreError) as refusal:
-        check_unused(folder, "P002", 1)
+        used_ids(folder).check_unused("P002", 1)
     message = str(refusal.value)
     assert "participant P002 already has session 1" in message
     assert "use a new session number (3), resume that session, or use another id (next free: P003)" in message
     assert "nothing was changed" in message
-    check_unused(folder, "P002", 3)
-    check_unused(folder, "P004", 1)
+    used_ids(folder).check_unused("P002", 3)
+    used_ids(folder).check_unused("P004", 1)
 
 
 def test_a_sessions_folder_is_known_from_its_path(tmp_path: Path) -> None:

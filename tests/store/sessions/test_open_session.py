@@ -27,7 +27,7 @@ def test_a_table_or_receipt_that_cannot_be_written_at_the_end_is_reported_and_th
         path.mkdir()
         with pytest.raises(StoreError, match=rf"{path.name} cannot be written"):
             store.finish("completed")
-        assert journal.read(store.folder.journal)[-1]["event"] == "session_ended"
+        assert journal.read(store.folder.journal)[-1].event == "session_ended"
         assert of is None or receipt.read(store.folder.receipt)["status"] == status
         assert b"completed" in store.place.study_folder.participants("brackish").read_bytes()
 
@@ -93,7 +93,7 @@ def test_a_recording_that_is_lost_is_said_to_be(start: Start, samples_of: Make) 
     store.recorder.append(samples_of(10))
     store.finish("completed")
     (lost,) = [line for line in journal.read(store.folder.journal) if line.event == "recording_lost"]
-    assert (lost["trial"], lost["attempt"], lost["reason"]) == (1, 1, "File exists")
+    assert (lost.trial, lost.attempt, lost.reason) == (1, 1, "File exists")
     assert rows_of(store, "trials")[0]["recording"] == "n/a"
 
 

@@ -86,7 +86,7 @@ def test_it_goes_on_after_the_last_line_and_says_so(start: Start, again: Again) 
     resumed.close()
     assert journal.read(store.folder.journal) == list(resumed.lines)
     assert [line.n for line in resumed.lines] == [1, 2, 3, 4]
-    assert {name: line[name] for name in line if name not in ("t_s", "at", "previous")} == {
+    assert {name: value for name, value in line.line().items() if name not in ("t_s", "at", "previous")} == {
         "n": 3,
         "event": "session_resumed",
         "gap_s": 72_000.25,

@@ -14,7 +14,7 @@ from study_app.errors import StoreError
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal, journal_events
 from study_app.store.sessions import begin, open_session
-from study_app.store.sessions.begin import check_unused, used_ids
+from study_app.store.sessions.begin import used_ids
 from study_app.store.sessions.folder_lock import abandoned, markers, never_begun, open_alone
 from study_app.store.sessions.recovery import reopen
 from study_app.store.verification.verify_study import verify
@@ -81,7 +81,7 @@ def test_it_cannot_be_resumed_but_begun_where_no_program_takes_it_over(
             start("P004")
         assert sorted(place.path.iterdir()) == before
     assert used_ids(left).suggested() == "P004"
-    check_unused(left, "P004", 1)
+    used_ids(left).check_unused("P004", 1)
     with start("P004") as store:
         store.append(journal_events.PageShown(page="consent"))
         assert used_ids(left).suggested() == "P005"

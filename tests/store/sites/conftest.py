@@ -15,7 +15,7 @@ def labs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     root = tmp_path_factory.mktemp("labs")
     felt = made_up("demo")
     return {
-        site: rehearse_answers("demo", participants=2, seed=seed, results=root / site / "demo", felt=felt)
+        site: rehearse_answers("demo", participants=2, seed=seed, results=root / site / "demo", features=felt)
         for seed, site in enumerate("ABC", start=1)
     }
 
