@@ -52,10 +52,12 @@ def excluded(folder: Path) -> Path:
     return results.folder
 
 
-def rehearsed(make: Callable[[Path], Path], people: int, *, seed: int = 3, felt: bool = True) -> Callable[[Path], Path]:
+def rehearsed(
+    make: Callable[[Path], Path], people: int, *, seed: int = 3, features: bool = True
+) -> Callable[[Path], Path]:
     def study(folder: Path) -> Path:
         file = make(folder)
-        moved = made_up(str(file)) if felt else {}
+        moved = made_up(str(file)) if features else {}
         results = rehearse_answers(file, participants=people, seed=seed, results=folder / "r", features=moved)
         unblind(results, "AB", "to analyse")
         return results

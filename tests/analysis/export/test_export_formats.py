@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from study_app.protocol.simulated_observer import NO_FEATURES
 
 from study_app.analysis.export import spss
 from study_app.analysis.export.export import export
@@ -19,6 +18,7 @@ from study_app.analysis.export.spss import CANNOT_JUDGE, NOT_ANSWERED, names_of
 from study_app.analysis.export.table_files import Extra
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse
+from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from tests.analysis.conftest import HIDDEN, SMALL, Results, make_results

@@ -4,7 +4,6 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
-from study_app.evidence.online_estimation import applied_estimates
 
 from study_app.cli import commands
 from study_app.evidence.stability.applied_estimates import AppliedCase, judge_applied, report
