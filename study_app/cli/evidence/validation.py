@@ -94,12 +94,12 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
     participants are rehearsed with servo, files, unblinding and analysis. Every value is printed with its limit. Ends
     with exit code 3 if a value exceeds its limit.
     """
-    from study_app.evidence.thresholds.many_studies import NAMES, PEOPLE, judged, methods_alone, plant, rehearsed
-    from study_app.evidence.thresholds.planted import Verdict, evidence
+    from study_app.evidence.thresholds.known_thresholds import Verdict, evidence
+    from study_app.evidence.thresholds.many_studies import NAMES, PEOPLE, judged, known_value, methods_alone, rehearsed
     from study_app.protocol.load import load, source_bytes
 
     try:
-        chosen = [(source_bytes(name), plant(Path(name).stem, load(name))) for name in files or NAMES]
+        chosen = [(source_bytes(name), known_value(Path(name).stem, load(name))) for name in files or NAMES]
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     prepare(to)

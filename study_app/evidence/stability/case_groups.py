@@ -131,7 +131,14 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
         return Group(name, tuple(_drawn(f"{seed} {name}", some(found, min(CASES, count or CASES)), light)))
 
     found = [
-        Group(name, tuple(_drawn(f"{seed} {name}", [_second(case) for case in some(cases, count)], light)))
+        Group(
+            name,
+            tuple(
+                _drawn(
+                    f"{seed} {name}", [dataclasses.replace(case, plant=SECOND) for case in some(cases, count)], light
+                )
+            ),
+        )
         for name, cases in (("second plant, held", held), ("second plant, let go", released))
     ]
     for name, change in CHANGES.items():
@@ -157,8 +164,9 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     found.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
     found += _of_liquids("non-Newtonian liquids", materials, seed, light, count)
     found += _of_liquids("liquids of physical2", of_physical2, seed, light, count)
-    found.append(_late_forces(seed, light, count))
-    by_device = _by_device(seed, light, count)
+    found.append(_half_damper("late forces", min(LATE_CASES, count or LATE_CASES), seed, {**light, **LINKS}))
+    devices = min(DEVICE_CASES, count or DEVICE_CASES)
+    by_device = _half_damper("velocity measured by the device", devices, seed, {**light, **MEASURED})
     fewer = min(KALMAN_CASES, count or KALMAN_CASES)
     return (*found, by_device, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
 
@@ -177,20 +185,10 @@ def _of_liquids(
     yield Group(f"{name}, let go in mid-stroke", some(free, count))
 
 
-def _late_forces(seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None) -> Group:
-    """Return loops with a force link: held, thrown and let go, in half of them the strongest damper."""
-    name = "late forces"
+def _half_damper(name: str, count: int, seed: str, choices: Mapping[str, tuple[Any, ...]]) -> Group:
+    """Return loops that are held, thrown and let go, in half of them the strongest damper."""
     whole = tuple(_grid(GRIPS, PLANTS, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
-    cases = some(whole, min(LATE_CASES, count or LATE_CASES))
-    return Group(name, tuple(_drawn(f"{seed} {name}", cases, {**choices, **LINKS})))
-
-
-def _by_device(seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None) -> Group:
-    """Return loops whose device measures the velocity, in half of them the strongest damper."""
-    name = "velocity measured by the device"
-    whole = tuple(_grid(GRIPS, PLANTS, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
-    cases = some(whole, min(DEVICE_CASES, count or DEVICE_CASES))
-    return Group(name, tuple(_drawn(f"{seed} {name}", cases, {**choices, **MEASURED})))
+    return Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
 
 
 def _with_kalman(group: Group, count: int) -> Group:
@@ -204,10 +202,6 @@ def some(cases: Sequence[Case], count: int | None) -> tuple[Case, ...]:
     if count is None or count >= len(cases):
         return tuple(cases)
     return tuple(Random(count).sample(cases, count))  # noqa: S311 - no secret
-
-
-def _second(case: Case) -> Case:
-    return dataclasses.replace(case, plant=SECOND)
 
 
 def _believing(less: int) -> Callable[[Case], Case | None]:

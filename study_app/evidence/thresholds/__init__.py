@@ -1,1 +1,1 @@
-"""Whether thresholds are recovered: observers with a planted threshold, by methods and analysis, and by the program."""
+"""Whether thresholds are recovered: observers with a known threshold, by methods and analysis, and by the program."""

@@ -1,4 +1,4 @@
-"""Magnitude estimation: the exponent of estimates over the varied number, planted and recovered.
+"""Magnitude estimation: the exponent of estimates over the varied number, known and recovered.
 
 An observer's estimate is exp(n y + 0.25 N), where y is the logarithm of what reaches the hand: mean force over RMS
 speed. The exponent over the varied number is therefore n times the slope of y over its logarithm at the task's pace,
@@ -15,7 +15,7 @@ import pandas as pd
 
 from study_app.analysis.levels.thresholds import estimate_slope
 from study_app.analysis.statistics.outcome import student_interval
-from study_app.evidence.thresholds.planted import PEOPLE, Verdict, group_coverage
+from study_app.evidence.thresholds.known_thresholds import PEOPLE, Verdict, group_coverage
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.blocks import Block
@@ -33,7 +33,7 @@ POINTS: Final = 64
 
 
 @dataclass(frozen=True, slots=True)
-class PlantedExponent:
+class KnownExponent:
     """A study's main block of magnitude estimation, and the exponent of its observers.
 
     ``resistances`` are those of each level, ascending: mean force over RMS speed at the pace [N·s/m].
@@ -60,8 +60,8 @@ class PlantedExponent:
         return replace(OBSERVER, estimates=(EXPONENT / self.resistance_exponent, ESTIMATE_NOISE))
 
 
-def planted_exponent(name: str, protocol: Protocol) -> PlantedExponent | None:
-    """Return what is planted in a study's first main block of magnitude estimation at a pace; None: it has none."""
+def known_exponent(name: str, protocol: Protocol) -> KnownExponent | None:
+    """Return what is known of a study's first main block of magnitude estimation at a pace; None: it has none."""
     for block in protocol.main_blocks:
         if block.stimulus is None or block.design is None:
             continue
@@ -72,7 +72,7 @@ def planted_exponent(name: str, protocol: Protocol) -> PlantedExponent | None:
         levels = sorted(method_of(protocol, block).asked(stimulus))
         pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
         of_levels = tuple(_resistance(override(scene, stimulus.vary, level), pace_mps) for level in levels)
-        return PlantedExponent(name, protocol, block, of_levels)
+        return KnownExponent(name, protocol, block, of_levels)
     return None
 
 
@@ -97,7 +97,7 @@ class ExponentsFound:
         return sum(self.own[:people]) / people
 
 
-def simulate_estimates(one: PlantedExponent, number: int, seed: int, people: int = PEOPLE) -> ExponentsFound:
+def simulate_estimates(one: KnownExponent, number: int, seed: int, people: int = PEOPLE) -> ExponentsFound:
     """Return what a study of ``people`` equal observers finds; ``number`` names its draws.
 
     They estimate what would reach the hand at the pace.
@@ -119,7 +119,7 @@ def found_of(own: Sequence[float]) -> ExponentsFound:
     return ExponentsFound(tuple(own), float(values.mean()), low, high)
 
 
-def exponent_verdicts(one: PlantedExponent, studies: Sequence[ExponentsFound]) -> Iterator[Verdict]:
+def exponent_verdicts(one: KnownExponent, studies: Sequence[ExponentsFound]) -> Iterator[Verdict]:
     """Yield what studies of equal observers show of magnitude estimation."""
     mean = float(np.mean([found.mean for found in studies]))
     yield Verdict(
@@ -138,8 +138,8 @@ def spread_of_exponents(studies: Sequence[ExponentsFound], people: int) -> float
     return float(np.std([found.mean_of(people) for found in studies], ddof=1))
 
 
-def recovered_exponent(one: PlantedExponent, exponents: Sequence[float], spread: float) -> Verdict:
-    """Return whether rehearsed participants have the planted exponent; ``spread`` is from `spread_of_exponents`."""
+def recovered_exponent(one: KnownExponent, exponents: Sequence[float], spread: float) -> Verdict:
+    """Return whether rehearsed participants have the known exponent; ``spread`` is from `spread_of_exponents`."""
     mean = float(np.mean(exponents))
     return Verdict(
         one.name,

@@ -1,4 +1,4 @@
-"""What is planted in a study, many simulated studies of it on an executor, and three participants of the whole program.
+"""What is known of a study, many simulated studies of it on an executor, and three participants of the whole program.
 
 These pass through servo, store, unblinding and analysis.
 """
@@ -16,14 +16,22 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.levels.thresholds import estimated_exponents, thresholds, tracks
 from study_app.evidence.table import run
 from study_app.evidence.thresholds.estimated_exponents import (
-    PlantedExponent,
+    KnownExponent,
     exponent_verdicts,
-    planted_exponent,
+    known_exponent,
     recovered_exponent,
     simulate_estimates,
     spread_of_exponents,
 )
-from study_app.evidence.thresholds.planted import SHIPPED, Planted, Verdict, planted, simulate, spread, verdicts
+from study_app.evidence.thresholds.known_thresholds import (
+    SHIPPED,
+    KnownThreshold,
+    Verdict,
+    known_threshold,
+    simulate,
+    spread,
+    verdicts,
+)
 from study_app.protocol.model import Protocol
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
@@ -56,7 +64,7 @@ class Rehearsed:
     recovered: tuple[float, ...]
 
 
-def rehearsed(one: Planted | PlantedExponent, source: bytes, seed: int) -> Rehearsed:
+def rehearsed(one: KnownThreshold | KnownExponent, source: bytes, seed: int) -> Rehearsed:
     """Rehearse `PEOPLE` participants in a temporary folder, from the source of a protocol; return what they show."""
     with tempfile.TemporaryDirectory() as place:
         file, folder = Path(place) / f"{one.name}.toml", Path(place) / "study"
@@ -66,21 +74,21 @@ def rehearsed(one: Planted | PlantedExponent, source: bytes, seed: int) -> Rehea
         findings = len(verify(folder, None).errors)
         findings += sum(len(reproduced(session.path).differences) for session in sessions)
         findings += sum(not replay(session.path).proved for session in sessions)
-        unblind(folder, "validate", "to compare with what was planted")
+        unblind(folder, "validate", "to compare with what is known")
         study = load_study(folder)
         intervals = study.intervals[study.intervals["block"] == one.block.id]
         return Rehearsed(float(intervals["invalid_reasons"].isna().mean()), findings, _recovered(one, study))
 
 
-def _recovered(one: Planted | PlantedExponent, study: Study) -> tuple[float, ...]:
+def _recovered(one: KnownThreshold | KnownExponent, study: Study) -> tuple[float, ...]:
     rows = tracks(study)
     block = next(block for block in study.levels if block.id == one.block.id)
-    if isinstance(one, PlantedExponent):
+    if isinstance(one, KnownExponent):
         return tuple(found.exponent for found in estimated_exponents(block, rows) if found.participant is not None)
     return tuple(row.threshold for row in thresholds(block, rows) if row.participant is not None)
 
 
-def judged(one: Planted | PlantedExponent, found: Rehearsed, spread: float) -> Iterator[Verdict]:
+def judged(one: KnownThreshold | KnownExponent, found: Rehearsed, spread: float) -> Iterator[Verdict]:
     """Yield the verdicts on rehearsed participants.
 
     ``spread`` is the standard deviation of ln threshold, or of the exponent, over studies of `PEOPLE`.
@@ -94,7 +102,7 @@ def judged(one: Planted | PlantedExponent, found: Rehearsed, spread: float) -> I
     )
     clean = found.findings == 0
     yield Verdict(one.name, "findings of verify, reproduce and replay", str(found.findings), "0", clean)
-    if isinstance(one, PlantedExponent):
+    if isinstance(one, KnownExponent):
         yield recovered_exponent(one, found.recovered, spread)
         return
     error = sum(math.log(value / one.threshold) for value in found.recovered) / len(found.recovered)
@@ -107,7 +115,7 @@ def judged(one: Planted | PlantedExponent, found: Rehearsed, spread: float) -> I
     )
 
 
-def _unit(one: Planted) -> Any:
+def _unit(one: KnownThreshold) -> Any:
     return "ms" if one.threshold > 1 else "Weber fraction"
 
 
@@ -115,26 +123,26 @@ NAMES: Final = (*SHIPPED, "thickness")
 """The shipped studies that are validated."""
 
 
-def plant(name: str, protocol: Protocol) -> Planted | PlantedExponent:
-    """Return what is planted in a study.
+def known_value(name: str, protocol: Protocol) -> KnownThreshold | KnownExponent:
+    """Return what is known of a study.
 
     Raises
     ------
     ValueError
         Nothing can be.
     """
-    return planted_exponent(name, protocol) or planted(name, protocol)
+    return known_exponent(name, protocol) or known_threshold(name, protocol)
 
 
 def methods_alone(
-    one: Planted | PlantedExponent, studies: int, seed: int, executor: Executor, progress: Callable[[int], object]
+    one: KnownThreshold | KnownExponent, studies: int, seed: int, executor: Executor, progress: Callable[[int], object]
 ) -> tuple[list[Verdict], float]:
     """Return the verdicts of many studies of equal observers, and the spread of studies of `PEOPLE`.
 
     ``progress`` is called with the number of finished studies.
     """
     numbers = [(number,) for number in range(studies)]
-    if isinstance(one, PlantedExponent):
+    if isinstance(one, KnownExponent):
         exponents = run(partial(simulate_estimates, one, seed=seed), numbers, executor, progress)
         return list(exponent_verdicts(one, exponents)), spread_of_exponents(exponents, PEOPLE)
     thresholds = run(partial(simulate, one, seed=seed), numbers, executor, progress)

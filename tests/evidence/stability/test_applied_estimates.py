@@ -6,7 +6,8 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.evidence.stability.applied_estimates import AppliedCase, judge_applied, report
+from study_app.evidence.stability import applied_estimates
+from study_app.evidence.stability.applied_estimates import AppliedCase, evidence, judge_applied
 from study_app.evidence.stability.stability_cases import parse
 from study_app.lab.estimation.liquid_model import DRAG
 from tests.haptics.scenes import COMPILED
@@ -33,7 +34,7 @@ def test_a_value_that_jumps_is_found_out(monkeypatch: Any) -> None:
     found = judge_applied(AppliedCase(HELD, 1.0))
     assert found.harmed
     assert "force" in found.reasons["estimated"]
-    assert f"unstable: planted=1 {HELD}" in report([found])
+    assert f"unstable: planted=1 {HELD}" in evidence([found]).text
 
 
 @pytest.mark.nightly

@@ -1,4 +1,4 @@
-"""The exponent of magnitude estimation is planted over the varied number and recovered."""
+"""The exponent of magnitude estimation is known over the varied number and recovered."""
 
 import pytest
 
@@ -6,37 +6,37 @@ from study_app.evidence.thresholds import estimated_exponents
 from study_app.evidence.thresholds.estimated_exponents import (
     EXPONENT,
     ExponentsFound,
-    PlantedExponent,
+    KnownExponent,
     exponent_verdicts,
     found_of,
     simulate_estimates,
     spread_of_exponents,
 )
-from study_app.evidence.thresholds.many_studies import judged, plant, rehearsed
+from study_app.evidence.thresholds.many_studies import judged, known_value, rehearsed
 from study_app.protocol.load import load, parse, source_bytes
 from tests.compiled import needs_servo
 
 
 @pytest.fixture(scope="module")
-def one() -> PlantedExponent:
-    found = plant("thickness", load("thickness"))
-    assert isinstance(found, PlantedExponent)
+def one() -> KnownExponent:
+    found = known_value("thickness", load("thickness"))
+    assert isinstance(found, KnownExponent)
     return found
 
 
 @pytest.fixture(scope="module")
-def studies(one: PlantedExponent) -> list[ExponentsFound]:
+def studies(one: KnownExponent) -> list[ExponentsFound]:
     return [simulate_estimates(one, number, seed=1) for number in range(12)]
 
 
-def test_without_noise_the_planted_exponent_is_found(one: PlantedExponent, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_noise_the_known_exponent_is_found(one: KnownExponent, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(estimated_exponents, "ESTIMATE_NOISE", 1e-6)
     found = simulate_estimates(one, 0, seed=1, people=3)
     assert found.own == pytest.approx((EXPONENT,) * 3, abs=1e-5)
 
 
 @pytest.mark.slow
-def test_studies_recover_it_and_a_wrong_exponent_is_found(one: PlantedExponent, studies: list[ExponentsFound]) -> None:
+def test_studies_recover_it_and_a_wrong_exponent_is_found(one: KnownExponent, studies: list[ExponentsFound]) -> None:
     judged = list(exponent_verdicts(one, studies))
     assert [row.what for row in judged] == ["exponent over viscosity_pa_s", "coverage of the group's 95 % intervals"]
     assert all(row.holds for row in judged), judged
@@ -60,8 +60,8 @@ def test_the_whole_program_recovers_it() -> None:
     ):
         assert old in text
         text = text.replace(old, new)
-    short = plant("short", parse(text.encode(), "short.toml"))
-    assert isinstance(short, PlantedExponent)
+    short = known_value("short", parse(text.encode(), "short.toml"))
+    assert isinstance(short, KnownExponent)
     spread = spread_of_exponents([simulate_estimates(short, number, seed=1) for number in range(10)], 3)
     rows = list(judged(short, rehearsed(short, text.encode(), seed=1), spread))
     assert [row.holds for row in rows] == [True, True, True], rows

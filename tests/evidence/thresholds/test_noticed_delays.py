@@ -25,7 +25,7 @@ def found() -> Compared:
     return compare(40, 1)
 
 
-def test_the_forced_choice_finds_the_planted_delay_and_the_rating_the_criterion(found: Compared) -> None:
+def test_the_forced_choice_finds_the_known_delay_and_the_rating_the_criterion(found: Compared) -> None:
     middle, low, high = found.detected_ms
     assert low < 1000 * JND_S < high
     assert middle == pytest.approx(1000 * JND_S, rel=0.1)

@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.levels.summaries import sensitivities
-from study_app.evidence.thresholds.estimated_exponents import planted_exponent, simulate_estimates
+from study_app.evidence.thresholds.estimated_exponents import known_exponent, simulate_estimates
 from study_app.protocol.checks.expected_precision import (
     EstimationPlan,
     MeanPlan,
@@ -110,7 +110,7 @@ def test_the_spread_of_an_exponent_is_that_of_a_least_squares_slope() -> None:
 @pytest.mark.slow
 def test_the_spread_is_that_of_exponents_from_simulated_answers() -> None:
     protocol = load("thickness")
-    planted = planted_exponent("thickness", protocol)
+    planted = known_exponent("thickness", protocol)
     assert planted is not None
     found = np.concatenate([simulate_estimates(planted, number, seed=1).own for number in range(30)])
     expected = expected_mean(plan_of(protocol, "thickness"))

@@ -29,13 +29,13 @@ SHIPPED: Final[dict[str, Observer]] = {
     "delayjnd": OBSERVER,
     "forcedelay": Observer(delay_jnd_s=0.015),
 }
-"""The shipped studies with thresholds. Planted are a Weber fraction of 0.24 at 75 % correct, which is 0.19 at 71 %
+"""The shipped studies with thresholds. Known are a Weber fraction of 0.24 at 75 % correct, which is 0.19 at 71 %
 (Jones, Hunter & Lafontaine 1997), 45 ms (Vogels 2004), 25 ms at every standard (below 33 ms: Ellis et al. 1999),
 and 15 ms of a force (Rank et al. 2010)."""
 
 
 @dataclass(frozen=True, slots=True)
-class Planted:
+class KnownThreshold:
     """A study's main block with an adaptive method, and the observer who answers."""
 
     name: str
@@ -63,8 +63,8 @@ class Planted:
         return 0.0 if stimulus_of(self.protocol, self.block).vary in DELAYS else 1.0
 
 
-def planted(name: str, protocol: Protocol) -> Planted:
-    """Return what is planted in a study.
+def known_threshold(name: str, protocol: Protocol) -> KnownThreshold:
+    """Return what is known of a study.
 
     Raises
     ------
@@ -76,10 +76,10 @@ def planted(name: str, protocol: Protocol) -> Planted:
             continue
         stimulus = stimulus_of(protocol, block)
         if stimulus.level_kind != "value" and not all(one is None for one in standards_of(protocol, block)):
-            return Planted(name, protocol, block, SHIPPED.get(name, OBSERVER))
+            return KnownThreshold(name, protocol, block, SHIPPED.get(name, OBSERVER))
     raise ValueError(
         f"{name} has no main block with levels above a standard, or with magnitude estimation of a liquid at a pace: "
-        "nothing can be planted in it"
+        "nothing is known of it in advance"
     )
 
 
@@ -105,7 +105,7 @@ class StudyFound:
 
 
 def simulate(
-    one: Planted, number: int, seed: int, people: int = PEOPLE, observers: Sequence[Observer] = ()
+    one: KnownThreshold, number: int, seed: int, people: int = PEOPLE, observers: Sequence[Observer] = ()
 ) -> StudyFound:
     """Return what a study of equal observers finds; ``number`` names its draws.
 
@@ -120,7 +120,7 @@ def simulate(
     return StudyFound(group, own)
 
 
-def slopes(one: Planted, found: StudyFound) -> list[float]:
+def slopes(one: KnownThreshold, found: StudyFound) -> list[float]:
     """Return each participant's slope of ln JND over ln standard."""
     standards = np.array(one.standards)
     unit = standards if stimulus_of(one.protocol, one.block).level_kind == "weber" else 1.0
@@ -132,7 +132,7 @@ def _ends(row: ThresholdFound) -> tuple[float, float, float]:
     return row.threshold, row.low, row.high
 
 
-def _level_block(one: Planted) -> LevelBlock:
+def _level_block(one: KnownThreshold) -> LevelBlock:
     block, protocol = one.block, one.protocol
     return LevelBlock(
         id=block.id,
@@ -163,7 +163,7 @@ class Verdict:
     holds: bool
 
 
-def verdicts(one: Planted, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
+def verdicts(one: KnownThreshold, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
     """Yield what studies of equal observers show of methods and analysis."""
     errors = np.array([math.log(found.mean / one.threshold) for found in studies])
     mean = math.exp(float(errors.mean())) - 1

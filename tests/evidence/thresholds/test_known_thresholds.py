@@ -1,4 +1,4 @@
-"""Planted thresholds are recovered, and an observer that is wrong is found."""
+"""Known thresholds are recovered, and an observer that is wrong is found."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -8,8 +8,15 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
+from study_app.evidence.thresholds.known_thresholds import (
+    KnownThreshold,
+    StudyFound,
+    known_threshold,
+    simulate,
+    spread,
+    verdicts,
+)
 from study_app.evidence.thresholds.many_studies import judged, rehearsed
-from study_app.evidence.thresholds.planted import Planted, StudyFound, planted, simulate, spread, verdicts
 from study_app.protocol.load import load, parse
 from study_app.protocol.simulated import OBSERVER, Comparison, Observer
 from study_app.protocol.streams import stream
@@ -35,12 +42,12 @@ method = "short"
 
 
 @pytest.fixture(scope="module")
-def one() -> Planted:
-    return planted("small", parse(SMALL.encode(), "small.toml"))
+def one() -> KnownThreshold:
+    return known_threshold("small", parse(SMALL.encode(), "small.toml"))
 
 
 @pytest.fixture(scope="module")
-def studies(one: Planted) -> list[StudyFound]:
+def studies(one: KnownThreshold) -> list[StudyFound]:
     return [simulate(one, number, seed=1) for number in range(20)]
 
 
@@ -48,7 +55,7 @@ def studies(one: Planted) -> list[StudyFound]:
     ("delays", "standard", "threshold"),
     [(False, 8.0, 0.24), (False, 32.0, 0.24), (True, 0.0, 0.025), (True, 0.2, 0.025)],
 )
-def test_an_observer_is_correct_in_75_percent_at_the_planted_threshold(
+def test_an_observer_is_correct_in_75_percent_at_the_known_threshold(
     delays: bool, standard: float, threshold: float
 ) -> None:
     attended = Comparison(delays, smallest=False, observer=replace(OBSERVER, lapses=0.0))
@@ -61,14 +68,14 @@ def test_an_observer_is_correct_in_75_percent_at_the_planted_threshold(
 
 def test_what_has_no_threshold_is_refused() -> None:
     with pytest.raises(ValueError, match="rek2024 has no main block"):
-        planted("rek2024", load("rek2024"))
+        known_threshold("rek2024", load("rek2024"))
     ran = CliRunner().invoke(commands, ["validate", "rek2024"])
     assert ran.exit_code == 2
-    assert "nothing can be planted in it" in ran.output
+    assert "nothing is known of it in advance" in ran.output
 
 
 def test_studies_are_the_same_in_any_order_and_on_any_number_of_workers(
-    one: Planted, studies: list[StudyFound]
+    one: KnownThreshold, studies: list[StudyFound]
 ) -> None:
     with ThreadPoolExecutor(2) as executor:
         again = list(executor.map(partial(simulate, one, seed=1), reversed(range(4))))
@@ -77,7 +84,7 @@ def test_studies_are_the_same_in_any_order_and_on_any_number_of_workers(
     assert simulate(one, 1, seed=1) != studies[0]
 
 
-def test_the_threshold_is_recovered(one: Planted, studies: list[StudyFound]) -> None:
+def test_the_threshold_is_recovered(one: KnownThreshold, studies: list[StudyFound]) -> None:
     judged = {row.what: row for row in verdicts(one, studies)}
     assert {what for what, row in judged.items() if not row.holds} <= {
         "studies of 10 within ±15 %"
@@ -90,7 +97,7 @@ def test_the_threshold_is_recovered(one: Planted, studies: list[StudyFound]) -> 
 @pytest.mark.nightly
 @pytest.mark.slow
 @needs_servo
-def test_the_whole_program_recovers_it_and_another_observer_is_found(one: Planted) -> None:
+def test_the_whole_program_recovers_it_and_another_observer_is_found(one: KnownThreshold) -> None:
     rows = list(judged(one, rehearsed(one, SMALL.encode(), seed=1), 0.25))
     assert [row.holds for row in rows] == [True, True, True], rows
     assert rows[0].what == "intervals delivered as requested"
