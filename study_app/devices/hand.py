@@ -1,4 +1,4 @@
-"""The target of a simulated hand at a time: at the pointer, along a motion, on a reach, or at its present place.
+"""A simulated hand: its target at a time (at the pointer, along a motion, on a reach, at its place), and its orders.
 
 Orders come from any thread, one at a time, through a seqlock: the writer makes the serial odd, writes, makes it even;
 the reader, inside the servo, reads an order only when it is complete, else at the next tick; so neither ever waits for
@@ -6,9 +6,6 @@ the other.
 
 It only uses sums, products, divisions and square roots, which IEEE 754 rounds alike everywhere; so a scripted hand
 moves identically on every machine.
-
-
-Commands to a simulated hand, from any thread but one at a time.
 """
 
 import math
@@ -229,7 +226,6 @@ class HandOrders:
         self.state.buttons = buttons
 
     def release(self) -> None:
-        """Release all buttons."""
         self.state.buttons = 0
 
     def hold(self, x_m: float, y_m: float, z_m: float) -> None:
@@ -278,7 +274,6 @@ class HandOrders:
         self._post(REACH, target_m=self._inside(x_m, y_m, z_m), duration_ns=nanoseconds)
 
     def rest(self) -> None:
-        """Stay where the hand is."""
         self._post(STAY)
 
     @property

@@ -5,9 +5,8 @@ force for the next step. With the mouse the liquid is seen instead of felt: a sp
 handle to the pointer, and the liquid's force acts on that handle: it lags behind the pointer by force / stiffness, and
 continues after the pointer has stopped, as the liquid moves it. In free space it follows smoothly, 20 ms behind (two
 low-passes of 10 ms, which smooth the pointer's steps).
-
-
-A device moved by a simulated hand: along a given motion or in human-like reaches, with tremor and encoders.
+The scripted device is moved by a simulated hand: along a given motion or in human-like reaches, with tremor and
+encoders.
 """
 
 from functools import cache
@@ -75,7 +74,6 @@ class SimulatedDevice(HandOrders, Device):
 
     @property
     def dynamics(self) -> Dynamics:
-        """The handle's dynamics, with its delay at 1 kHz."""
         handle = self.state.handle
         lag_s = 0.0 if self.state.measures_velocity else None
         return Dynamics(1e-3 * float(handle.delay), float(handle.quantum_m), float(handle.mass_kg), lag_s)
@@ -85,19 +83,15 @@ class SimulatedDevice(HandOrders, Device):
         self.state.measures_velocity = 1
 
     def unplug(self) -> None:
-        """Stop responding, like a disconnected device."""
         self.state.unplugged = 1
 
     def open(self) -> None:
-        """Connect it again."""
         self.state.unplugged = 0
 
     def close(self) -> None:
-        """Set the force on the handle to zero."""
         let_go(self.state.handle)
 
     def describe(self) -> dict[str, Any]:
-        """Return name and numbers for the receipt."""
         handle = self.state.handle
         return {
             "name": self.name,
@@ -206,8 +200,8 @@ class ScriptedDevice(SimulatedDevice):
     random : random numbers for frequencies and phases of the tremor; None: always the same ones
     workspace_m : half extents of the handle's workspace [m]
     force_limit_n : the greatest force that may be commanded [N]
-    tremor_m : amplitude of each of the tremor's three waves per axis [m]; 0: no tremor quantum_m : one count of the
-    encoders [m]; 0: exact
+    tremor_m : amplitude of each of the tremor's three waves per axis [m]; 0: no tremor
+    quantum_m : one count of the encoders [m]; 0: exact
     """
 
     name = "scripted"

@@ -38,7 +38,7 @@ class Ticks:
     def __init__(self, device: Any, now_ns: int | None = None, pause_s: float = 0.0) -> None:
         self.device, self.reading, self._pause_s = device, new_reading(), pause_s
         exchange = getattr(device, "exchange", None)
-        started_ns = 0 if exchange is None else int(exchange.now_ns)
+        started_ns = 0 if exchange is None or device.name.startswith("falcon") else int(exchange.now_ns)
         self.now_ns = now_ns or max(started_ns, 10 * MS)
 
     def read(self, pause_ns: int = MS) -> int:

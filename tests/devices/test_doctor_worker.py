@@ -5,7 +5,8 @@ import time
 
 import pytest
 
-from study_app.devices.doctor import Report, start_examination
+from study_app.devices.doctor import Report
+from study_app.devices.doctor_worker import start_examination
 from study_app.workers.server import Crashed, Refused
 from tests.compiled import needs_servo
 

@@ -4,9 +4,7 @@ The servo presents no liquid; `BenchDriver` lies between it and the device, and 
 place, a constant push, a chirp, a damper. A write without a reading before it is zero, and so is the last write of a
 servo. The force ends at once if the handle oscillates or moves too far, if its stop button is pressed, or if device or
 host do not respond; then it stays zero until the next excitation.
-
-
-A device on the bench: the servo's own loop around it, excitations for a time, and the samples of that time.
+`Stand` is the servo around the device: it applies excitations for a time, and returns the samples of that time.
 """
 
 import math
@@ -332,7 +330,6 @@ class Stand:
 
     @property
     def damper_nspm(self) -> float:
-        """The present damping of the damper."""
         return float(self._driver.state.damper_nspm)
 
     @property
@@ -357,8 +354,8 @@ class Stand:
 
         Parameters
         ----------
-        answered : returns the operator's input, None without one may_end : whether an excitation may end by itself;
-        then this returns at once
+        answered : returns the operator's input, None without one
+        may_end : whether an excitation may end by itself; then this returns at once
 
         Raises
         ------
@@ -388,7 +385,6 @@ class Stand:
         return np.concatenate(taken).view(np.recarray) if taken else self._reader.read(), answer
 
     def rest(self) -> None:
-        """End the force."""
         self._driver.end()
 
     def _live(self) -> None:

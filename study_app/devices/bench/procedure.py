@@ -69,8 +69,10 @@ class Durations:
     Attributes
     ----------
     rest_s : at rest, without force
-    come_s : for the spring to bring the handle to the middle wave_s : force on each axis for mass and friction push_s :
-    until the force on the scale is steady damping_s : until the damper has grown to `MOST_NSPM`, on each axis
+    come_s : for the spring to bring the handle to the middle
+    wave_s : force on each axis for mass and friction
+    push_s : until the force on the scale is steady
+    damping_s : until the damper has grown to `MOST_NSPM`, on each axis
     """
 
     rest_s: float = 120.0
@@ -94,8 +96,12 @@ class Found:
 
     Attributes
     ----------
-    device : the device's own description regularity, noise : at rest motions : of the axes x, y, z gain : of the force
-    downward; None without a scale damping : of the axes x, y, z overruns : number of deadlines that the servo skipped
+    device : the device's own description
+    regularity, noise : at rest
+    motions : of the axes x, y, z
+    gain : of the force downward; None without a scale
+    damping : of the axes x, y, z
+    overruns : number of deadlines that the servo skipped
     """
 
     device: dict[str, Any]

@@ -271,7 +271,7 @@ def _string_descriptor(index: int, serial: str) -> bytes:
     return bytes((2 + len(text), _STRING_DESCRIPTOR)) + text
 
 
-PATIENCE_S = 5.0
+FAULTY_PATIENCE_S = 5.0  # some faults keep it from being homed
 _STILL_TICKS = 10  # longer than the pause between two strokes of homing
 
 
@@ -301,16 +301,10 @@ class EmulatedFalcon(FalconDevice):
         force_limit_n: float = FORCE_LIMIT_N,
         progress: Callable[[str], object] | None = None,
         emulator: Emulator | None = None,
-        patience_s: float = PATIENCE_S,
         **options: Any,
     ) -> None:
         super().__init__(
-            firmware=firmware,
-            workspace_m=workspace_m,
-            force_limit_n=force_limit_n,
-            progress=progress,
-            patience_s=patience_s,
-            **options,
+            firmware=firmware, workspace_m=workspace_m, force_limit_n=force_limit_n, progress=progress, **options
         )
         self.hand = emulator or Emulator(random, running=firmware is None, workspace_m=workspace_m)
         self._backend = EmulatedBackend(self.hand)
@@ -321,6 +315,7 @@ class EmulatedFalcon(FalconDevice):
 
     def take_fault(self, fault: str) -> None:
         self.hand.take(fault)
+        self._patience_s = FAULTY_PATIENCE_S
 
     def open(self) -> None:
         """Open it, and wait until the hand has moved the grip to the middle after homing."""

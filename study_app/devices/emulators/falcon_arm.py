@@ -1,7 +1,7 @@
 """The emulated Falcon's three arms: angles from a pose, and the force of torques at it.
 
 Its method differs from ``kinematics`` on purpose, to reveal errors in either. A search finds the angle of an arm at
-which its rod, as a vector, has the correct length; the force follows from virtual work, ``F . dp = sum tau_i
+which its rod, as a vector, has the correct length; the force follows from virtual receive_byte, ``F . dp = sum tau_i
 dtheta_i``, with the changes of the angles from small displacements of the grip.
 """
 
@@ -66,7 +66,7 @@ def set_arms(arms: Any, geometry: Geometry, units_per_nm: float, arm_offset_rad:
 
 
 @kernel
-def bend(arms: Any, hand_m: Any) -> None:
+def find_angles(arms: Any, hand_m: Any) -> None:
     """Find the arms' angles for the grip at ``hand_m`` (3,) [m, hand frame]."""
     x, y, z = hand_m[0], hand_m[1], hand_m[2] + arms.centre_m
     for i in range(3):
@@ -76,7 +76,7 @@ def bend(arms: Any, hand_m: Any) -> None:
 @kernel
 def stop(arms: Any, handle: Any) -> None:
     """Keep a ``plant.HANDLE`` within the arms' reach, and set their angles: outward it stops before the arms' stops."""
-    bend(arms, handle.position_m)
+    find_angles(arms, handle.position_m)
     if _reached(arms, handle.position_m):
         return
     x, y, z = handle.position_m[0], handle.position_m[1], handle.position_m[2]
@@ -84,7 +84,7 @@ def stop(arms: Any, handle: Any) -> None:
     for _ in range(_STOP_HALVINGS):
         share = 0.5 * (low + high)
         _put(handle, share * x, share * y, share * z)
-        bend(arms, handle.position_m)
+        find_angles(arms, handle.position_m)
         if _reached(arms, handle.position_m):
             low = share
         else:
@@ -92,7 +92,7 @@ def stop(arms: Any, handle: Any) -> None:
     _put(handle, low * x, low * y, low * z)
     for i in range(3):
         handle.velocity_mps[i] = 0.0
-    bend(arms, handle.position_m)
+    find_angles(arms, handle.position_m)
 
 
 @kernel
@@ -128,7 +128,7 @@ def count(arms: Any, arm: int) -> int:
 
 
 @kernel
-def strain(arms: Any, torque: Any, hand_m: Any) -> None:
+def find_force(arms: Any, torque: Any, hand_m: Any) -> None:
     """Set ``arms.force_n`` from motor torques (3,) [units], with the grip at ``hand_m`` of the last angles.
 
     A step of the grip changes the rod's length, a rotation of the arm must compensate it: their ratio in radians per

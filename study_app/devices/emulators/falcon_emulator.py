@@ -1,12 +1,8 @@
-"""The emulated Falcon's memory and its interface to a host: transfers, control requests, time, and mains power.
+"""An emulated Falcon: the USB bridge, the boot loader, the program it runs, its arms, and the hand that holds the grip.
 
-A transfer advances emulated time from byte to byte at the device, until it is complete or its time is out.
-
-
-An emulated Falcon: the USB bridge, the boot loader, the program it runs, its arms, and the hand that holds the grip.
-
-Its interface is one C function with the signature of ``libusb_bulk_transfer`` (``bulk``), whose handle is the address
-of the emulator's memory, and the bridge's control requests. Everything happens in emulated time (``ftdi_bridge``) and
+A transfer advances emulated time from byte to byte at the device, until it is complete or its time is out. Its
+interface is one C function with the signature of ``libusb_bulk_transfer`` (``bulk``), whose handle is the address of
+the emulator's memory, and the bridge's control requests. Everything happens in emulated time (``falcon_bridge``) and
 depends only on its commands and on ``random``.
 """
 
@@ -17,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from study_app.devices.emulators import falcon_bridge as ftdi_bridge
-from study_app.devices.emulators.falcon_arm import ARMS, bend, count, saturate, set_arms, strain
+from study_app.devices.emulators import falcon_bridge
+from study_app.devices.emulators.falcon_arm import ARMS, count, find_angles, find_force, saturate, set_arms
 from study_app.devices.emulators.falcon_bridge import BRIDGE, OUT_RING, byte_at, power_up
 from study_app.devices.emulators.falcon_processor import (
     FAULTS,
@@ -30,11 +26,11 @@ from study_app.devices.emulators.falcon_processor import (
     WAITING,
     Faults,
     draw,
-    live,
     load,
+    move_until,
+    receive_byte,
     reset,
     spelt,
-    work,
 )
 from study_app.devices.falcon import constants
 from study_app.devices.falcon.bulk import BULK, BulkCalls
@@ -81,7 +77,7 @@ def _bulk(handle: int, endpoint: int, data: int, length: int, transferred: int, 
     if e.faults.unplugged:
         return constants.ERROR_NO_DEVICE
     _begin(e)
-    end_ns = ftdi_bridge.end_of(e.bridge, timeout_ms * 1_000_000)
+    end_ns = falcon_bridge.end_of(e.bridge, timeout_ms * 1_000_000)
     if endpoint == constants.ENDPOINT_OUT:
         return _bulk_out(e, data, length, moved, end_ns)
     if endpoint == constants.ENDPOINT_IN:
@@ -92,22 +88,22 @@ def _bulk(handle: int, endpoint: int, data: int, length: int, transferred: int, 
 @kernel
 def _begin(e: Any) -> None:
     """Begin a transfer now; if the clock was changed, shift all times to it."""
-    jump_ns = ftdi_bridge.begin(e.bridge)
+    jump_ns = falcon_bridge.begin(e.bridge)
     if jump_ns != 0:
-        ftdi_bridge.shift_bridge(e.bridge, jump_ns)
+        falcon_bridge.shift_bridge(e.bridge, jump_ns)
         e.moved_ns += jump_ns
         e.hand.began_ns += jump_ns
         e.run.stalled_ns += jump_ns
     if e.faults.was_unplugged:
         e.faults.was_unplugged = 0
-        ftdi_bridge.power_up(e.bridge)
+        falcon_bridge.power_up(e.bridge)
     _advance(e, e.bridge.now_ns)
 
 
 @kernel
 def _bulk_out(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
     for k in range(length):
-        if not ftdi_bridge.send(e.bridge, byte_at(data + k).value, end_ns):
+        if not falcon_bridge.send(e.bridge, byte_at(data + k).value, end_ns):
             _advance(e, end_ns)
             return constants.ERROR_TIMEOUT
         moved.value = k + 1
@@ -119,8 +115,8 @@ def _bulk_out(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
 def _bulk_in(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
     bridge = e.bridge
     while moved.value < length:
-        ftdi_bridge.overflow(bridge)
-        due_ns = ftdi_bridge.hand_over_ns(bridge)
+        falcon_bridge.overflow(bridge)
+        due_ns = falcon_bridge.hand_over_ns(bridge)
         if bridge.out_first < bridge.out_last:
             heard_ns = bridge.out_ns[bridge.out_first % OUT_RING]
             if heard_ns <= min(due_ns, end_ns):  # the device's answer to it may be due sooner
@@ -135,7 +131,7 @@ def _bulk_in(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
         if room < constants.USB_PACKET and _arrived_of(bridge, waiting) + constants.STATUS_BYTES > room:
             return constants.ERROR_OVERFLOW
         noise = int(draw(e.faults) * 0x10000) if e.faults.status_noise else 0
-        got = ftdi_bridge.hand_over(bridge, data + moved.value, noise)
+        got = falcon_bridge.hand_over(bridge, data + moved.value, noise)
         moved.value += got
         if got < constants.USB_PACKET:
             return constants.SUCCESS
@@ -159,7 +155,7 @@ def poll(e: Any, data: int, length: int, moved: Any) -> int:
 def next_event_ns(e: Any) -> int:
     """Return when a poll may transfer more than now: the chip hands over, or the device hears a byte [ns]."""
     bridge = e.bridge
-    due_ns = ftdi_bridge.hand_over_ns(bridge)
+    due_ns = falcon_bridge.hand_over_ns(bridge)
     if bridge.out_first < bridge.out_last:
         due_ns = min(due_ns, bridge.out_ns[bridge.out_first % OUT_RING])
     return int(due_ns)
@@ -170,7 +166,7 @@ def _arrived_of(bridge: Any, waiting: int) -> int:
     """Return how many bytes the next packet would carry."""
     held = 0
     while held < min(waiting, constants.CHUNK):
-        if bridge.back_ns[(bridge.back_first + held) % ftdi_bridge.BACK_RING] > bridge.now_ns:
+        if bridge.back_ns[(bridge.back_first + held) % falcon_bridge.BACK_RING] > bridge.now_ns:
             break
         held += 1
     return held
@@ -190,7 +186,7 @@ def _advance(e: Any, to_ns: int) -> None:
         if e.powered == 0:
             continue
         if e.loader.state == RUNNING:
-            work(e, bridge.out[place], bridge.out_divisor[place], at_ns)
+            receive_byte(e, bridge.out[place], bridge.out_divisor[place], at_ns)
         else:
             load(e.loader, bridge, e.faults, bridge.out[place], bridge.out_divisor[place], at_ns)
             if e.loader.state == RUNNING:
@@ -228,7 +224,7 @@ def control(e: Any, request: int, value: int) -> int:
         return constants.ERROR_NO_DEVICE
     _begin(e)
     dtr = e.bridge.dtr
-    ftdi_bridge.control(e.bridge, request, value)
+    falcon_bridge.control(e.bridge, request, value)
     if e.bridge.dtr > dtr and e.bridge.divisor == constants.BAUD_9600 and e.powered != 0:
         reset(e.loader)
         _limp(e)
@@ -250,29 +246,29 @@ def supply(e: Any, on: int) -> None:
 def let_pass(e: Any, lasting_ns: int) -> None:
     """Advance the time, including the motion of hand and handle."""
     _begin(e)
-    end_ns = ftdi_bridge.end_of(e.bridge, lasting_ns)
+    end_ns = falcon_bridge.end_of(e.bridge, lasting_ns)
     _advance(e, end_ns)
-    live(e, end_ns, max(lasting_ns, LONGEST_NS))
+    move_until(e, end_ns, max(lasting_ns, LONGEST_NS))
 
 
 @kernel
 def look(e: Any) -> None:
     """Advance to the clock's present time."""
     _begin(e)
-    live(e, e.bridge.now_ns, LONGEST_NS)
+    move_until(e, e.bridge.now_ns, LONGEST_NS)
 
 
 @kernel
-def settle(e: Any) -> None:
+def unload(e: Any) -> None:
     """Reset to the state after connection: arms at the grip's place, no program."""
-    bend(e.arms, e.handle.position_m)
+    find_angles(e.arms, e.handle.position_m)
     e.loader.state = WAITING
 
 
 @kernel
-def feel(e: Any) -> None:
+def update_force(e: Any) -> None:
     """Set ``arms.force_n`` to the motors' present force."""
-    strain(e.arms, e.run.acting, e.handle.position_m)
+    find_force(e.arms, e.run.acting, e.handle.position_m)
     saturate(e.arms)
 
 
@@ -293,10 +289,13 @@ class Emulator(HandOrders):
     Parameters
     ----------
     random : random numbers for tremor and faults; None: always the same ones
-    geometry : its dimensions, or the name of published ones running : whether its program is loaded already serial : of
-    its bridge workspace_m : half extents of where the hand can be sent [m] tremor_m : amplitude of the tremor's waves
-    [m]; 0: no tremor units_per_nm : motor units for an arm torque of 1 N m arm_offset_rad : by how much each arm's
-    encoder was assembled off its zero
+    geometry : its dimensions, or the name of published ones
+    running : whether its program is loaded already
+    serial : of its bridge
+    workspace_m : half extents of where the hand can be sent [m]
+    tremor_m : amplitude of the tremor's waves [m]; 0: no tremor
+    units_per_nm : motor units for an arm torque of 1 N m
+    arm_offset_rad : by how much each arm's encoder was assembled off its zero
     """
 
     def __init__(
@@ -328,7 +327,7 @@ class Emulator(HandOrders):
         self.state.handle.stop_m = STOPS_M
         self.state.hand.place_m = self.state.hand.aim_m
         self.state.powered = 1
-        settle(self.state)
+        unload(self.state)
         if running:
             run_program(self.state)
 
@@ -399,7 +398,6 @@ class Emulator(HandOrders):
 
     @property
     def now_ns(self) -> int:
-        """Its present time [ns]."""
         return int(self._now_ns[0])
 
     def pause(self, seconds: float) -> None:
@@ -429,12 +427,10 @@ class Emulator(HandOrders):
 
     @property
     def powered(self) -> bool:
-        """Whether the mains adapter is plugged in."""
         return bool(self.state.powered)
 
     @property
     def running(self) -> bool:
-        """Whether its program is loaded and runs."""
         return bool(self.state.powered) and int(self.state.loader.state) == RUNNING
 
     @property
@@ -486,13 +482,12 @@ class Emulator(HandOrders):
     @property
     def force_n(self) -> tuple[float, float, float]:
         """The force of its motors on the hand, by virtual work [N]."""
-        feel(self.state)
+        update_force(self.state)
         x, y, z = self.state.arms.force_n
         return float(x), float(y), float(z)
 
     @property
     def position_m(self) -> tuple[float, float, float]:
-        """Where the grip is [m, hand frame]."""
         x, y, z = self.state.handle.position_m
         return float(x), float(y), float(z)
 

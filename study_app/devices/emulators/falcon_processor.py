@@ -1,16 +1,13 @@
-"""Faults of an emulated Falcon: by chance, a number of times, or while switched on.
+"""The emulated Falcon's processor: its boot loader, its program, and faults of both.
 
-The emulated Falcon's processor before it has a program: pinged at 9600 baud, timed by an 'A', loaded byte by byte.
+Without a program it is pinged at 9600 baud, timed by an 'A', and loaded byte by byte. It knows the boot stream of TI's
+loader (SPRUI33): little-endian words, the key 0x08AA, eight reserved words, the entry point, then blocks of (count,
+destination, words) until a count of 0, after which the program runs. After invalid data it does not answer until it is
+pinged again.
 
-It knows the boot stream of TI's loader (SPRUI33): little-endian words, the key 0x08AA, eight reserved words, the entry
-point, then blocks of (count, destination, words) until a count of 0, after which the program runs. After invalid data
-it does not answer until it is pinged again.
-
-
-The running program of the emulated Falcon: packets in, torques out, and a handle moved by motors and hand.
-
-Assumed, because not published: mass, friction and hand (those of the scripted device), the places of the arms' indices,
-the response time, that a torque persists until the next packet, and that one beyond the range is clipped.
+The program receives packets, sets torques, and moves a handle by motors and hand. Assumed, because not published: mass,
+friction and hand (those of the scripted device), the places of the arms' indices, the response time, that a torque
+persists until the next packet, and that one beyond the range is clipped.
 """
 
 import math
@@ -19,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices.emulators.falcon_arm import count, saturate, stop, strain
+from study_app.devices.emulators.falcon_arm import count, find_force, saturate, stop
 from study_app.devices.emulators.falcon_bridge import answer
 from study_app.devices.falcon import constants
 from study_app.devices.hand import REACH, move_hand
@@ -124,11 +121,9 @@ class Faults:
             self._state.kernel_driver = 1  # which has to be there, to stay
 
     def off(self, name: str) -> None:
-        """Switch it off."""
         self.on(name, False)
 
     def is_on(self, name: str) -> bool:
-        """Return whether it is switched on."""
         return bool(self._state[_switch(name)])
 
     def last(self, *, delay_s: float | None = None, stall_s: float | None = None) -> None:
@@ -313,7 +308,7 @@ _NIBBLES: Final = 4
 
 
 @kernel
-def work(e: Any, value: int, divisor: int, at_ns: int) -> None:
+def receive_byte(e: Any, value: int, divisor: int, at_ns: int) -> None:
     """Receive a byte of a packet that came at ``at_ns``, over the line at this speed."""
     run = e.run
     if divisor != constants.BAUD_1500000 or at_ns < run.stalled_ns:
@@ -361,7 +356,7 @@ def _well_formed(heard: Any) -> bool:
 def _obey(e: Any, at_ns: int) -> None:
     """Advance to the arrival of the packet, then execute it."""
     run = e.run
-    live(e, at_ns, LONGEST_NS)
+    move_until(e, at_ns, LONGEST_NS)
     flags = int(run.heard[13]) - constants.ZERO
     run.lights = flags & (constants.FLAG_GREEN | constants.FLAG_BLUE | constants.FLAG_RED)
     homing = flags & constants.FLAG_HOMING
@@ -441,7 +436,7 @@ def _byte_of_reply(e: Any, k: int) -> int:
 
 
 @kernel
-def live(e: Any, now_ns: int, longest_ns: int) -> None:
+def move_until(e: Any, now_ns: int, longest_ns: int) -> None:
     """Let hand and handle move up to ``now_ns``, but for no longer than ``longest_ns``."""
     elapsed_ns = min(now_ns - e.moved_ns, longest_ns)
     if elapsed_ns <= 0:
@@ -464,7 +459,7 @@ def _load(e: Any) -> None:
     if e.run.acting[0] == 0.0 and e.run.acting[1] == 0.0 and e.run.acting[2] == 0.0:
         push(e.handle, 0.0, -e.weight_n, 0.0)
         return
-    strain(e.arms, e.run.acting, e.handle.position_m)
+    find_force(e.arms, e.run.acting, e.handle.position_m)
     saturate(e.arms)
     force = e.arms.force_n
     if math.isfinite(force[0] + force[1] + force[2]):

@@ -63,14 +63,12 @@ class EmulatedFunctions:
         self._hand = hand
 
     def prepare(self, force_limit_n: float) -> dict[str, Any]:
-        """Enable the force."""
         self.state.force_on = 1
         names, handle = ("wrist", "gripper", "active_wrist", "active_gripper"), self._hand.dynamics
         known = {"delay_s": handle.delay_s, "count_m": handle.count_m, "mass_kg": handle.mass_kg}
         return {"sdk": None, "system": "emulated"} | dict.fromkeys(names, False) | known
 
     def address(self, name: str) -> int:
-        """Return where an emulated function is."""
         return int(_functions()[name].address)
 
     def take(self, fault: str, after: int = 0) -> None:
@@ -86,7 +84,6 @@ class EmulatedFunctions:
         self.state.fault, self.state.fault_after = FAULTS[fault], after
 
     def close(self) -> bool:
-        """Take the force off the handle."""
         self._hand.close()
         return True
 
@@ -121,11 +118,9 @@ class EmulatedForceDimension(ForceDimensionDevice):
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:
-        """Return the device of a request, closed."""
         return cls(request.random, **request.limits)
 
     def take_fault(self, fault: str) -> None:
-        """Have a fault."""
         self.emulated.take(fault, FAULT_AFTER)
 
     def _connect(self) -> Functions:

@@ -1,15 +1,12 @@
-"""The messages of the emulated service, as its documentation shows them.
+"""An emulated Inverse Service with one Inverse3, whose handle a simulated hand holds.
 
 Written from docs.haply.co: "WebSocket Protocol" 3.5.x, step 1 (inventory) and core rule; "Simulation Channel" 3.5.x
 (a state update has ``state`` and ``status``, a full state ``config``, too); "HTTP" 3.4.x, Devices (``status``, grips).
 Not shown there, so a guess: that a state update has a ``session_id``, and the values of ``control_mode`` but "idle".
 
-
-An emulated Inverse Service with one Inverse3, whose handle a simulated hand holds.
-
-What a session is opened with is read by the standard library's JSON; the commands afterwards are compiled (``stream``).
-Documents: see ``documents``; "Device Configuration" 3.5.x for what ``configure`` takes, "Simulation Channel" 3.5.x for
-``session.force_render_full_state``, "Filters" and "Settings Reference" for the force scale, RFC 6455 §4.2 for the
+What a session is opened with is read by the standard library's JSON; the commands afterwards are compiled
+(``inverse3_stream``). Documents: "Device Configuration" 3.5.x for what ``configure`` takes, "Simulation Channel" 3.5.x
+for ``session.force_render_full_state``, "Filters" and "Settings Reference" for the force scale, RFC 6455 §4.2 for the
 handshake.
 """
 

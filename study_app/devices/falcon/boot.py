@@ -1,14 +1,12 @@
-"""The Falcon's firmware file, looked at before a byte of it is sent: a boot stream of TI's loader, whole and no more.
+"""The Falcon's firmware file, checked before a byte of it is sent, and the boot after power-up.
 
 None comes with this software: the owner of a Falcon has it. The stream is little-endian words: the key 0x08AA, eight
 zeros, the entry point, then blocks of (count, destination, words) and a count of 0; addresses are two words, the high
 one first (TI SPRUI33, boot data stream of 8 bits).
 
-
-Boot of a Falcon after power-up: ping, speed, upload with its echo, first reply.
-
-Each step reads its answer as a stream, independent of the bridge's packets. A step that fails ends the attempt; the
-next one begins with reopening the bridge, which succeeds according to owners of a Falcon.
+Boot is ping, speed, upload with its echo, first reply. Each step reads its answer as a stream, independent of the
+bridge's packets. A step that fails ends the attempt; the next one begins with reopening the bridge, which succeeds
+according to owners of a Falcon.
 """
 
 import hashlib

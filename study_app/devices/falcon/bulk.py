@@ -3,9 +3,7 @@
 ``int32 (intp handle, uint8 endpoint, intp data, int32 length, intp transferred, uint32 timeout_ms)``: move ``length``
 bytes at address ``data`` out, or at most as many in; write how many were moved into the int32 at ``transferred``;
 return 0 or a negative libusb error.
-
-
-The C function that puts FTDI's library (``transport_ftdi``) where libusb would be: ``FT_Read`` and ``FT_Write``.
+`transfer` puts FTDI's library (``FT_Read`` and ``FT_Write``) where libusb would be.
 """
 
 import ctypes

@@ -1,12 +1,8 @@
-"""Converts the servo's force to motor units, and these back to the force that the motors exert.
+"""The Falcon's compiled tick: read the reply to the last packet, return the grip's position, send the next torques.
 
 The servo limits the change of its force, except when its passivity controller reduces force or adds damping. So does
 the driver: after packets that were not sent, or for a caller without such a limit, a force grows by at most the servo's
-slew limit per tick; reductions, and forces that take energy from the moving grip, pass at once. The functions work on
-the exchange's record (``exchange.FALCON``), in the Falcon's frame.
-
-
-The Falcon's compiled tick: read the reply to the last packet, return the grip's position, send the next torques.
+slew limit per tick; reductions, and forces that take energy from the moving grip, pass at once.
 
 The device answers each packet with one, so `_read` collects the reply to the last tick's packet, and `_write` sends the
 force as soon as it is known; a position is one tick old. Of several replies the newest counts; without one there is no
@@ -50,13 +46,13 @@ from study_app.devices.falcon.mechanics import (
 from study_app.devices.falcon.replies import (
     PARSER,
     STATUS,
-    believe,
     feed,
     give_up_measurement,
+    is_plausible,
     pack,
-    settle,
     strip,
-    trust,
+    take_status,
+    update_delay,
 )
 from study_app.haptics.kernels.c_functions import (
     READ,
@@ -339,14 +335,14 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
     falcon.started = 1
     if gap:
         falcon.posed_ns = 0
-    punctual = settle(falcon, packets, gap)
+    punctual = update_delay(falcon, packets, gap)
     if packets == 0:
         falcon.missing += 1
         return READ_NOTHING_NEW
     if not punctual:
         falcon.late += 1
         return READ_NOTHING_NEW
-    if not (believe(falcon) and trust(falcon) and _locate(falcon)):
+    if not (take_status(falcon) and is_plausible(falcon) and _locate(falcon)):
         falcon.refused += 1
         return READ_NOTHING_NEW
     _follow(falcon)

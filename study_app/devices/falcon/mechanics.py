@@ -1,17 +1,15 @@
-"""The Falcon's measures, as published: three sets that disagree, so they are data and the receipt names the one used.
+"""The Falcon's mechanics: published dimensions, the grip's position from arm angles, and torques from a force.
 
-Frame of the Falcon: x right, y up, z toward the user, origin at the base [m]. Arms 1, 2, 3 are at the top, right and
-left, seen from the user. The frame of the hand is the same, moved so that its origin is ``centre_m`` in front of the
-base: there the tank of the protocols (100 x 60 x 60 mm) is reached with equal margin in and out.
+Three published sets disagree, so they are data and the receipt names the one used. Frame of the Falcon: x right, y up,
+z toward the user, origin at the base [m]. Arms 1, 2, 3 are at the top, right and left, seen from the user. The frame of
+the hand is the same, moved so that its origin is ``centre_m`` in front of the base: there the tank of the protocols
+(100 x 60 x 60 mm) is reached with equal margin in and out.
 
 Sources: ``libnifalcon`` and ``zm-redux``: libnifalcon's geometry of 2019 and of its branch of that name;
 ``martin-hillier``: Martin & Hillier, "Characterisation of the Novint Falcon Haptic Device for Application as a Robot
-Manipulator", ACRA 2009, at second hand. Loads no compiler.
+Manipulator", ACRA 2009, at second hand.
 
-
-Kinematics and statics: the grip's position from three arm angles, and torques from a force; in the Falcon's frame.
-
-For arm i at azimuth phi, with u, v, w as in ``geometry.Geometry`` and ``L = ends + sqrt(rod^2 - v^2)``::
+For arm i at azimuth phi, with u, v, w as in `Geometry` and ``L = ends + sqrt(rod^2 - v^2)``::
 
     g_i(theta_i, p) = (u - a cos theta)^2 + (w - a sin theta)^2 - L^2 = 0
 

@@ -1,12 +1,10 @@
-"""Packets of sixteen bytes each way: torques and lights out, encoders and buttons in; the stream may lose bytes.
+"""Packets to and from the Falcon, the delay of its replies, and which of them are plausible.
 
-A number is four bytes, a nibble each, the least significant first, with ``ZERO`` added; a packet is ``START``, three
-such numbers, a byte of flags or status, a byte of unknown meaning, ``STOP`` (``wire``). There is no checksum, so the
-parser accepts a packet only if every byte of it is permitted at its place, keeps a possible start of the next, and
-returns each packet once.
-
-
-The delay of a Falcon's replies, and which of them are accepted: recent ones that are plausible for a hand.
+Packets have sixteen bytes each way: torques and lights out, encoders and buttons in; the stream may lose bytes. A
+number is four bytes, a nibble each, the least significant first, with ``ZERO`` added; a packet is ``START``, three such
+numbers, a byte of flags or status, a byte of unknown meaning, ``STOP``. There is no checksum, so the parser accepts a
+packet only if every byte of it is permitted at its place, keeps a possible start of the next, and returns each packet
+once.
 
 A reply cannot be matched to its packet, so replies with a constant delay look like punctual ones after a loss. So the
 delay is measured: when for ``SLOWER_READS`` reads more replies are owed than the delay explains, or for
@@ -177,7 +175,7 @@ GIVEN_UP_READS: Final = 32
 RETEST_TICKS: Final = 30
 """For at least this many ticks after a measurement the motors receive a new command in every tick."""
 ALL_HOMED: Final = 0b111
-BELIEVED: Final = 3
+UNHOMED_PACKETS: Final = 3
 """Number of packets in a row that must report that an arm is no longer homed: a single one may be corrupted."""
 
 LEAP: Final = 24.0
@@ -186,7 +184,7 @@ DOUBTS: Final = 2  # greatest number of doubted replies in a row
 
 
 @kernel
-def settle(falcon: Any, packets: int, gap: bool) -> bool:
+def update_delay(falcon: Any, packets: int, gap: bool) -> bool:
     """Update the owed replies and the delay; return whether the received reply is recent enough."""
     owed = falcon.owed + falcon.asked - packets
     falcon.asked = 0
@@ -216,7 +214,7 @@ def _look_for_change(falcon: Any) -> None:
     if (due and falcon.retest == 0) or (not _few_owed(falcon) and falcon.delay <= MOST_DELAY):
         falcon.testing = 1
     if more and falcon.astray >= GIVEN_UP_READS:  # the force changes too much for a measurement
-        _believe_delay(falcon, falcon.owed + 1)
+        _adopt_delay(falcon, falcon.owed + 1)
 
 
 @kernel
@@ -236,7 +234,7 @@ def _measure_delay(falcon: Any, packets: int) -> None:
     if packets == 0:
         _write_off(falcon)
     if found >= falcon.delay or found == falcon.measured:
-        _believe_delay(falcon, found)
+        _adopt_delay(falcon, found)
     else:  # a reply lost may look like that: once more
         falcon.measured = found
         falcon.unsure = 1
@@ -252,7 +250,7 @@ def give_up_measurement(falcon: Any) -> None:
 
 
 @kernel
-def _believe_delay(falcon: Any, found: int) -> None:
+def _adopt_delay(falcon: Any, found: int) -> None:
     falcon.delay = found
     falcon.measured = 0
     falcon.unsure = 0
@@ -267,14 +265,14 @@ def _write_off(falcon: Any) -> None:
 
 
 @kernel
-def believe(falcon: Any) -> bool:
+def take_status(falcon: Any) -> bool:
     """Take buttons and homed arms from the newest packet; return whether its encoders count from their index."""
     status = falcon.status
     if status.homed != ALL_HOMED:
         falcon.unhomed += 1
         falcon.tracked = 0
         falcon.beyond = 0
-        if falcon.unhomed >= BELIEVED:
+        if falcon.unhomed >= UNHOMED_PACKETS:
             falcon.homed = 0
             falcon.pulled_out = 0
             falcon.share = 0.0
@@ -288,7 +286,7 @@ def believe(falcon: Any) -> bool:
 
 
 @kernel
-def trust(falcon: Any) -> bool:
+def is_plausible(falcon: Any) -> bool:
     """Return whether the encoder counts continue the arms' motion, or confirm counts doubted before."""
     counts = falcon.status.encoders
     astray, repeated = False, falcon.doubts > 0

@@ -47,7 +47,7 @@ class Transport(Protocol):
         ...
 
     def control(self, request: int, value: int) -> None:
-        """Send a control request (``wire.REQUEST_*``) with its value."""
+        """Send a control request (``constants.REQUEST_*``) with its value."""
         ...
 
     def write(self, data: bytes, timeout_s: float) -> None:

@@ -1,10 +1,7 @@
-"""The service's own settings that change the force: which values a session uses, and which it refuses. As data.
+"""How a session is opened: RFC 6455's handshake, the service's inventory, and its settings that change the force.
 
 Documents: docs.haply.co 3.5.x, "Device Configuration" (availability matrix, preset, basis, damping), "Filters" (force
 pipeline), "Mount & Workspace Transforms" (presets), "WebSocket Protocol" step 1 (shape of ``config``).
-
-
-How a connection is opened: RFC 6455's handshake, the service's inventory, and the first message's settings.
 """
 
 import base64

@@ -1,16 +1,11 @@
-"""Frames of a WebSocket client, compiled: RFC 6455 §5.2 (layout), §5.3 (masking), §5.5 (control frames).
+"""Messages to and from the Inverse Service, compiled: WebSocket frames, numbers as text, and a JSON scanner.
 
-A client masks what it sends; a server must not (§5.1). The service answers each message with one text frame, so
-fragments (§5.4) are not expected and count as a violation of the protocol.
-
-
-Numbers and texts written into bytes by compiled code.
-
-What a state message of the Inverse Service says of one device, read by a compiled JSON scanner (RFC 8259).
-
-The scanner checks the grammar of the whole message, in any order of its keys, and keeps the numbers at the places
-that it knows (``_PLACES``). Unknown keys are skipped, so that a later service may add some. A place is known by a hash
-of the keys that lead to it; an element of an array counts as the key ``*``.
+Frames follow RFC 6455 §5.2 (layout), §5.3 (masking), §5.5 (control frames). A client masks what it sends; a server must
+not (§5.1). The service answers each message with one text frame, so fragments (§5.4) are not expected and count as a
+violation of the protocol. `scan` reads what a state message says of one device (RFC 8259). It checks the grammar of the
+whole message, in any order of its keys, and keeps the numbers at the places that it knows (``_PLACES``). Unknown keys
+are skipped, so that a later service may add some. A place is known by a hash of the keys that lead to it; an element of
+an array counts as the key ``*``.
 
 Documented in docs.haply.co, version 3.5.x: "WebSocket Protocol", steps 1 and 2 (``inverse3``: ``state.cursor_position``
 [m], ``state.cursor_velocity`` [m/s], ``status``) and "HTTP", Devices (``verse_grip``, ``wireless_verse_grip``).

@@ -1,12 +1,9 @@
-"""What a 3Dconnexion SpaceMouse says: its models, its reports byte by byte, and where its deflection leads.
+"""SpaceMice as hidapi sees them: models, reports byte by byte, which are connected, and why one cannot be opened.
 
 Report 1 is the cap's displacement (three little-endian int16: right, toward the user, down), on newer models with its
 rotation behind it; report 2 the rotation of older models; report 3 the buttons, a bit each, the lowest first. Full
 deflection is about 350. Sources: pyspacemouse's table of devices, whose own observations these are; never seen here on
-a device. Loads neither the compiler nor a driver.
-
-
-SpaceMice as hidapi sees them: which are connected, which of their interfaces reports motion, and why none opens.
+a device.
 
 Known ways to fail: on Linux the device's node belongs to the administrator (a rule for udev helps); on macOS
 3Dconnexion's helper seizes it, so that it does not open or stays silent; a universal receiver shows several interfaces,

@@ -8,7 +8,8 @@ from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent
 from PySide6.QtWidgets import QDialog, QFileDialog, QGridLayout, QLineEdit, QProgressBar, QWidget
 
-from study_app.devices.doctor import ExaminationClient, Finding, Report, State, lines, start_examination
+from study_app.devices.doctor import Finding, Report, State, lines
+from study_app.devices.doctor_worker import ExaminationClient, start_examination
 from study_app.devices.registry import doctor_of, title_of
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font

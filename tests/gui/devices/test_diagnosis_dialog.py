@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 
-from study_app.devices.doctor import start_examination
+from study_app.devices.doctor_worker import start_examination
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.theme.theme import DARK, LIGHT
 from tests.compiled import needs_servo
