@@ -209,7 +209,6 @@ class _Showing:
             bridge.operator.hide()
 
     def _run(self, bridge: SessionBridge) -> None:
-        """Let the session go from its first trial to its last."""
         loop = QEventLoop()
         bridge.done.connect(loop.quit)
 
@@ -229,7 +228,6 @@ class _Showing:
         QApplication.processEvents()
 
     def _read(self, store: SessionStore, schedule: Schedule, paced: str) -> tuple[Shown, ...]:
-        """Return what the recordings say of every trial."""
         refresh_hz = self._refresh_hz or choose_screens(None)[0].refreshRate()
         screen = f"{'virtual' if self._refresh_hz is not None else 'this screen'}, {refresh_hz:.4g} Hz"
         shown = []

@@ -95,7 +95,6 @@ class LabAndDesigner(QObject):
                 act(self.designer)
 
     def _feel(self, liquids: LabLiquids) -> None:
-        """Go to the lab with liquids of the study that is edited."""
         self.go_asked.emit("lab")
         if self.lab is not None:
             self.lab.feel_of_study(liquids.a, liquids.b, liquids.study)

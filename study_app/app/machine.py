@@ -122,7 +122,6 @@ class WorkstationController(QObject):
 
 
 def _plain(settings: MachineSettings) -> dict[str, Any]:
-    """Return the values by their names, the offset as it is."""
     return {name: getattr(settings, name) for name in MachineSettings.model_fields}
 
 

@@ -187,7 +187,6 @@ class MainController(QObject):
             self.machine.place.open_test()
 
     def _show_study(self, folder: Path) -> None:
-        """Go to the results of a study."""
         self.window.place("results")
         assert self.results_controller is not None  # noqa: S101 - made with its place
         self.results_controller.choose(folder)

@@ -372,5 +372,4 @@ class ResultsController(QObject):
 
 
 def _what_to_open(order: WriteTables | WriteReport, files: tuple[Path, ...]) -> Path:
-    """Return the page of a report, or the folder of tables."""
     return files[0] if isinstance(order, WriteReport) else order.to

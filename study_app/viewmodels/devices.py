@@ -89,7 +89,6 @@ class DeviceShown:
 
     @property
     def ready(self) -> bool:
-        """Whether it can be felt with now."""
         return self.tone == "ok"
 
 
@@ -195,5 +194,4 @@ def _descriptor(name: str) -> DeviceDescriptor | None:
 
 
 def _sentence(words: str) -> str:
-    """Return a clause with a capital letter and a full stop."""
     return words[:1].upper() + words[1:] + ("" if not words or words[-1] in ".!?" else ".")

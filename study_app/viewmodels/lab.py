@@ -158,12 +158,10 @@ class LabView:
 
     @property
     def felt(self) -> Side:
-        """The side that is felt."""
         return self.workbench.felt
 
     @property
     def tail(self) -> Tail | None:
-        """The tail of the side that is felt."""
         return self.tail_a if self.felt == "A" else self.tail_b
 
 

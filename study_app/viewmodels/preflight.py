@@ -47,12 +47,10 @@ class PreflightView:
 
     @property
     def warnings(self) -> int:
-        """How many checks warn."""
         return sum(check.verdict == "warning" for check in self.checks)
 
     @property
     def failures(self) -> int:
-        """How many checks forbid the session."""
         return sum(check.verdict == "failure" for check in self.checks)
 
     @property

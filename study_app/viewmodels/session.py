@@ -275,7 +275,6 @@ def _choices(given: Mapping[str, Answer]) -> tuple[str, ...]:
 
 
 def _row_notes(row: Mapping[str, Any]) -> list[str]:
-    """Return what a trial's row says under "Notes"."""
     said = [("recording lost", row["recording_lost"]), ("marked", row["marked"])]
     return [word for word, holds in said if holds] + (row["notes"] or "").splitlines()
 

@@ -123,7 +123,6 @@ class LabController(QObject):
 
     @property
     def liquids(self) -> tuple[Choice, ...]:
-        """The liquids that a side can be set to."""
         return self._saving.liquids
 
     def leave(self) -> None:
@@ -202,7 +201,6 @@ class LabController(QObject):
 
     @guarded
     def _frame(self) -> None:
-        """Look at the servo, load what waited, and show it all."""
         if self.live is not None:
             self.live.poll()
         self.estimation.poll()
@@ -214,14 +212,12 @@ class LabController(QObject):
 
     @guarded
     def _open(self, name: str) -> None:
-        """Open a device in place of the one that is open."""
         self._let_go()
         self.device, self.trouble, self._said = name, "", ""
         self._opening.want(name)
 
     @guarded
     def _begin(self, live: Live) -> None:
-        """Feel with a device that was opened."""
         if not self._entered:
             live.close()
             return
@@ -337,7 +333,6 @@ class LabController(QObject):
 
     @guarded
     def _save(self, path: Path, setting: Setting) -> None:
-        """Write a setting as a preset."""
         if self.bench.blind:
             self.trouble = "no preset can be saved during a blind comparison: end it first"
             return
@@ -346,7 +341,6 @@ class LabController(QObject):
 
     @guarded
     def _use(self, study: Path, setting: Setting) -> None:
-        """Name a setting's liquid file in a study."""
         self._forget_trouble()
         self._saving.use(study, setting)
 

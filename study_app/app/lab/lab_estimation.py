@@ -138,7 +138,6 @@ class LabEstimation(QObject):
             self._loading = self._executor.submit(_load, self._executor)
 
     def _begin(self) -> None:
-        """Begin what is wanted."""
         assert self.estimation is not None  # noqa: S101 - begun where it is loaded
         from study_app.lab.estimation.live_estimation import Chosen  # noqa: PLC0415 - loads the compiler
 
@@ -182,7 +181,6 @@ def _load(executor: ThreadPoolExecutor) -> LiveEstimation:
 
 
 def _label(name: str) -> str:
-    """Return what people call a parameter."""
     place = "body" if name == "drag_coefficient" else "wake"
     return QUANTITIES[f"{place}.{name}"].label
 

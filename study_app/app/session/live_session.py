@@ -119,7 +119,6 @@ class LiveSession(QObject):
 
     @property
     def began(self) -> bool:
-        """Whether it was begun on the disk."""
         return self.bridge is not None
 
     @property

@@ -144,7 +144,6 @@ class OperatorMonitor:
         )
 
     def _count_faults(self) -> None:
-        """Count the servo going from well to faulty."""
         faulty = self._parts.servo.fault is not None
         self._faults += faulty and not self._faulty
         self._faulty = faulty
@@ -271,7 +270,6 @@ class Reconnection(QObject):
 
     @property
     def under_way(self) -> bool:
-        """Whether the device is being connected."""
         return self._thread is not None
 
     def begin(self) -> None:

@@ -190,7 +190,6 @@ def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
 
 
 def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, rig: Rig) -> Session:
-    """Return what the operator's window says throughout."""
     described = descriptor_of(chosen.device)
     return Session(
         protocol=protocol,

@@ -324,7 +324,6 @@ class DiagnosisDialog(QDialog):
             self.copy.show_action("check", "Copied")
 
     def _ask_where(self) -> None:
-        """Ask for a file, in a dialog that nothing waits for."""
         dialog = QFileDialog(self, "Save a zip file for support", NAME, "Zip files (*.zip)")
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix("zip")

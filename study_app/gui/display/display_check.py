@@ -92,7 +92,6 @@ def _load_plugin() -> None:
 
 
 def _reach(display: str) -> None:
-    """Connect to the X server and leave again."""
     try:
         xcb = ctypes.CDLL("libxcb.so.1")
     except OSError as error:

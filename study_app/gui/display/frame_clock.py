@@ -44,12 +44,10 @@ class Frames(QObject):
 
     @property
     def paced(self) -> str:
-        """What frames follow now, in words."""
         return LOCKED if self.locked else BY_CLOCK
 
     @property
     def next_ns(self) -> int:
-        """When the next frame is to be drawn."""
         return self._next_ns
 
     def start(self) -> None:

@@ -28,7 +28,6 @@ class ScreenShown:
 
     @property
     def words(self) -> str:
-        """Size, rate and scaling, in a line."""
         size = f"{round(self.width_px * self.scaling)} × {round(self.height_px * self.scaling)}"
         return f"{size}, {self.refresh_hz:.0f} Hz, {self.scaling:.0%}".replace("%", "\u202f%")
 

@@ -299,7 +299,6 @@ class HelpPlace(Place):
             self._go_to_origin()
 
     def _go_to_origin(self) -> None:
-        """Go to the place where help was asked for."""
         if self._came_from:
             self.go_asked.emit(self._came_from)
 

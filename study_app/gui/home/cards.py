@@ -215,7 +215,6 @@ class SessionsCard(Card):
 
     @property
     def shown(self) -> tuple[SessionFacts, ...]:
-        """The sessions whose rows stand there."""
         return self.rows.shown
 
     def show_sessions(self, found: Sequence[SessionFacts], where: str, now: datetime) -> None:

@@ -155,7 +155,6 @@ class RehearsalDialog(QDialog):
         self.cancel.setText("Close")
 
     def _let_go(self) -> None:
-        """Have the process end that has nothing to do any more."""
         self._listening.stop()
         self.progress.hide()
         if self.worker is not None:
@@ -359,7 +358,6 @@ class NewSessionDialog(QDialog):
         self.adjustSize()
 
     def _choose_device(self) -> None:
-        """Ask for another folder where the device is simulated."""
         self._suggest_folder()
         self._check()
 
@@ -488,7 +486,6 @@ class WorkspaceDialog(Question):
 
     @property
     def folder(self) -> Path:
-        """The folder in the field."""
         return Path(self.path.text().strip()).expanduser()
 
     def _choose(self) -> None:

@@ -84,7 +84,6 @@ class RailButton(Themed, PressedByEnter):
 
     @property
     def here(self) -> bool:
-        """Whether this is the place one is at."""
         return self._here
 
     @here.setter
@@ -237,7 +236,6 @@ class MainWindow(QMainWindow):
 
     @property
     def here(self) -> str:
-        """The name of the place one is at."""
         return self._here
 
     def place(self, name: str) -> Place:
@@ -328,7 +326,6 @@ class MainWindow(QMainWindow):
             notice.show()
 
     def _close_notice(self, of: str) -> None:
-        """Close what a place has said."""
         if self.notice is not None and self._notice_of == of and isValid(self.notice):
             self.notice.accept()
 

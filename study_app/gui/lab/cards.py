@@ -254,7 +254,6 @@ def _aside(view: LabView) -> str:
 
 
 def _fit(lines: list, count: int, kind: type, layout: QVBoxLayout, whole: ReadingCard) -> None:
-    """Have so many lines of a kind in a layout."""
     while len(lines) > count:
         gone = lines.pop()
         layout.removeWidget(gone)

@@ -71,7 +71,6 @@ class Legend(Themed, QWidget):
         self.setFixedHeight(LEGEND_LINE * max(1, len(lines)))
 
     def _places(self) -> list[QPointF]:
-        """Return where each entry begins."""
         metrics = QFontMetricsF(self._font)
         places, x, y = [], 0.0, LEGEND_LINE / 2
         for _, words in self._entries:

@@ -286,7 +286,6 @@ class LabTank(Themed, QWidget):
             self.let_go()
 
     def _ready(self) -> Camera:
-        """Return the camera of the present size."""
         if self.camera is None:
             room = (self.width() - 2 * MARGIN_X, self.height() - MARGIN_TOP - MARGIN_BOTTOM)
             self.camera = Camera.fitted(self.box, MARGIN_X, MARGIN_TOP, *room, pitch=PITCH)
@@ -456,7 +455,6 @@ class LabTank(Themed, QWidget):
 
 
 def _beyond(start: Point, vector: Point, scale: float) -> Point:
-    """Return where an arrow from ``start`` ends."""
     x, y, z = (a + scale * v for a, v in zip(start, vector, strict=True))
     return x, y, z
 

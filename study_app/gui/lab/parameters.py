@@ -421,7 +421,6 @@ class FormPanel(Card):
                 apply_theme_within(block, self.theme)
 
     def _stack_up(self) -> None:
-        """Place the blocks below one another, a hairline between them."""
         for rule in self._rules:
             self._column.removeWidget(rule)
             rule.hide()
@@ -436,7 +435,6 @@ class FormPanel(Card):
             self._column.insertWidget(at, part)
 
     def _order(self) -> None:
-        """Let Tab go from top to bottom."""
         before: QWidget = self.copy
         for row in self.rows.values():
             for part in row.parts():

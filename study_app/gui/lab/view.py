@@ -17,7 +17,7 @@ from study_app.gui.lab.parameters import FormPanel
 from study_app.gui.theme.theme import SPACE
 from study_app.gui.widgets.boxes import add_layout, vbox
 from study_app.gui.widgets.cards import SHADOW, scrolled
-from study_app.gui.widgets.escape_key import EscapeAnywhere
+from study_app.gui.widgets.escape_key import EscapeKey
 from study_app.gui.widgets.main_view import Place
 from study_app.lab.ab_comparison import Setting
 from study_app.viewmodels.lab import FILE, LabView
@@ -85,7 +85,7 @@ class LabPlace(Place):
         self.curves = FlowCurveRow(GAP)
         self.estimate = EstimateCard()
         self.cost, self.error, self.limiters = CostCard(), ErrorCard(), LimiterCard()
-        self._escape = EscapeAnywhere(self)
+        self._escape = EscapeKey(self, anywhere=True)
         self._lay_out()
         self._connect()
         self._shortcuts()
@@ -232,7 +232,6 @@ class LabPlace(Place):
             self.put_back_asked.emit(self._view.felt, setting)
 
     def _choose_source(self, source: str) -> None:
-        """Ask for a file where the force comes from one."""
         if source != FILE:
             self.estimate_source_chosen.emit(source, None)
         elif self._free_to_ask() is not None:

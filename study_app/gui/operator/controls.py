@@ -1,5 +1,8 @@
 """What the operator can do: stop the force, pause, repeat, exclude, end, write a note, have the device examined."""
 
+from collections.abc import Sequence
+from typing import Any
+
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
@@ -104,94 +107,54 @@ def _hint(view: OperatorView) -> str:
     return "You will be asked for a reason; both recordings are kept." if view.may_repeat else ""
 
 
-class RepeatQuestion(Question):
-    """Why the trial is to come again."""
+class ReasonQuestion(Question):
+    """A question that wants a reason, and before it a choice if there are any.
 
-    def __init__(self, parent: QWidget, theme: Theme, setting: str) -> None:
-        super().__init__(
-            parent,
-            theme,
-            "Repeat this trial?",
-            f"{setting} starts again from the beginning. The first recording is kept, together with your reason.",
-        )
-        self.setting = setting
-        self.reason = QLineEdit()
-        self.reason.setFont(font("body"))
-        self.reason.setPlaceholderText("Reason, for example: phone rang")
-        self.reason.setAccessibleName("Reason")
-        self.column.addWidget(self.reason)
-        self.add_buttons("Cancel", ActionButton("repeat", "Repeat trial", role="primary"))
-        self.go_on.setEnabled(False)
-        self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
+    Parameters
+    ----------
+    choices
+        Each value that can be chosen and its words; the last is chosen at first, unless ``first`` is.
+    about
+        What it is about: the answer to a question about something else would hit the wrong thing.
+    """
 
-
-class ExcludeQuestion(Question):
-    """What to exclude from the analysis, and why; ``trial`` is the one under way or the last, None before the first."""
-
-    def __init__(self, parent: QWidget, theme: Theme, trial: int | None, setting: str) -> None:
-        super().__init__(
-            parent,
-            theme,
-            "Exclude this from the analysis?",
-            "Nothing is deleted. The list of exclusions records what was excluded, by whom and why.",
-        )
+    def __init__(
+        self,
+        parent: QWidget,
+        theme: Theme,
+        title: str,
+        explanation: str,
+        *,
+        go_on: ActionButton,
+        placeholder: str,
+        choices: Sequence[tuple[Any, str]] = (),
+        first: bool = False,
+        back: str = "Cancel",
+        required: bool = True,
+        about: str = "",
+    ) -> None:
+        super().__init__(parent, theme, title, explanation)
+        self.about, self._values = about, [value for value, _ in choices]
         self.choices = QButtonGroup(self)
-        self._trial = trial
-        for index, words in enumerate((setting, "Whole session")):
+        for index, (_, words) in enumerate(choices):
             choice = Radio(words)
             choice.setFont(font("body"))
-            choice.setVisible(index == 1 or trial is not None)
+            choice.setChecked(index == (0 if first else len(choices) - 1))
             self.choices.addButton(choice, index)
             self.column.addWidget(choice)
-        self.choices.button(1 if trial is None else 0).setChecked(True)
         self.reason = QLineEdit()
         self.reason.setFont(font("body"))
-        self.reason.setPlaceholderText("Reason, for example: talked during the trial")
+        self.reason.setPlaceholderText(placeholder)
         self.reason.setAccessibleName("Reason")
         self.column.addWidget(self.reason)
-        self.add_buttons("Cancel", ActionButton("flag", "Exclude", role="primary"))
-        self.go_on.setEnabled(False)
-        self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
+        self.add_buttons(back, go_on)
+        if required:
+            self.go_on.setEnabled(False)
+            self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
 
     @property
-    def trial(self) -> int | None:
-        """Return the trial to leave out, None for the whole session."""
-        return self._trial if self.choices.checkedId() == 0 else None
-
-
-class EndQuestion(Question):
-    """Whether, and why, the session ends now."""
-
-    STATUSES = (("withdrawn", "The participant withdrew"), ("aborted", "Another reason"))
-
-    def __init__(self, parent: QWidget, theme: Theme, answers: str) -> None:
-        super().__init__(
-            parent,
-            theme,
-            "End this session now?",
-            f"{answers} answers are on disk and are kept. The force is turned off when the session ends.",
-        )
-        self.choices = QButtonGroup(self)
-        for index, (_, words) in enumerate(self.STATUSES):
-            choice = Radio(words)
-            choice.setFont(font("body"))
-            self.choices.addButton(choice, index)
-            self.column.addWidget(choice)
-        self.choices.button(1).setChecked(True)
-        self.choices.button(1).setFocus()
-        self.reason = QLineEdit()
-        self.reason.setFont(font("body"))
-        self.reason.setPlaceholderText("Reason (optional)")
-        self.reason.setAccessibleName("Reason")
-        self.column.addWidget(self.reason)
-        self.add_buttons("Continue the session", ActionButton("cross", "End session", role="danger"))
-        self.go_on.setDefault(False)
-        self.back.setDefault(True)
-
-    @property
-    def status(self) -> str:
-        """Return "withdrawn" or "aborted"."""
-        return self.STATUSES[self.choices.checkedId()][0]
+    def choice(self) -> Any:
+        return self._values[self.choices.checkedId()]
 
 
 class NoteField(QPlainTextEdit):

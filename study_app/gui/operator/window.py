@@ -3,6 +3,7 @@
 It draws an ``OperatorView`` and two plots, and says what the operator asks for; it knows no runner and no servo.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -11,16 +12,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QMainWindow, QWidget
 
-from study_app.gui.operator.controls import (
-    ALL_ROWS,
-    Actions,
-    DeviceCard,
-    EndQuestion,
-    ExcludeQuestion,
-    NotesCard,
-    RepeatQuestion,
-    StopPanel,
-)
+from study_app.gui.operator.controls import ALL_ROWS, Actions, DeviceCard, NotesCard, ReasonQuestion, StopPanel
 from study_app.gui.operator.header import Banner, Header
 from study_app.gui.operator.plots import ForceCard, HiddenForceCard, LatenessCard, PositionCard, Tiles
 from study_app.gui.operator.steps import NARROW, SLIM, WIDTH, Rail
@@ -28,8 +20,9 @@ from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import add_layout, vbox
 from study_app.gui.widgets.cards import Card, scrolled
+from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Notice
-from study_app.gui.widgets.escape_key import EscapeAnywhere
+from study_app.gui.widgets.escape_key import EscapeKey
 from study_app.gui.widgets.failed_panel import Panels
 from study_app.viewmodels.operator import NOTES_SHOWN, OperatorView
 from study_app.viewmodels.servo_health import Forces, ServoHealth
@@ -231,8 +224,8 @@ class OperatorWindow(QMainWindow):
                 self.notes: "Notes",
             }
         )
-        self.question: RepeatQuestion | ExcludeQuestion | EndQuestion | None = None
-        self.escape = EscapeAnywhere(self)
+        self.question: ReasonQuestion | None = None
+        self.escape = EscapeKey(self, anywhere=True)
         self.arrangement = Arrangement(
             Pieces(
                 header=self.header,
@@ -278,7 +271,7 @@ class OperatorWindow(QMainWindow):
         self.banner.show_view(view)
         self.may_close = view.over
         asked = self.question
-        if isinstance(asked, RepeatQuestion) and not self._asks_about(view, asked):
+        if asked is not None and asked.about and not (view.may_repeat and asked.about == _setting(view)):
             asked.reject()  # the trial it was about is over: its answer would hit the next one
         for part in (self.stop, self.header, self.buttons):
             part.show_view(view)
@@ -305,17 +298,38 @@ class OperatorWindow(QMainWindow):
         """Ask for the reason of a repetition; nothing happens without one."""
         if self._already_asked() or self._view is None or not self._view.may_repeat:
             return
-        question = RepeatQuestion(self, self.theme, _setting(self._view))
-        question.accepted.connect(lambda: self.repeat_asked.emit(question.reason.text().strip()))
-        self._open(question)
+        setting = _setting(self._view)
+        self._ask(
+            ReasonQuestion(
+                self,
+                self.theme,
+                "Repeat this trial?",
+                f"{setting} starts again from the beginning. The first recording is kept, together with your reason.",
+                go_on=ActionButton("repeat", "Repeat trial", role="primary"),
+                placeholder="Reason, for example: phone rang",
+                about=setting,
+            ),
+            lambda question: self.repeat_asked.emit(question.reason.text().strip()),
+        )
 
     def ask_to_exclude(self) -> None:
         """Ask what does not count, and why."""
         if self._already_asked() or self._view is None:
             return
-        question = ExcludeQuestion(self, self.theme, self._view.trial, _setting(self._view))
-        question.accepted.connect(lambda: self.exclude_asked.emit(question.trial, question.reason.text().strip()))
-        self._open(question)
+        trial = self._view.trial
+        self._ask(
+            ReasonQuestion(
+                self,
+                self.theme,
+                "Exclude this from the analysis?",
+                "Nothing is deleted. The list of exclusions records what was excluded, by whom and why.",
+                go_on=ActionButton("flag", "Exclude", role="primary"),
+                placeholder="Reason, for example: talked during the trial",
+                choices=(*([] if trial is None else [(trial, _setting(self._view))]), (None, "Whole session")),
+                first=True,
+            ),
+            lambda question: self.exclude_asked.emit(question.choice, question.reason.text().strip()),
+        )
 
     def show_message(self, title: str, sentence: str) -> None:
         notice = Notice(self, self.theme, title, sentence)
@@ -327,16 +341,26 @@ class OperatorWindow(QMainWindow):
         """Ask whether and why the session is to end now."""
         if self._already_asked() or self._view is None or self._view.over:
             return
-        question = EndQuestion(self, self.theme, dict(self._view.counts)["Answers on disk"])
-        question.accepted.connect(lambda: self.end_asked.emit(question.status, question.reason.text().strip()))
-        self._open(question)
+        question = ReasonQuestion(
+            self,
+            self.theme,
+            "End this session now?",
+            f"{dict(self._view.counts)['Answers on disk']} answers are on disk and are kept. The force is turned off "
+            "when the session ends.",
+            go_on=ActionButton("cross", "End session", role="danger"),
+            placeholder="Reason (optional)",
+            choices=(("withdrawn", "The participant withdrew"), ("aborted", "Another reason")),
+            back="Continue the session",
+            required=False,
+        )
+        question.go_on.setDefault(False)
+        question.back.setDefault(True)
+        question.choices.button(1).setFocus()
+        self._ask(question, lambda asked: self.end_asked.emit(asked.choice, asked.reason.text().strip()))
 
-    @staticmethod
-    def _asks_about(view: OperatorView, question: RepeatQuestion) -> bool:
-        return view.may_repeat and question.setting == _setting(view)
-
-    def _open(self, question: RepeatQuestion | ExcludeQuestion | EndQuestion) -> None:
+    def _ask(self, question: ReasonQuestion, answered: Callable[[ReasonQuestion], None]) -> None:
         self.question = question
+        question.accepted.connect(lambda: answered(question))
         question.finished.connect(self._question_answered)
         question.show()
 
@@ -346,7 +370,6 @@ class OperatorWindow(QMainWindow):
         self.activateWindow()
 
     def _already_asked(self) -> bool:
-        """Bring a question that is still open to the front."""
         if self.question is None:
             return False
         self.question.raise_()

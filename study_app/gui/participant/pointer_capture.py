@@ -38,7 +38,6 @@ class PointerCapture(QObject):
 
     @property
     def held(self) -> bool:
-        """Whether the pointer is held."""
         return self._widget is not None
 
     def take(self, widget: QWidget, workspace_m: tuple[float, float, float]) -> None:

@@ -75,7 +75,6 @@ class ChoiceField(OptionsField):
 
     @property
     def forward(self) -> int:
-        """Which way the key → goes."""
         return -1 if self.layoutDirection() == Qt.LayoutDirection.RightToLeft else 1
 
     @property
@@ -101,7 +100,6 @@ class ChoiceField(OptionsField):
         return height
 
     def _arrange(self, across: int) -> None:
-        """Put so many options side by side."""
         for number, option in enumerate(self.options):
             self._cells.addWidget(option, number // across, number % across)
         for column in range(MOST_ACROSS):
@@ -164,7 +162,6 @@ class NumberField(TypedField):
 
     @property
     def keys(self) -> list[QPushButton]:
-        """The keys on the screen."""
         return self._pad.keys
 
     @property
@@ -247,7 +244,6 @@ class NumberField(TypedField):
             self.take_back()
 
     def _expected(self) -> str:
-        """Return which number is permitted."""
         words, view = self._words, self._number
         kind = words.whole_number if view.whole else words.any_number
         least, most = (None if one is None else write_number(one, 9) for one in (view.least, view.most))
@@ -322,7 +318,6 @@ class RatingField(ScaleField):
         return [(0, end - 1), (end, points - end - 1), (points - end, points - 1)]
 
     def _sides(self) -> list[Qt.AlignmentFlag]:
-        """Return to which side of its columns each name stands."""
         centre = Qt.AlignmentFlag.AlignHCenter
         if len(self.labels) <= ALL_NAMED:
             return [centre] * len(self.labels)
@@ -456,7 +451,6 @@ class Line(QSlider):
         self.set_to.emit(self.value())
 
     def _hear(self, step: int) -> None:
-        """Hear a screen reader, which sets the value itself."""
         if not self.isSliderDown():
             self.touched = True
             self.update()

@@ -123,7 +123,6 @@ class TankWidget(QWidget):
 
     @property
     def page(self) -> TaskPage:
-        """The page that is drawn."""
         return self._page
 
     @property
@@ -220,7 +219,6 @@ class TankWidget(QWidget):
         self._tell()
 
     def _made_pane(self) -> QWidget:
-        """Return a surface of the graphics card that fills the widget."""
         from study_app.gui.participant.tank.layers import Pane  # noqa: PLC0415 - OpenGL: only where it is drawn with
 
         pane = Pane(self, self._paint)
@@ -307,7 +305,6 @@ class TankWidget(QWidget):
         return tuple(target_place(self.camera, self._box, centre, around_m) for centre in centres_m)
 
     def _frame(self) -> dict[str, Placed]:
-        """Return the things of the present view."""
         task = self._task
         lit = task.lit if task else None
         if isinstance(self._page.task, Follow):

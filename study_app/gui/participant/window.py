@@ -31,7 +31,7 @@ from study_app.gui.participant.pointer_capture import BUTTONS, PointerCapture
 from study_app.gui.participant.tank_widget import TankWidget, paint_ahead
 from study_app.gui.theme.theme import PARTICIPANT, font, load_fonts, stylesheet
 from study_app.gui.widgets.accessible import give_role
-from study_app.gui.widgets.escape_key import EscapeHold
+from study_app.gui.widgets.escape_key import EscapeKey
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import (
     DesignPage,
@@ -131,7 +131,7 @@ class ParticipantWindow(QWidget):
         self._ahead.setSingleShot(True)
         self._ahead.setInterval(AHEAD_MS)
         self._ahead.timeout.connect(self._paint_ahead)
-        self._escape = EscapeHold(self)
+        self._escape = EscapeKey(self)
         self._escape.held.connect(self._stop_force)
         self._escape.tapped.connect(self._pause)
         self.installEventFilter(self._escape)
@@ -152,7 +152,6 @@ class ParticipantWindow(QWidget):
 
     @property
     def widget(self) -> PageWidget | TankWidget:
-        """What draws the page."""
         return self._widget
 
     @property
@@ -205,7 +204,6 @@ class ParticipantWindow(QWidget):
             self._put(self._make(page, self._widget))
 
     def _put(self, made: PageWidget | TankWidget) -> None:
-        """Put a widget in place of the present one."""
         old = self._widget
         if isinstance(old, TankWidget):
             old.painted.disconnect(self.painted)  # a late frame of one trial's tank must not begin the next trial
@@ -293,7 +291,6 @@ class ParticipantWindow(QWidget):
             self.painting = paint_ahead(self._page.coming, self._words, self.text_scale, size, ratio)
 
     def _wait_page(self, words_said: str) -> ReadingPage:
-        """Return a page that asks for a moment's patience."""
         column = ("clock", words_said, (), PARTICIPANT.accent)
         return ReadingPage(column, self._words, self._clock, parent=self, text_scale=self.text_scale)
 
@@ -313,7 +310,6 @@ class ParticipantWindow(QWidget):
         self.setAccessibleName(self.windowTitle())
 
     def _room(self) -> QRect:
-        """Return where pages are."""
         frame = self.frame_px
         above = self.strip.height() if self.strip is not None else 0
         return self.rect().adjusted(frame, frame + above, -frame, -frame)

@@ -138,7 +138,6 @@ class WriteDialog(QDialog):
         self.write_asked.emit(Path(self.to.value).expanduser(), extras)
 
     def _shrink(self) -> None:
-        """Shrink the dialog to the height of its present contents."""
         layout = self.layout()
         if layout is not None:
             layout.activate()

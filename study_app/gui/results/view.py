@@ -144,7 +144,6 @@ class ExclusionsCard(Card):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
 
     def _line(self, one: LeftOut) -> QWidget:
-        """Return one decision with the way to take it back."""
         back = ActionButton("undo", "Include again …", role="plain", height=30)
         back.setAccessibleName(f"Include again: {one.what}")
         back.clicked.connect(lambda: self.take_back_asked.emit(one))

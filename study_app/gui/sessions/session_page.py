@@ -209,7 +209,6 @@ class MotionPlot(Themed, QWidget):
 
     @property
     def points(self) -> int:
-        """How many points each curve has."""
         return len(self._times_s)
 
     def show_motion(self, times_s: NDArray[np.float64], positions_m: NDArray[np.float64]) -> None:
@@ -451,7 +450,6 @@ class SessionPage(QDialog):
 
     @property
     def chosen(self) -> TrialRecord | None:
-        """The trial whose row is chosen."""
         row = self.trials.chosen_row
         return None if row is None else self.model.trials[row]
 
@@ -516,7 +514,6 @@ class SessionPage(QDialog):
 
 
 def _result(read: Callable[[Path], Any], path: Path) -> Any:
-    """Return what ``read`` returns, or the refusal."""
     try:
         return read(path)
     except StoreError as error:

@@ -135,7 +135,6 @@ class SessionsTable(QWidget):
 
     @property
     def shown(self) -> tuple[SessionFacts, ...]:
-        """The sessions that stand there."""
         return self.model.shown
 
     @property

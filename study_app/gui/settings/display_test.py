@@ -248,7 +248,6 @@ class DisplayTest(QWidget):
         vbox(head, self._figures(), ramp, fields, self._foot(), spacing=18, margins=(40, 32, 40, 32), parent=self)
 
     def _figures(self) -> QGridLayout:
-        """Return the live figures, a name over each."""
         grid = QGridLayout()
         grid.setHorizontalSpacing(40)
         grid.setVerticalSpacing(2)
@@ -260,7 +259,6 @@ class DisplayTest(QWidget):
         return grid
 
     def _fields(self) -> QBoxLayout:
-        """Return the fields of lines, and what to look for in them."""
         fields = [(LineField(thick, standing=standing), 2) for thick in (1, 2) for standing in (True, False)]
         words = label(
             "Every line is 1 or 2 pixels wide. If a field looks uniformly grey, shimmers or shows broad bands, the "

@@ -250,7 +250,6 @@ class MachinePlace(Place):
 
     @property
     def participants(self) -> ScreenShown:
-        """The participant's screen."""
         return self._screens[self.settings.screen_among([screen.name for screen in self._screens]) - 1]
 
     def show_settings(self, settings: MachineSettings, *, folder: str, undo: str, kept_in: str) -> None:

@@ -7,55 +7,38 @@ from PySide6.QtWidgets import QWidget
 HOLD_MS = 600
 
 
-class EscapeHold(QObject):
-    """An event filter that sees Esc go down and up in a window and its parts, whichever has the focus.
+class EscapeKey(QObject):
+    """An event filter that sees Esc go down and up, whichever part of a window has the keyboard.
 
-    ``held`` comes once it has been down for 600 ms, whatever the window shows meanwhile; ``tapped`` where it came up
-    before. A window that is left ends it without either.
+    ``held`` comes once it has been down for 600 ms, whatever is shown meanwhile, ``tapped`` where it came up before.
+    The keyboard's own repetition counts for neither. A window that is left ends a hold without either.
+
+    Parameters
+    ----------
+    anywhere
+        Whether it listens by itself to the window of the program that has the keyboard, later ones too. A question
+        closes when Esc goes down, and a page may take the keyboard while it is down: then only the release ends a hold,
+        in whatever window that is. A hold that began in the window it was left to (``leave_to``) is that window's, as
+        long as no other one of the program has got the keyboard since.
     """
 
     held = Signal()
     tapped = Signal()
 
-    def __init__(self, parent: QObject) -> None:
+    def __init__(self, parent: QObject, *, anywhere: bool = False) -> None:
         super().__init__(parent)
-        self._timer = _timer(self)
-        self._timer.timeout.connect(self.held)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Start at the first press, stop at the release; the keyboard's own repetition counts for neither."""
-        if isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape and not event.isAutoRepeat():
-            if event.type() == QEvent.Type.KeyPress:
-                self._timer.start()
-            elif event.type() == QEvent.Type.KeyRelease and self._timer.isActive():
-                self._timer.stop()
-                self.tapped.emit()
-        elif event.type() == QEvent.Type.WindowDeactivate:
-            self._timer.stop()
-        return super().eventFilter(watched, event)
-
-
-class EscapeAnywhere(QObject):
-    """Hears Esc held in whichever window of the program has the keyboard, those that open later too.
-
-    A question closes when Esc goes down, and a page may take the keyboard while it is down: only its release ends a
-    hold, in whatever window that is. A hold that began in the window it was left to (``leave_to``) is that window's,
-    as long as no other one of the program has got the keyboard since.
-    """
-
-    held = Signal()
-
-    def __init__(self, parent: QObject) -> None:
-        super().__init__(parent)
+        self._anywhere = anywhere
         self._aside: QWidget | None = None
         self._began_aside = False
         self._watched: QWindow | None = None
-        self._timer = _timer(self)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(HOLD_MS)
         self._timer.timeout.connect(self._fire)
         application = QGuiApplication.instance()
-        if isinstance(application, QGuiApplication):
+        if anywhere and isinstance(application, QGuiApplication):
             application.focusWindowChanged.connect(self._watch)
-        self._watch(QGuiApplication.focusWindow())
+            self._watch(QGuiApplication.focusWindow())
 
     def leave_to(self, window: QWidget) -> None:
         """Let ``window`` hear its own."""
@@ -63,14 +46,16 @@ class EscapeAnywhere(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
-        if kind not in {QEvent.Type.KeyPress, QEvent.Type.KeyRelease} or not isinstance(event, QKeyEvent):
+        if kind == QEvent.Type.WindowDeactivate and not self._anywhere:
+            self._timer.stop()
+        if not isinstance(event, QKeyEvent) or event.key() != Qt.Key.Key_Escape or event.isAutoRepeat():
             return False
-        if event.key() == Qt.Key.Key_Escape and not event.isAutoRepeat():
-            if kind == QEvent.Type.KeyRelease:
-                self._timer.stop()
-            elif not self._timer.isActive():
-                self._began_aside = self._is_aside(watched)
-                self._timer.start()
+        if kind == QEvent.Type.KeyPress and not self._timer.isActive():
+            self._began_aside = self._is_aside(watched)
+            self._timer.start()
+        elif kind == QEvent.Type.KeyRelease and self._timer.isActive():
+            self._timer.stop()
+            self.tapped.emit()
         return False
 
     def _watch(self, window: QWindow | None) -> None:
@@ -87,10 +72,3 @@ class EscapeAnywhere(QObject):
         now = QGuiApplication.focusWindow()
         if not (self._began_aside and (now is None or self._is_aside(now))):
             self.held.emit()
-
-
-def _timer(parent: QObject) -> QTimer:
-    timer = QTimer(parent)
-    timer.setSingleShot(True)
-    timer.setInterval(HOLD_MS)
-    return timer

@@ -118,7 +118,6 @@ def _widgets(trace: TracebackType | None) -> Iterator[QWidget]:
 
 
 def _owner(frame: FrameType) -> object:
-    """Return the first argument of the function that a frame runs."""
     code = frame.f_code
     if not code.co_argcount:
         return None

@@ -85,17 +85,14 @@ class Slider(Themed, QSlider):
 
     @property
     def number(self) -> float:
-        """The number the slider is at."""
         return self._value
 
     @property
     def tick(self) -> float | None:
-        """The number marked on the track."""
         return self._tick
 
     @property
     def dragged(self) -> bool:
-        """Whether the knob is held."""
         return self._dragged
 
     def show_number(self, span: Range, value: float, tick: float | None = None) -> None:

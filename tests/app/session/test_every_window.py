@@ -116,7 +116,7 @@ def test_held_escape_stops_the_force(
 def test_tapped_escape_leaves_the_force(
     bridge: Bridge, world: World, qtbot: Any, open_: Callable[[Bridge], QWidget]
 ) -> None:
-    holds = bridge.operator.escape, bridge.participant.findChild(escape_key.EscapeHold)
+    holds = bridge.operator.escape, bridge.participant.findChild(escape_key.EscapeKey)
     timers = [hold.findChild(QTimer) for hold in holds]
     for timer in timers:
         timer.setInterval(LONG_MS)  # the release comes before, however slow the machine is

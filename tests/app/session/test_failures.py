@@ -10,7 +10,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.widgets.dialogs import Notice
-from study_app.gui.widgets.escape_key import EscapeHold
+from study_app.gui.widgets.escape_key import EscapeKey
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.session.transitions.events import EndAsked
 from tests.app.world import begin_trial
@@ -68,8 +68,8 @@ def tap(bridge):
 
 
 def write_note(bridge):
-    bridge.operator.controls.field.setPlainText("left-handed")
-    bridge.operator.controls.field.entered.emit()
+    bridge.operator.notes.field.setPlainText("left-handed")
+    bridge.operator.notes.field.entered.emit()
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def write_note(bridge):
         (
             "participant.window.ParticipantWindow",
             "_pause",
-            lambda bridge: bridge.participant.findChild(EscapeHold).tapped.emit(),
+            lambda bridge: bridge.participant.findChild(EscapeKey).tapped.emit(),
         ),
     ],
 )

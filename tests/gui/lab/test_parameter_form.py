@@ -9,7 +9,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
 from study_app.gui.lab.parameters import NumberRow
-from study_app.gui.widgets.escape_key import HOLD_MS, EscapeAnywhere
+from study_app.gui.widgets.escape_key import HOLD_MS, EscapeKey
 from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import blind, heard
 from tests.gui.walk import settle
@@ -132,7 +132,7 @@ def test_esc_held_stops_the_force_from_any_part_also_while_a_preset_is_being_sav
     place.header.save.click()
     place.hide()
     assert place.dialog is None, "a dialog goes with the place"
-    place.findChild(EscapeAnywhere).held.emit()
+    place.findChild(EscapeKey).held.emit()
     assert len(said) == 1, "Esc held elsewhere asks nothing of a lab that was left"
 
 

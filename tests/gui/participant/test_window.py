@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
 from study_app.gui.participant.window import LEAST_SIZE
-from study_app.gui.widgets.escape_key import HOLD_MS, EscapeHold
+from study_app.gui.widgets.escape_key import HOLD_MS, EscapeKey
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import EndPage, FeedbackPage, Page, PausePage, TroublePage
 from study_app.session.transitions.events import Chosen, Continue, ForceStopped, PauseAsked, ResumeAsked
@@ -304,5 +304,5 @@ def test_escape_held_while_the_window_is_left_stops_nothing(opened: Participant)
     QTest.keyPress(opened.focus, KEY.Key_Escape)
     QApplication.sendEvent(opened.window, QEvent(QEvent.Type.WindowDeactivate))
     QTest.keyRelease(opened.focus, KEY.Key_Escape)
-    assert not opened.window.findChild(EscapeHold).findChild(QTimer).isActive()
+    assert not opened.window.findChild(EscapeKey).findChild(QTimer).isActive()
     assert opened.events == []

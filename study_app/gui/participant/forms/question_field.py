@@ -214,7 +214,6 @@ class QuestionField(QWidget):
 
     @property
     def note(self) -> str:
-        """The small line under the words."""
         if self.missing:
             return self._words.please_answer
         return "" if self.view.required else self._words.optional
@@ -602,7 +601,6 @@ class OptionsField(QuestionField):
 
     @property
     def digits(self) -> int:
-        """How many options digits choose."""
         return min(MOST_DIGITS, len(self.options))
 
     @property
@@ -727,7 +725,6 @@ class ScaleField(OptionsField):
 
     @property
     def chosen(self) -> tuple[int, ...]:
-        """The place of the answer in the row."""
         if not self.is_answered:
             return ()
         return (self.value - 1 if isinstance(self.value, int) else len(self.points),)

@@ -259,12 +259,10 @@ class QuestionsPage(PageWidget):
 
     @property
     def part(self) -> tuple[QuestionField, ...]:
-        """The questions of the part that is shown."""
         return tuple(self.parts[self._part]) if self.parts else ()
 
     @property
     def button(self) -> QPushButton:
-        """The button that goes on."""
         return self.foot.button
 
     @property
@@ -292,7 +290,6 @@ class QuestionsPage(PageWidget):
 
     @property
     def _first(self) -> QuestionField:
-        """The first question without an answer."""
         asked = self.asked
         return next((field for field in asked if not field.is_answered), asked[0])
 
@@ -364,7 +361,6 @@ class QuestionsPage(PageWidget):
         self._tell()
 
     def _tab_parts(self) -> None:
-        """Offer the parts by the numbers of their questions."""
         wanted = self.parts if len(self.parts) > 1 else []
         while len(self.tabs) > len(wanted):
             tab = self.tabs.pop()
@@ -393,7 +389,6 @@ class QuestionsPage(PageWidget):
         return tab
 
     def _tell(self) -> None:
-        """Bring the foot up to date."""
         asked = self.asked
         here = self.focusWidget()
         question = question_of(here) if here is not None else self._first  # where the keyboard will be

@@ -112,7 +112,6 @@ class PageWidget(QWidget):
 
     @property
     def words_scale(self) -> float:
-        """How much larger than designed words are."""
         return words_scale(self.width(), self.height(), self._text_scale)
 
     def lay_out(self, scale: float) -> None:

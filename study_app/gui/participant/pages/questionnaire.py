@@ -65,12 +65,10 @@ class Grid:
 
     @property
     def cell_width(self) -> float:
-        """The width of a cell of the scale."""
         return self.cell_pitch - CELL_GAP * self.scale
 
     @property
     def cell_height(self) -> float:
-        """The height of every cell."""
         return min(self.pitch - (4 if self.tight else 7) * self.scale, 50 * max(self.scale, 0.8 * self.text))
 
     @property
@@ -235,7 +233,6 @@ class StatementField(ScaleField):
         return face, note_face, height, QFontMetricsF(note_face).height() if note else 0.0
 
     def _tell(self) -> None:
-        """Write the words as large as the row can hold them."""
         super()._tell()
         if self.sizes is not None:
             face, note_face, *_ = self.fitted(self.sizes, self.note) or self._smallest(self.sizes, self.note)

@@ -354,7 +354,6 @@ class TextWidget(ReadingPage):
         self.count_label.move(left, place.center().y() - size.height() // 2)
 
     def _lay_out_head(self, scale: float, margin: int, top: int) -> int:
-        """Put the languages into the upper corner where lines end."""
         if self.languages is None:
             return top
         self.languages.set_scale(min(scale, self._room_for_languages(margin)))

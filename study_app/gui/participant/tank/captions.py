@@ -188,7 +188,6 @@ class Captions:
 
     @property
     def setting_keys(self) -> str:
-        """Which keys set a level, in a line."""
         words = self._words
         return f"← {words.less} · {words.more} → · {words.enter_key}: {words.done}"
 
@@ -203,7 +202,6 @@ class Captions:
         return f"{words.continue_now} · {both}", words.continue_in.format(seconds=999), counted, words.time_is_up
 
     def _draw_foot(self, painter: QPainter) -> None:
-        """Draw the way to pause."""
         fine, words = self._fine, self._words
         key, _ = key_size(words.escape_key, 1.1 * fine)
         cap = self._placed(QRectF(self._foot.left(), self._foot.top(), key, self._foot.height()))

@@ -118,7 +118,6 @@ class VideoLayer:
 
     @property
     def thing(self) -> Placed:
-        """The video as a thing of a frame."""
         return Placed(None if self._frame is None else self._frame.number, self.place)
 
     def size(self, ratio: float) -> tuple[int, int]:
