@@ -69,9 +69,8 @@ def take_designer(camera: Camera, results: Path, theme: Theme) -> None:
 def _take_sizes(camera: Camera, main: MainController, name: str) -> None:
     designer = main.lab_and_designer.designer
     assert designer is not None  # noqa: S101 - it was waited for
-    slow = designer.measures.slow
     for width, height in SIZES:
         main.window.resize(width, height)
         camera.wait(SETTLED_MS)
-        camera.until(lambda: not slow.waits, "the simulations")
+        camera.until(lambda: not designer.measures.waits, "the simulations")
         camera.take(main.window, f"designer-{name}-{width}")

@@ -28,17 +28,13 @@ BIAS: Final = 0.1
 COVERAGE: Final = 0.93
 """A threshold can be measured if the mean estimate is within the bias and so many 95 % intervals hold it. [choice]"""
 
-Watch: TypeAlias = Callable[[int, int], None]
-"""Called with the number of finished simulations and of all; raises `GivenUp` to end them."""
+Check: TypeAlias = Callable[[], None]
+"""Called between batches of simulations; raises to end them."""
 Values: TypeAlias = tuple[float, ...]
 
 
-def unwatched(_done: int, _total: int) -> None:
+def unchecked() -> None:
     """Let simulations come to their end."""
-
-
-class GivenUp(Exception):
-    """A simulation was stopped before its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,24 +95,21 @@ class Measurable:
     planted: tuple[Planted, ...]
 
 
-def observe(plan: ThresholdPlan, threshold: float, lapses: float, watch: Watch = unwatched) -> Observed | None:
-    """Return what observers with a threshold (a level) show; None where tracks of the method are not simulated.
-
-    ``watch`` may raise `GivenUp`.
-    """
+def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check = unchecked) -> Observed | None:
+    """Return what observers with a threshold (a level) show; None where tracks of the method are not simulated."""
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     u = stimulus.coordinate(threshold)
     medians, course, presented = [], None, []
     first: Answered | None = None
-    for done in range(0, OBSERVERS, AT_ONCE):
-        watch(done, OBSERVERS)
+    for _ in range(0, OBSERVERS, AT_ONCE):
+        check()
         answered = plan.answered(np.full(AT_ONCE, u), random, lapses)
         if answered is None:
             return None
         medians.append(plan.estimates(answered).medians)
         presented += [one.levels[~np.isnan(one.levels)] for one in answered.tracks]
         if first is None:
-            first, course = answered, _course(plan, answered, watch)
+            first, course = answered, _course(plan, answered, check)
     assert first is not None  # noqa: S101 - there is a first one
     found, planted = np.concatenate(medians), replace(first.observers, thresholds=np.array(u))
     errors = (found - u) * math.log(10) if stimulus.spacing == "log" else (found - u) / u
@@ -139,21 +132,22 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, watch: Watch =
 
 
 def measurable(
-    plan: ThresholdPlan, lapses: float, least: float, watch: Watch = unwatched, most: float = math.inf
+    plan: ThresholdPlan, lapses: float, least: float, check: Check = unchecked, most: float = math.inf
 ) -> Measurable | None:
     """Return which thresholds a block can measure; None where tracks of the method are not simulated.
 
     ``lapses`` is the lapse rate of the observers. No threshold counts below the level ``least``, twice the largest
-    error of a valid trial, or above ``most``, the highest one that is presented in full. ``watch`` may raise `GivenUp`.
+    error of a valid trial, or above ``most``, the highest one that is presented in full. ``check``
+    is called between batches and raises to end the simulation.
     """
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     found: list[Planted] = []
     planted = [(u, stimulus.level_of(u)) for u in np.linspace(*stimulus.domain, PLANTED).tolist()]
     planted = [(u, threshold) for u, threshold in planted if least <= threshold <= most and threshold > 0]
-    for number, (u, threshold) in enumerate(planted):
+    for u, threshold in planted:
         levels, held = [], []
-        for done in range(0, OBSERVERS, AT_ONCE):
-            watch(number * OBSERVERS + done, len(planted) * OBSERVERS)
+        for _ in range(0, OBSERVERS, AT_ONCE):
+            check()
             answered = plan.answered(np.full(AT_ONCE, u), random, lapses)
             if answered is None:
                 return None
@@ -191,12 +185,12 @@ def _asked(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float],
     return tuple((plan.stimulus.level_of(u), share) for u, share in zip(places.tolist(), counts.tolist(), strict=True))
 
 
-def _course(plan: ThresholdPlan, answered: Answered, watch: Watch) -> tuple[tuple[int, Values], ...]:
+def _course(plan: ThresholdPlan, answered: Answered, check: Check) -> tuple[tuple[int, Values], ...]:
     """Return the quantiles of the estimates after some numbers of trials."""
     each, tracks = answered.tracks[0].levels.shape[1], len(answered.tracks)
     found: list[tuple[int, Values]] = []
     for number in sorted({round(one) for one in np.geomspace(1, each, min(COURSE, each))}):
-        watch(0, OBSERVERS)
+        check()
         medians = plan.estimates(answered, most=number).medians
         quantiles = (plan.stimulus.level_of(one) for one in np.quantile(medians, SHARES).tolist())
         found.append((number * tracks, tuple(quantiles)))

@@ -1,7 +1,9 @@
-"""What simulated studies of so many participants find: values that the worker of slow numbers answers with."""
+"""What simulated observers and studies of a block find: what the worker of the tab Measures answers."""
 
 from dataclasses import dataclass
 from typing import Final
+
+from study_app.authoring.measures.observers import Measurable, Observed
 
 ENOUGH: Final = 0.8
 """Participants are enough where so many simulated studies are as precise as planned."""
@@ -46,3 +48,20 @@ class Detectable:
     studies: int
     points: int
     findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """What was simulated of an element, each part None until it was answered for the first time.
+
+    ``waiting`` is said of numbers that are of an earlier study while others are simulated, ``failed`` why they cannot
+    be; both are "" otherwise. ``warnings`` are those of ``check`` that take simulated observers.
+    """
+
+    observed: Observed | None = None
+    measurable: Measurable | None = None
+    group: GroupPrecision | None = None
+    detectable: Detectable | None = None
+    warnings: tuple[str, ...] = ()
+    waiting: str = ""
+    failed: str = ""

@@ -7,17 +7,15 @@ import numpy as np
 import pytest
 
 from study_app.analysis.planning.threshold_studies import Case, study_batch
-from study_app.app.designer.measures.measures_worker import Measuring
-from study_app.app.designer.measures.wanted import wanted_of
 from study_app.authoring.edited_study import read
 from study_app.authoring.measures import observers
-from study_app.authoring.measures.observers import OBSERVERS, PLANTED, GivenUp, measurable, observe
+from study_app.authoring.measures.observers import measurable, observe
 from study_app.authoring.new_study import template
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
 from study_app.protocol.source.files import shipped_file
 from study_app.protocol.trials.presented_levels import LevelLimits, clipping
-from study_app.viewmodels.designer.measures.measures_view import Controls, focus_of
+from study_app.viewmodels.designer.measures.measures_view import focus_of
 
 CLIPPED = Set(("stimuli", "damping", "standards"), [32]), Set(("stimuli", "damping", "levels"), [0.02, 2.0])
 FULL = 53 / 32 - 1
@@ -103,9 +101,11 @@ def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
         protocol = template("viscosity-jnd").edited(*changes)[0].formed
         assert protocol is not None
         focus = focus_of(protocol, ("blocks", "viscosity"))
-        (wanted,) = [one for one in wanted_of(protocol, focus, Controls()) if isinstance(one, Measuring)]
-        assert wanted.most == pytest.approx(most, rel=1e-4)
-        assert (wanted.plan.clipping is None) == (changes is unpaced)  # fast motions are repeated, not answered
+        assert focus.plan is not None
+        clips = clipping(protocol, protocol.blocks["viscosity"])
+        assert clips is not None
+        assert clips.highest(focus.plan.stimulus) == pytest.approx(most, rel=1e-4)
+        assert (focus.plan.clipping is None) == (changes is unpaced)  # fast motions are repeated, not answered
     limits = LevelLimits(None, 40.0, 0.1)
     known = clipping(protocol, protocol.blocks["viscosity"], limits)
     assert known is not None
@@ -189,17 +189,16 @@ def test_thresholds_beyond_the_levels_are_not_measurable_and_none_below_the_erro
 
 
 def test_a_simulation_is_given_up_when_asked() -> None:
-    told = []
+    asked = 0
 
-    def watch(done: int, total: int) -> None:
-        told.append((done, total))
-        if done:
-            raise GivenUp
+    def check() -> None:
+        nonlocal asked
+        asked += 1
+        if asked > 3:
+            raise InterruptedError
 
-    with pytest.raises(GivenUp):
-        observe(plan_of(4), 0.2, 0.02, watch)
-    assert (told[0], told[-1]) == ((0, OBSERVERS), (100, OBSERVERS))
-    assert told.count((0, OBSERVERS)) > 1  # asked while the course is computed, too
-    with pytest.raises(GivenUp):
-        measurable(plan_of(4), 0.02, 0.0, watch)
-    assert told[-1] == (100, PLANTED * OBSERVERS)
+    with pytest.raises(InterruptedError):
+        observe(plan_of(4), 0.2, 0.02, check)
+    with pytest.raises(InterruptedError):
+        measurable(plan_of(4), 0.02, 0.0, check)
+    assert asked == 5

@@ -9,6 +9,7 @@ from study_app.app.designer.participant.shown_step import showing
 from study_app.app.designer.participant.sound_part import sound_part
 from study_app.app.designer.play.playable import NotPlayableError, playable
 from study_app.authoring.edited_study import Study, read
+from study_app.authoring.measures.planned import Simulated
 from study_app.authoring.names import blocks_using
 from study_app.authoring.new_study import template
 from study_app.authoring.repairs import repairs
@@ -19,7 +20,8 @@ from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.files import shipped_file
 from study_app.viewmodels.designer.element_facts import used_by
 from study_app.viewmodels.designer.form.form_rows import form
-from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
+from study_app.viewmodels.designer.measures.level_plots import Controls
+from study_app.viewmodels.designer.measures.measures_view import measures_view
 from study_app.viewmodels.designer.outline_rows import outline_rows
 from study_app.viewmodels.designer.problem_rows import problem_rows
 from tests.authoring.grown import PROTOCOLS
@@ -98,7 +100,7 @@ def test_a_value_of_a_wrong_type_is_a_fault_that_every_view_shows(name: str, pat
         if not isinstance(value_at(study.document, selected), dict):
             continue
         form(study, selected)
-        measures_view(study, known, selected, Controls(), SlowResults(), dict.fromkeys(problems, ()))
+        measures_view(study, known, selected, Controls(), Simulated(), dict.fromkeys(problems, ()))
         if protocol is not None:
             showing(protocol, selected)
         with pytest.raises(NotPlayableError):

@@ -9,7 +9,7 @@ import pytest
 from study_app.authoring.additions import additions_for
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.measures.observers import Asked, Measurable, Observed, Planted
-from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision
+from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision, Simulated
 from study_app.authoring.outline import outline
 from study_app.authoring.repairs import repairs
 from study_app.authoring.study_facts import facts
@@ -19,8 +19,8 @@ from study_app.viewmodels.designer.element_facts import brief, used_by
 from study_app.viewmodels.designer.file_text import file_text
 from study_app.viewmodels.designer.finding import found_fields
 from study_app.viewmodels.designer.form.form_rows import form, position_of
-from study_app.viewmodels.designer.measures.level_plots import Simulated
-from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
+from study_app.viewmodels.designer.measures.level_plots import Controls
+from study_app.viewmodels.designer.measures.measures_view import measures_view
 from study_app.viewmodels.designer.outline_rows import outline_rows
 from study_app.viewmodels.designer.problem_rows import problem_rows
 from study_app.viewmodels.designer.prompts import series_prompt, series_titles
@@ -66,7 +66,7 @@ class Shown:
         yield f"brief: {brief(document, path)} | {used_by(document, path)} | {position_of(document, path)}"
         yield f"lines: {marked.selected} {marked.faulty}"
         yield from value_lines(form(study, path), "form")
-        yield from self.note("measures", measures_view(study, facts(study), path, Controls(12), SlowResults(), {}))
+        yield from self.note("measures", measures_view(study, facts(study), path, Controls(12), Simulated(), {}))
         yield from self.note("to add", tuple(addable(study, path)))
         if (prompt := series_prompt(study, path)) is not None:
             yield from value_lines(prompt)
@@ -105,21 +105,21 @@ OBSERVED = Observed(
 )  # fmt: skip
 GROUP = GroupPrecision(12, 60, 0.15, 80, 0.7, 107, 0.9, 60, 14)
 SIMULATED = {
-    "viscosityjnd": SlowResults(
-        Simulated(OBSERVED, Measurable((0.05, 0.4), (Planted(0.19, 0.01, 0.95),)), GROUP, threshold=0.19, planned=12),
-        ranges={"viscosity": (0.05, 0.5), "training": None}, warnings=("methods.adaptive.trials: few trials",),
+    "viscosityjnd": Simulated(
+        OBSERVED, Measurable((0.05, 0.4), (Planted(0.19, 0.01, 0.95),)), GROUP,
+        warnings=("methods.adaptive.trials: few trials",),
     ),
-    "thickness": SlowResults(Simulated(measurable=Measurable(None, ()), failed={"observed": "The process ended."})),
-    "physical2": SlowResults(detectable=Detectable(12, 200, 7, (Finding("thick", 0.5), Finding("wet", None))), parts=2),
+    "thickness": Simulated(measurable=Measurable(None, ()), failed="The process ended."),
+    "physical2": Simulated(detectable=Detectable(12, 200, 7, (Finding("thick", 0.5), Finding("wet", None)))),
 }  # fmt: skip
 """What simulations could answer, by study: the cards of blocks show it."""
 
 
-def of_blocks(study: Study, slow: SlowResults) -> Iterator[str]:
+def of_blocks(study: Study, simulated: Simulated) -> Iterator[str]:
     for name in study.document["blocks"]:
         for people in (1, 13):
-            controls = Controls(people, planned=12)
-            yield from value_lines(measures_view(study, facts(study), ("blocks", name), controls, slow, {}))
+            controls = Controls(people, threshold=0.19, planned=12)
+            yield from value_lines(measures_view(study, facts(study), ("blocks", name), controls, simulated, {}, 2))
 
 
 @pytest.mark.parametrize("name", [STUDIES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in STUDIES[1:])])

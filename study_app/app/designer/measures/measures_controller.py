@@ -1,44 +1,50 @@
-"""The tab Measures: instant numbers once the window is idle after an edit, slow ones when the keyboard rests."""
+"""The tab Measures: instant numbers once the window is idle after an edit, simulated ones when the keyboard rests."""
 
+import logging
+from collections import OrderedDict
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.app.designer.editing import Editing
-from study_app.app.designer.measures.measures_worker import Advising, Detecting, Grouping, Measuring, Observing, Wanted
 from study_app.app.designer.measures.page_fit import PageFit
-from study_app.app.designer.measures.slow_numbers import SlowNumbers
-from study_app.app.designer.measures.wanted import (
+from study_app.app.designer.measures.simulation import (
     LAPSES,
-    measuring,
+    MeasureClient,
+    Simulation,
+    advises,
     participants_of,
     planned_of,
     precision_of,
+    simulation_of,
+    start_measure_worker,
     threshold_of,
-    wanted_of,
 )
 from study_app.app.designer.repair_search import RepairSearch
 from study_app.authoring.edited_study import Study
 from study_app.authoring.kept_settings import keep_setting, kept_participants
-from study_app.authoring.measures.observers import Measurable, Observed
-from study_app.authoring.measures.planned import Detectable, GroupPrecision
+from study_app.authoring.measures.planned import Simulated
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study_facts import facts
 from study_app.gui.designer.view import DesignerPlace
-from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.measures.level_plots import Simulated
+from study_app.viewmodels.designer.measures.level_plots import Controls
 from study_app.viewmodels.designer.measures.level_words import LevelWords
-from study_app.viewmodels.designer.measures.measures_view import Controls, Focus, SlowResults, focus_of, measures_view
+from study_app.viewmodels.designer.measures.measures_view import Focus, focus_of, measures_view
 from study_app.viewmodels.designer.measures.number_cards import ANEW
 from study_app.viewmodels.designer.problem_rows import ProblemRow, problem_rows
+from study_app.workers.server import Crashed
+
+log = logging.getLogger(__name__)
 
 IDLE_MS: Final = 20
+REST_MS: Final = 800
+LOOK_MS: Final = 100
+KEPT: Final = 50
 MOST_PARTICIPANTS: Final = 500
-NAMES: Final[dict[type, str]] = {Observing: "observed", Grouping: "group", Measuring: "measurable",
-                                 Detecting: "detectable", Advising: "warnings"}  # fmt: skip
+FAILED: Final = "the process of the simulations does not start"
 
 
 class MeasuresController(QObject):
@@ -62,7 +68,20 @@ class MeasuresController(QObject):
         super().__init__(editing)
         self.warnings: tuple[str, ...] = ()
         self._editing, self._place = editing, place
-        self.slow = SlowNumbers(self)
+        self.make = start_measure_worker
+        self._client: MeasureClient | None = None
+        self._ordered = 0
+        self._wanted: Simulation | None = None
+        self._found, self._failed = Simulated(), ""
+        self._answers: OrderedDict[Simulation, Simulated] = OrderedDict()
+        self._of_block: dict[str, Simulated] = {}
+        self.rest = QTimer(self)
+        self.rest.setSingleShot(True)
+        self.rest.setInterval(REST_MS)
+        self.rest.timeout.connect(self._order)
+        self._look = QTimer(self)
+        self._look.setInterval(LOOK_MS)
+        self._look.timeout.connect(self._take)
         self.fit = PageFit(self)
         self._sound: Study | None = None
         self._participants: int | None = None
@@ -70,7 +89,6 @@ class MeasuresController(QObject):
         self._lapses = LAPSES
         self._focus = Focus()
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
-        self._last: dict[tuple[str, str], Any] = {}
         self._idle = QTimer(self)
         self._idle.setSingleShot(True)
         self._idle.setInterval(IDLE_MS)
@@ -78,7 +96,6 @@ class MeasuresController(QObject):
         editing.opened_other.connect(self._forget)
         editing.changed.connect(self._idle.start)
         repairs.found.connect(self._take_repairs)
-        self.slow.came.connect(self._idle.start)
         self.fit.found.connect(self._idle.start)
         place.pane.tab_shown.connect(self._idle.start)
         place.entered.connect(self._idle.start)
@@ -96,7 +113,7 @@ class MeasuresController(QObject):
         """Show the numbers of the study as it is now, and order those that are not known."""
         opened = self._editing.opened
         if opened is None or not self._place.isVisible():
-            self.slow.want(())
+            self._want(None)
             return
         path, problems = opened.history.selected, problem_rows(opened.study)
         study = self._measured(opened.study, path)
@@ -104,18 +121,17 @@ class MeasuresController(QObject):
         protocol = valid.protocol
         self._focus = focus = focus_of(protocol, path)
         controls = self._controls(opened.study, protocol, focus)
-        wanted = () if protocol is None else wanted_of(protocol, focus, controls)
-        wanted = tuple(one for one in wanted if valid.forces or not isinstance(one, Detecting))
-        self.slow.want(wanted if self._is_looked_at else tuple(one for one in wanted if isinstance(one, Advising)))
+        if protocol is not None:
+            measured = self._is_looked_at and (valid.forces or focus.plan is not None)
+            self._want(simulation_of(protocol, focus if measured else Focus(), controls))
+        else:
+            self._want(None)
+        if protocol is None or not advises(protocol):
+            self._warn(())
         repairs = {row: self._repairs.get(row, ()) for row in problems}
         parts = self.fit.parts(protocol, focus, path) if self._is_looked_at else None
-        ranges = {} if protocol is None else self._ranges(protocol)
-        results = replace(self._results(wanted, focus, controls), parts=parts, ranges=ranges)
-        view = measures_view(study, facts(study), path, controls, results, repairs)
+        view = measures_view(study, facts(study), path, controls, self._simulated(), repairs, parts)
         view = replace(view, earlier=study is not opened.study)
-        if results.warnings != self.warnings:
-            self.warnings = results.warnings
-            self.warned.emit()
         self._place.measures.show_measures(view)
         self._place.pane.facts.show_measures(view)
 
@@ -130,8 +146,8 @@ class MeasuresController(QObject):
     def leave(self) -> None:
         """End the process: a session that begins now must not share the processor with it."""
         self._idle.stop()
-        self.slow.want(())
-        self.slow.close()
+        self._want(None)
+        self._close()
 
     @property
     def _is_looked_at(self) -> bool:
@@ -143,7 +159,7 @@ class MeasuresController(QObject):
         kept = None if opened is None else kept_participants(opened.file)
         self._participants = None if kept is None else _permitted(kept)
         self._lapses, self._sound = LAPSES, None
-        self._thresholds, self._last, self._repairs = {}, {}, {}
+        self._thresholds, self._of_block, self._repairs = {}, {}, {}
         self._idle.start()
 
     def _controls(self, study: Study, protocol: Protocol | None, focus: Focus) -> Controls:
@@ -156,47 +172,96 @@ class MeasuresController(QObject):
         threshold = asked if asked is not None and low <= asked <= high else threshold_of(focus.plan)
         return Controls(participants, threshold, self._lapses, precision_of(protocol), planned)
 
-    def _ranges(self, protocol: Protocol) -> dict[str, tuple[float, float] | None]:
-        """Return the thresholds that blocks can measure, of those for which that was simulated."""
-        found = {}
-        for block in protocol.main_blocks:
-            plan = threshold_plan(protocol, block)
-            wanted = None if plan is None else measuring(protocol, plan, block, self._lapses)
-            if wanted is not None and isinstance(known := self.slow.found(wanted), Measurable):
-                found[block.id] = known.ends
-        return found
+    # simulations
 
-    def _results(self, wanted: tuple[Wanted, ...], focus: Focus, controls: Controls) -> SlowResults:
-        """Return what is known of what is wanted; where nothing is, what was known of the block before."""
-        block = "" if focus.block is None else focus.block.id
-        found: dict[str, Any] = {}
-        progress, failed = {}, {}
-        for one in wanted:
-            name = NAMES[type(one)]
-            if self.slow.known(one):
-                found[name] = self._last[name, block] = self.slow.found(one)
-            elif why := self.slow.failure(one):
-                failed[name] = f"{why[:1].upper()}{why[1:]}."
-            else:
-                found[name] = self._last.get((name, block))
-                counted = self.slow.progress(one)
-                progress[name] = ANEW if counted is None else f"{counted[0]} of {counted[1]} simulated"
-        observed, measured, group = (found.get(name) for name in ("observed", "measurable", "group"))
-        detectable = found.get("detectable")
-        return SlowResults(
-            Simulated(
-                observed if isinstance(observed, Observed) else None,
-                measured if isinstance(measured, Measurable) else None,
-                group if isinstance(group, GroupPrecision) else None,
-                progress,
-                failed,
-                controls.threshold,
-                controls.precision,
-                controls.planned,
-            ),
-            detectable if isinstance(detectable, Detectable) else None,
-            found.get("warnings") or (),
-        )
+    @property
+    def waits(self) -> bool:
+        """Whether a simulation is still to come."""
+        return self.rest.isActive() or self._look.isActive()
+
+    def _want(self, wanted: Simulation | None) -> None:
+        """Want this from now on; what is under way for another element or study is given up."""
+        if wanted == self._wanted:
+            return
+        self._wanted, self._found, self._failed = wanted, Simulated(), ""
+        self.rest.stop()
+        if self._look.isActive():
+            self._look.stop()
+            if self._client is not None:
+                self._client.stop()
+        if wanted is not None and wanted in self._answers:
+            self._warn(self._answers[wanted].warnings)
+        elif wanted is not None:
+            self.rest.start()
+
+    def _order(self) -> None:
+        if self._wanted is None:
+            return
+        if self._client is not None and not self._client.works:
+            self._close()
+        if self._client is None:
+            try:
+                self._client = self.make()
+            except OSError as error:  # no process to be had: the designer goes on without these numbers
+                log.info("the worker of simulations does not start: %s", error)
+                self._fail(FAILED)
+                return
+        self._ordered = self._client.order(self._wanted)
+        self._look.start()
+
+    def _take(self) -> None:
+        wanted = self._wanted
+        if self._client is None or wanted is None:
+            return
+        for number, answer in self._client.answers():
+            if number != self._ordered:
+                continue
+            if isinstance(answer, Simulated):
+                self._found = answer
+                known = self._of_block.get(wanted.block, Simulated())
+                parts = ("observed", "group", "measurable", "detectable")
+                newer = {part: value for part in parts if (value := getattr(answer, part)) is not None}
+                self._of_block[wanted.block] = replace(known, **newer)
+                self._idle.start()
+                continue
+            self._look.stop()
+            if answer is None:
+                self._answers[wanted] = self._of_block[wanted.block] = self._found
+                if len(self._answers) > KEPT:
+                    self._answers.popitem(last=False)
+                self._warn(self._found.warnings)
+                self._idle.start()
+            elif isinstance(answer, Crashed) or not answer.stopped:
+                self._fail(answer.sentence)
+
+    def _fail(self, sentence: str) -> None:
+        log.info("simulations failed: %s", sentence)
+        self._failed = f"{sentence[:1].upper()}{sentence[1:]}."
+        self._idle.start()
+
+    def _warn(self, warnings: tuple[str, ...]) -> None:
+        if warnings != self.warnings:
+            self.warnings = warnings
+            self.warned.emit()
+
+    def _simulated(self) -> Simulated:
+        """Return what is known of what is wanted; before that, what was known of the block."""
+        wanted = self._wanted
+        if wanted is None:
+            return Simulated()
+        if (known := self._answers.get(wanted)) is not None:
+            return known
+        if self._failed:
+            return replace(self._found, warnings=self.warnings, failed=self._failed)
+        return replace(self._of_block.get(wanted.block, Simulated()), warnings=self.warnings, waiting=ANEW)
+
+    def _close(self) -> None:
+        """End the process."""
+        self.rest.stop()
+        self._look.stop()
+        client, self._client = self._client, None
+        if client is not None:
+            client.close()
 
     def _take_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
         self._repairs[row] = words

@@ -29,15 +29,16 @@ class MeasurePlot(Plot):
         self.axes["bottom"].setHeight(26)
         self.drawn: list[pg.GraphicsObject] = []
         self.shown: Any = None
+        self.grey = False
         describe_plot(self, name, "")
 
     def sizeHint(self) -> QSize:
         return QSize(220, 110)
 
-    def show_plot(self, shown: Any) -> None:
-        """Show another value, None where there is none."""
-        if shown != self.shown:
-            self.shown = shown
+    def show_plot(self, shown: Any, *, grey: bool = False) -> None:
+        """Show another value, None where there is none; ``grey`` if it is of an earlier study."""
+        if (shown, grey) != (self.shown, self.grey):
+            self.shown, self.grey = shown, grey
             self.setAccessibleDescription("Not known yet." if shown is None else shown.sentence)
             self._draw()
 
@@ -69,9 +70,9 @@ class MeasurePlot(Plot):
         self.box.addItem(item, ignoreBounds=True)
         self.drawn.append(item)
 
-    def band(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, opacity: float, *, anew: bool) -> None:
+    def band(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, opacity: float) -> None:
         """Fill the space between two curves."""
-        colour = QColor(self.theme.ctl if anew else self.theme.accent)
+        colour = QColor(self.theme.ctl if self.grey else self.theme.accent)
         colour.setAlphaF(opacity)
         curves = (pg.PlotCurveItem(x, one) for one in (low, high))
         self.add(pg.FillBetweenItem(*curves, brush=QBrush(colour)), -5)
@@ -115,9 +116,9 @@ class FunctionView(MeasurePlot):
         theme, (left, right) = self.theme, shown.span
         bottom, top = shown.low - 1.0, 101.5
         x = np.array(shown.x)
-        self.band(x, np.array(shown.found[-1]), np.array(shown.found[0]), 0.18, anew=shown.anew)
-        self.band(x, np.array(shown.found[-2]), np.array(shown.found[1]), 0.30, anew=shown.anew)
-        self.curve(x, shown.planted, theme.ctl if shown.anew else theme.accent, 2.4)
+        self.band(x, np.array(shown.found[-1]), np.array(shown.found[0]), 0.18)
+        self.band(x, np.array(shown.found[-2]), np.array(shown.found[1]), 0.30)
+        self.curve(x, shown.planted, theme.ctl if self.grey else theme.accent, 2.4)
         at, percent = shown.mark
         for xs, ys in (([left, at], [percent, percent]), ([at, at], [bottom, percent])):
             self.curve(xs, ys, theme.text, 1.2, dashed=True)
@@ -146,7 +147,7 @@ class FunctionView(MeasurePlot):
         clipped = places >= first
         for some, ink in ((~clipped, self.theme.accent), (clipped, limit_colour(self.theme, limit))):
             if some.any():
-                colour = QColor(self.theme.ctl if shown.anew else ink)
+                colour = QColor(self.theme.ctl if self.grey else ink)
                 colour.setAlphaF(0.6)
                 bars = pg.BarGraphItem(
                     x=places[some], y0=bottom, height=heights[some], width=0.72 * apart, brush=QBrush(colour),
@@ -166,11 +167,11 @@ class TrackView(MeasurePlot):
         """Draw bands, median, planted threshold and trials."""
         theme, (bottom, top) = self.theme, shown.span
         x, found = np.array(shown.trials), [np.array(one) for one in shown.found]
-        self.band(x, found[0], found[-1], 0.18, anew=shown.anew)
-        self.band(x, found[1], found[-2], 0.30, anew=shown.anew)
-        self.curve(x, found[len(found) // 2], theme.ctl if shown.anew else theme.accent, 2.4)
+        self.band(x, found[0], found[-1], 0.18)
+        self.band(x, found[1], found[-2], 0.30)
+        self.curve(x, found[len(found) // 2], theme.ctl if self.grey else theme.accent, 2.4)
         self.curve([0, shown.last], [shown.planted, shown.planted], theme.text, 1.2, dashed=True)
-        ink = QColor(theme.ctl if shown.anew else theme.trace_y)
+        ink = QColor(theme.ctl if self.grey else theme.trace_y)
         for track in sorted({track for _, _, track, _ in shown.one}):
             for success in (True, False):
                 some = [(trial, level) for trial, level, of, right in shown.one if of == track and right == success]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, Signal
@@ -17,7 +16,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.designer.measures.number_cards import EARLIER, ForcesPlot, MeasuresView, NumberCard
+from study_app.viewmodels.designer.measures.number_cards import EARLIER, FAILED, ForcesPlot, MeasuresView, NumberCard
 
 if TYPE_CHECKING:
     from study_app.gui.designer.measures.block_plots import ForcesView, FunctionView, TrackView
@@ -42,10 +41,10 @@ class NumbersRow(QWidget):
         self._columns = 0
         self._lay(NUMBERS)
 
-    def show_numbers(self, shown: tuple[NumberCard, ...]) -> None:
+    def show_numbers(self, shown: tuple[NumberCard, ...], waiting: str) -> None:
         self.setVisible(bool(shown))
         for part, one in zip(self.parts, shown, strict=False):
-            part.show_card(one)
+            part.show_card(one, waiting)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -182,17 +181,18 @@ class MeasuresPage(Themed, QWidget):
         self.area.widget().setEnabled(not shown.earlier)
         self.blocks.setVisible(shown.blocks is not None)
         self.blocks.show_cards(() if shown.blocks is None else (shown.blocks,))
-        self.numbers.show_numbers(shown.numbers)
+        self.numbers.show_numbers(shown.numbers, shown.waiting)
         if (shown.numbers or shown.forces) and not self.cards:
             self._make_plots()
         for name, there in (("function", shown.numbers), ("track", shown.numbers), ("forces", shown.forces)):
             if name in self.cards:
                 self.cards[name].setVisible(bool(there))
         self.curves.setVisible(bool(shown.numbers))
+        waiting = FAILED[2] if shown.failed else shown.waiting
         for name, view, plot in (("function", self.function, shown.function), ("track", self.track, shown.track)):
             if view is not None:
-                view.show_plot(replace(plot, anew=True) if plot is not None and shown.earlier else plot)
-                self._head(name, "" if plot is None else plot.heading, shown.waiting)
+                view.show_plot(plot, grey=shown.earlier or bool(shown.waiting))
+                self._head(name, "" if plot is None else plot.heading, waiting)
         forces = self.cards.get("forces")
         if shown.forces is not None and isinstance(forces, ForcesCard):
             forces.show_forces(shown.forces)

@@ -48,7 +48,7 @@ class NumberPart(Card):
     def __init__(self) -> None:
         super().__init__(padding=14, gap=2)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.shown: NumberCard | None = None
+        self.shown: tuple[NumberCard, str] | None = None
         self.title = Elided("small", "text2")
         self.number, self.unit = figures("", "number"), label("", "small", "text2")
         self.icon, self.note = Icon("info", "text2", 14), label("", "small", "text2", wraps=True)
@@ -57,20 +57,22 @@ class NumberPart(Card):
         below = hbox((self.icon, 0, Qt.AlignmentFlag.AlignTop), (self.note, 1), spacing=6)
         add_parts(self.column, self.title, across, below, self.more, STRETCH)
 
-    def show_card(self, shown: NumberCard) -> None:
-        if shown == self.shown:
+    def show_card(self, shown: NumberCard, waiting: str) -> None:
+        """Show a number; ``waiting`` is said of one that is simulated."""
+        waiting = waiting if shown.simulated else ""
+        if (shown, waiting) == self.shown:
             return
-        self.shown = shown
+        self.shown = (shown, waiting)
         self.title.show_text(shown.title)
         self.number.setText(shown.number)
-        set_ink(self.number, "text3" if shown.anew else "text")
+        set_ink(self.number, "text3" if waiting else "text")
         self.unit.setText(shown.unit)
-        waiting: Verdict = ("neutral", "clock", shown.anew)
-        tone, icon, words = waiting if shown.anew else shown.note
+        note: Verdict = ("neutral", "clock", waiting)
+        tone, icon, words = note if waiting else shown.note
         self.icon.show_icon(icon or "info", INKS[tone])
         self.note.setText(words)
         self.more.setText(shown.more)
-        self.more.setVisible(bool(shown.more) and not shown.anew)
+        self.more.setVisible(bool(shown.more) and not waiting)
         also = f". {shown.more}" if self.more.isVisibleTo(self) else ""
         self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {words}{also}")
         self._fit()
@@ -269,9 +271,9 @@ class LinesPart(Made):
     """Lines with bars, and sentences below them."""
 
     def __init__(self, shown: LinesCard) -> None:
-        super().__init__(shown.title, shown.anew or shown.aside)
+        super().__init__(shown.title, shown.waiting or shown.aside)
         if shown.lines:
-            self.add(_lines(shown.lines, grey=bool(shown.anew)))
+            self.add(_lines(shown.lines, grey=bool(shown.waiting)))
         if shown.lines and shown.sentences:
             self.add(Rule())
         for verdict in shown.sentences:

@@ -73,6 +73,6 @@ class FactsRow(QScrollArea):
             self.earlier.setVisible(self.shown.earlier)
             for part in (self.numbers, self.grid):
                 part.setEnabled(not self.shown.earlier)
-            self.numbers.show_numbers(self.shown.numbers)
+            self.numbers.show_numbers(self.shown.numbers, self.shown.waiting)
             self.grid.show_cards(self.shown.below)
             self.make_room(self._window_px, self._left_px)

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
-from study_app.authoring.measures.observers import Measurable, Observed
-from study_app.authoring.measures.planned import ENOUGH, GroupPrecision
+from study_app.authoring.measures.observers import Observed
+from study_app.authoring.measures.planned import ENOUGH, Simulated
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
@@ -50,35 +50,15 @@ AS_ASKED: Final = "Clipped levels are simulated as they are requested"
 
 
 @dataclass(frozen=True, slots=True)
-class Simulated:
-    """What was simulated of a block with a method, each None until it was answered for the first time.
+class Controls:
+    """What is simulated: participants, the threshold (a level), the lapse rate, and the precision that is wanted.
 
-    Attributes
-    ----------
-    observed : Observed or None
-        Observers with the planted threshold.
-    measurable : Measurable or None
-        The thresholds that can be measured.
-    group : GroupPrecision or None
-        Studies of so many participants.
-    progress : mapping
-        How far the simulations are of those that are still to come, in words; their values are of an earlier study.
-    failed : mapping
-        Why those are not known whose simulations failed.
-    threshold : float
-        The planted threshold, a level.
-    precision : float
-        Half the group's 95 % interval that is wanted, as a share of the mean.
-    planned : int or None
-        How many participants the file plans.
+    ``planned`` is how many participants the file plans, None where it does not say.
     """
 
-    observed: Observed | None = None
-    measurable: Measurable | None = None
-    group: GroupPrecision | None = None
-    progress: Mapping[str, str] = field(default_factory=dict)
-    failed: Mapping[str, str] = field(default_factory=dict)
-    threshold: float = 0.0
+    participants: int = 12
+    threshold: float = 0.2
+    lapses: float = 0.02
     precision: float = 0.15
     planned: int | None = None
 
@@ -152,88 +132,79 @@ def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> Lev
 
 
 def number_cards(
-    of: LevelBlock, simulated: Simulated, participants: int, duration_s: float, order: BlockOrder, *, warned: bool
+    of: LevelBlock, simulated: Simulated, controls: Controls, duration_s: float, order: BlockOrder
 ) -> tuple[NumberCard, ...]:
-    """Return the four numbers of a block whose tracks are simulated.
-
-    ``warned``: whether ``check`` warns that the planned participants are too few.
-    """
+    """Return the four numbers of a block whose tracks are simulated."""
     breaks = f", {counted(order.breaks, 'break')}" if order.breaks else ""
     return (
-        _range(of, simulated),
+        _range(of, simulated, controls),
         _one_person(of, simulated),
-        _people(of, simulated, participants, warned=warned),
+        _people(of, simulated, controls),
         NumberCard(
             "Lasts", *duration_figure(duration_s),
-            ("neutral", "clock", f"{order.trials} trials{breaks}"),
+            ("neutral", "clock", f"{order.trials} trials{breaks}"), simulated=False,
         ),
     )  # fmt: skip
 
 
-def _unknown(title: str, unit: str, simulated: Simulated, name: str) -> NumberCard:
+def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:
     """Return a number that is not known: not yet, because its simulation failed, or because nothing simulates it."""
-    if name in simulated.failed:
-        return NumberCard(title, UNKNOWN, unit, FAILED, more=simulated.failed[name])
-    return NumberCard(title, UNKNOWN, unit, ("neutral", "info", "not simulated"), simulated.progress.get(name, ""))
+    if simulated.failed:
+        return NumberCard(title, UNKNOWN, unit, FAILED, simulated.failed)
+    return NumberCard(title, UNKNOWN, unit, ("neutral", "info", "not simulated"))
 
 
-def _range(of: LevelBlock, simulated: Simulated) -> NumberCard:
+def _range(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
     title, found, words = (
         f"{of.words.name[:1].upper()}{of.words.name[1:]}s it can measure",
         simulated.measurable,
         of.words,
     )
     if found is None:
-        return _unknown(title, words.unit, simulated, "measurable")
-    anew = simulated.progress.get("measurable", "")
+        return _unknown(title, words.unit, simulated)
     clipped = of.clipped_words
     if found.ends is None:
         if found.planted:
-            return NumberCard(title, "none", "", ("bad", "warning", "estimates are biased"), anew, clipped)
+            return NumberCard(title, "none", "", ("bad", "warning", "estimates are biased"), clipped)
         if of.clipping is None:
-            return NumberCard(title, "none", "", ("bad", "warning", "levels are too small"), anew, TOO_SMALL)
+            return NumberCard(title, "none", "", ("bad", "warning", "levels are too small"), TOO_SMALL)
         why = "the standard is clipped" if of.clipping.clips_standard else CLIPPED[2]
-        return NumberCard(title, "none", "", ("bad", "warning", why), anew, clipped)
+        return NumberCard(title, "none", "", ("bad", "warning", why), clipped)
     low, high = found.ends
     note: Verdict = ("neutral", "info", f"of {words.number(of.words.stimulus.levels[1])} {words.unit} at most")
     if words.stimulus.level_kind == "weber" and of.standard is not None:
         values = (rounded(level * of.standard, 2) for level in (low, high))
         note = ("neutral", "info", f"{' to '.join(values)} {words.value_unit}")
-    if not low * 0.999 <= simulated.threshold <= high * 1.001:
-        note = ("warn", "warning", f"not {words.words(simulated.threshold)}")
-    return NumberCard(title, f"{words.number(low, 2)} – {words.number(high, 2)}", words.unit, note, anew, clipped)
+    if not low * 0.999 <= controls.threshold <= high * 1.001:
+        note = ("warn", "warning", f"not {words.words(controls.threshold)}")
+    return NumberCard(title, f"{words.number(low, 2)} – {words.number(high, 2)}", words.unit, note, clipped)
 
 
 def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
     found = simulated.observed
     if found is None:
-        return _unknown("One person", "%", simulated, "observed")
+        return _unknown("One person", "%", simulated)
     if not of.measures(found.threshold):
-        return NumberCard("One person", UNKNOWN, "%", CLIPPED, simulated.progress.get("observed", ""), of.clipped_words)
+        return NumberCard("One person", UNKNOWN, "%", CLIPPED, of.clipped_words)
     note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(found.threshold)}")
-    return NumberCard(
-        "One person", f"± {100 * found.error:.0f}", "%", note, simulated.progress.get("observed", ""), of.as_asked
-    )
+    return NumberCard("One person", f"± {100 * found.error:.0f}", "%", note, of.as_asked)
 
 
-def _people(of: LevelBlock, simulated: Simulated, participants: int, *, warned: bool) -> NumberCard:
+def _people(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
     found = simulated.group
     if found is None:
-        title = f"{people(participants, simulated.planned)} in ± {100 * simulated.precision:g} %"
-        return _unknown(title, "% of studies", simulated, "group")
-    title = f"{people(found.participants, simulated.planned)} in ± {100 * found.precision:g} %"
-    if not of.measures(simulated.threshold):
-        return NumberCard(
-            title, UNKNOWN, "% of studies", CLIPPED, simulated.progress.get("group", ""), of.clipped_words
-        )
+        title = f"{people(controls.participants, controls.planned)} in ± {100 * controls.precision:g} %"
+        return _unknown(title, "% of studies", simulated)
+    title = f"{people(found.participants, controls.planned)} in ± {100 * found.precision:g} %"
+    if not of.measures(controls.threshold):
+        return NumberCard(title, UNKNOWN, "% of studies", CLIPPED, of.clipped_words)
     enough = found.share >= ENOUGH
     note: Verdict = ("ok", "check", "Enough") if enough else ("warn", "warning", "Not enough")
     many = f"more than {found.most}" if found.enough is None else f"about {found.enough}"
     needed = f"{100 * ENOUGH:g} % are enough" if enough else f"Needed: {many} participants for {100 * ENOUGH:g} %"
     more = f"{needed}; with {found.more_trials} trials: {100 * found.more_share:.0f} %"
-    more = ". ".join(filter(None, (more, ON_AVERAGE if warned else "", of.as_asked)))
-    anew = simulated.progress.get("group", "")
-    return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, anew, more)
+    more = ". ".join(filter(None, (more, ON_AVERAGE if simulated.warnings else "", of.as_asked)))
+    return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, more)
 
 
 def function_plot(of: LevelBlock, simulated: Simulated) -> FunctionPlot | None:
@@ -266,7 +237,6 @@ def function_plot(of: LevelBlock, simulated: Simulated) -> FunctionPlot | None:
         ticks_x=words.ticks(),
         ticks_y=tuple((one, f"{one:g}") for one in even_ticks(low_percent, 100.0, 7)),
         sentence=sentence,
-        anew="observed" in simulated.progress,
     )
 
 
@@ -306,7 +276,6 @@ def track_plot(of: LevelBlock, simulated: Simulated) -> TrackPlot | None:
             f"{words.number(low)} and {words.words(high)}, the simulated value is {words.words(found.threshold)}. "
             f"One of them answered {right} of {len(found.one)} trials with success."
         ),
-        anew="observed" in simulated.progress,
     )
 
 

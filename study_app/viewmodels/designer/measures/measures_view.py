@@ -1,11 +1,11 @@
 """What the tab Measures shows for the selected element, and the cards below the other tabs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 from study_app.authoring.edited_study import Study
-from study_app.authoring.measures.planned import Detectable
+from study_app.authoring.measures.planned import Simulated
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.study_facts import Facts
 from study_app.protocol.blocks import Block
@@ -15,7 +15,7 @@ from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.source.document import Path
 from study_app.viewmodels.designer.measures import session_cards as cards
 from study_app.viewmodels.designer.measures.level_plots import (
-    Simulated,
+    Controls,
     forces_plot,
     function_plot,
     level_block,
@@ -23,14 +23,7 @@ from study_app.viewmodels.designer.measures.level_plots import (
     track_plot,
 )
 from study_app.viewmodels.designer.measures.level_words import LevelWords, rounded
-from study_app.viewmodels.designer.measures.number_cards import (
-    FAILED,
-    Card,
-    ControlValues,
-    LinesCard,
-    MeasuresView,
-    people,
-)
+from study_app.viewmodels.designer.measures.number_cards import Card, ControlValues, LinesCard, MeasuresView, people
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 
 BELOW: Final = 4
@@ -56,45 +49,6 @@ class Focus:
     block: Block | None = None
     plan: ThresholdPlan | None = None
     compares: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Controls:
-    """What is simulated: participants, the threshold (a level), the lapse rate, and the precision that is wanted.
-
-    ``planned`` is how many participants the file plans, None where it does not say.
-    """
-
-    participants: int = 12
-    threshold: float = 0.2
-    lapses: float = 0.02
-    precision: float = 0.15
-    planned: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class SlowResults:
-    """What simulations answered: of observers, of studies, and the warnings of ``check`` that take them.
-
-    Attributes
-    ----------
-    simulated : Simulated
-        Of a block with a method, and how far all simulations are.
-    detectable : Detectable or None
-        Of a block whose statements compare conditions.
-    warnings : tuple of str
-        Sentences.
-    parts : int or None
-        On how many parts the questions stand on a small screen; None: not known.
-    ranges : mapping
-        The thresholds that other blocks can measure, as far as they are known; None: none.
-    """
-
-    simulated: Simulated = field(default_factory=Simulated)
-    detectable: Detectable | None = None
-    warnings: tuple[str, ...] = ()
-    parts: int | None = None
-    ranges: Mapping[str, tuple[float, float] | None] = field(default_factory=dict)
 
 
 def focus_of(protocol: Protocol | None, path: Path) -> Focus:
@@ -131,8 +85,9 @@ def measures_view(
     facts: Facts,
     path: Path,
     controls: Controls,
-    slow: SlowResults,
+    simulated: Simulated,
     problems: Mapping[ProblemRow, tuple[str, ...]],
+    parts: int | None = None,
 ) -> MeasuresView:
     """Return what is shown of the selected element.
 
@@ -146,72 +101,72 @@ def measures_view(
         The selected element.
     controls : Controls
         What is simulated.
-    slow : SlowResults
+    simulated : Simulated
         What simulations answered.
     problems : mapping
         The problems of the study, each with the words of its repairs as far as they were found.
+    parts : int, optional
+        On how many parts the questions stand on a small screen, where that is known.
     """
     valid = valid_part(study)
     protocol, focus = valid.protocol, focus_of(valid.protocol, path)
     block, values = focus.block, control_values(protocol, focus, controls)
-    waiting = slow.simulated.progress.get("observed", FAILED[2] if "observed" in slow.simulated.failed else "")
     blocks = None
     if protocol is not None:
-        words = {one.id: _measured(protocol, one, slow) for one in protocol.blocks_in_order}
+        words = {one.id: _measured(protocol, one) for one in protocol.blocks_in_order}
         shown_of = "" if block is None else block.id
         blocks = cards.blocks_card(study, protocol, facts, path, words, shown_of)
     of = None if protocol is None or block is None else level_block(protocol, block, forces=valid.forces)
     if protocol is not None and block is not None and of is not None and focus.plan is not None:
         numbers = number_cards(
-            of, slow.simulated, controls.participants, facts.steps_s.get(block.id, 0.0),
-            order_of(protocol, block), warned=bool(slow.warnings),
+            of, simulated, controls, facts.steps_s.get(block.id, 0.0), order_of(protocol, block),
         )  # fmt: skip
         return MeasuresView(
-            values, numbers, function_plot(of, slow.simulated), track_plot(of, slow.simulated),
-            forces_plot(of, problems), (), tuple(_others(study, facts, path, controls, slow)), waiting,
-            blocks=blocks,
+            values, numbers, function_plot(of, simulated), track_plot(of, simulated),
+            forces_plot(of, problems), (), tuple(_others(study, facts, path, simulated)), simulated.waiting,
+            bool(simulated.failed), blocks=blocks,
         )  # fmt: skip
-    shown = tuple(_cards(study, facts, path, focus, controls, slow))
+    shown = tuple(_cards(study, facts, path, focus, controls, simulated, parts))
     forces = None if of is None else forces_plot(of, problems)
-    return MeasuresView(values, forces=forces, cards=shown, below=shown[:BELOW], waiting=waiting, blocks=blocks)
+    return MeasuresView(
+        values, forces=forces, cards=shown, below=shown[:BELOW], waiting=simulated.waiting, blocks=blocks
+    )
 
 
-def _measured(protocol: Protocol, block: Block, slow: SlowResults) -> str:
-    """Return what a block measures, with what is known of it."""
+def _measured(protocol: Protocol, block: Block) -> str:
+    """Return what a block measures."""
     focus = focus_of(protocol, ("blocks", block.id))
     if focus.plan is None:
         return "smallest differences" if focus.compares else ""
-    words = LevelWords(focus.plan.stimulus, focus.plan.design)
-    if (ends := slow.ranges.get(block.id)) is None:
-        return f"{words.name}s" if block.id not in slow.ranges else f"no {words.name}"
-    return f"{words.name} {words.number(ends[0], 2)} – {words.words(ends[1], 2)}"
+    return f"{LevelWords(focus.plan.stimulus, focus.plan.design).name}s"
 
 
-def _others(study: Study, facts: Facts, path: Path, controls: Controls, slow: SlowResults) -> list[Card]:
+def _others(study: Study, facts: Facts, path: Path, simulated: Simulated) -> list[Card]:
     session: list[Card] = [cards.session_card(study, facts, path)]
-    warned = cards.warnings_card(facts, slow.warnings, slow.simulated.failed.get("warnings", ""))
+    warned = cards.warnings_card(facts, simulated.warnings)
     return session if warned is None else [*session, warned]
 
 
-def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, slow: SlowResults) -> list[Card]:
+def _cards(
+    study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, simulated: Simulated, parts: int | None
+) -> list[Card]:
     """Return the cards of an element without simulated tracks, those that concern it first."""
     valid, block = valid_part(study), focus.block
     protocol = valid.protocol
     asked = path[0] == "questionnaires" and protocol is not None and path[1:2] and path[1] in protocol.questionnaires
-    found: list[Card] = [cards.session_card(study, facts, path, None if asked else slow.parts)]
+    found: list[Card] = [cards.session_card(study, facts, path, None if asked else parts)]
     if protocol is None:
         return found if study.unreadable else [*found, cards.texts_card(study)]
     if asked:
-        found = [cards.questions_card(protocol, str(path[1]), slow.parts), cards.texts_card(study), *found]
+        found = [cards.questions_card(protocol, str(path[1]), parts), cards.texts_card(study), *found]
     if block is not None and (
         balance := cards.balance_card(study, protocol, block, controls.participants, controls.planned)
     ):
         found.append(balance)
     if block is not None and focus.compares:
-        simulated, known = slow.simulated, slow.detectable
+        known = simulated.detectable
         who = people(controls.participants if known is None else known.participants, controls.planned)
-        underway = simulated.progress.get("detectable", ""), simulated.failed.get("detectable", "")
-        found.append(cards.detectable_card(study, block, who, known, underway))
+        found.append(cards.detectable_card(study, block, who, simulated))
     found.append(cards.force_card(study, facts, protocol, _liquids(protocol, path, block)))
     if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids and valid.forces:
         found.insert(0, cards.effects_card(study, protocol, str(path[1])))
@@ -219,7 +174,7 @@ def _cards(study: Study, facts: Facts, path: Path, focus: Focus, controls: Contr
         found.append(cards.block_card(study, facts, protocol, block))
     if not asked:
         found.append(cards.texts_card(study))
-    warned: LinesCard | None = cards.warnings_card(facts, slow.warnings, slow.simulated.failed.get("warnings", ""))
+    warned: LinesCard | None = cards.warnings_card(facts, simulated.warnings)
     return found if warned is None else [*found, warned]
 
 

@@ -31,15 +31,15 @@ def people(participants: int, planned: int | None) -> str:
 class NumberCard:
     """One number: its title, the number, its unit, its verdict or a note, and a sentence below it.
 
-    ``anew`` says how far the simulations of another one are, "" where none runs.
+    ``simulated`` says that it is grey while another one is simulated.
     """
 
     title: str
     number: str
     unit: str = ""
     note: Verdict = ("neutral", "", "")
-    anew: str = ""
     more: str = ""
+    simulated: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,13 +111,13 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class LinesCard:
-    """Lines with bars, with a sentence below them; ``anew`` says how far the simulations of other numbers are."""
+    """Lines with bars, with a sentence below them; those that are ``simulated`` are grey while others are simulated."""
 
     title: str
     aside: str
     lines: tuple[Line, ...]
     sentences: tuple[Verdict, ...] = ()
-    anew: str = ""
+    waiting: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +150,6 @@ class FunctionPlot:
         Where the axes are written at.
     sentence : str
         The plot in a sentence.
-    anew : bool
-        Whether it is of an earlier study.
     """
 
     heading: str
@@ -167,7 +165,6 @@ class FunctionPlot:
     ticks_x: Ticks
     ticks_y: Ticks
     sentence: str
-    anew: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,8 +195,6 @@ class TrackPlot:
         How many there were.
     sentence : str
         The plot in a sentence.
-    anew : bool
-        Whether it is of an earlier study.
     """
 
     heading: str
@@ -214,7 +209,6 @@ class TrackPlot:
     ticks_y: Ticks
     observers: int
     sentence: str
-    anew: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -322,8 +316,9 @@ class ControlValues:
 class MeasuresView:
     """What the tab shows: numbers and plots of a block with a method, else cards; and the cards below other tabs.
 
-    Above them it says which ``blocks`` use the element, where it is not a block itself. ``earlier`` numbers are of the
-    last study without faults.
+    Above them it says which ``blocks`` use the element, where it is not a block itself. ``waiting`` is said of numbers
+    and plots while others are simulated, ``failed`` where they cannot be; ``earlier`` ones are of the last study
+    without faults.
     """
 
     controls: ControlValues
@@ -334,5 +329,6 @@ class MeasuresView:
     cards: tuple[Card, ...] = ()
     below: tuple[Card, ...] = ()
     waiting: str = ""
+    failed: bool = False
     earlier: bool = False
     blocks: BlocksCard | None = None

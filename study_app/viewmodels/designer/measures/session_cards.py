@@ -1,7 +1,7 @@
 """Cards about a session: its length, the balance of its orders, what a hand feels, its texts, what people can show."""
 
 from collections.abc import Mapping, Sequence
-from typing import Final, TypeAlias
+from typing import Final
 
 from study_app.authoring.changes.languages import languages_of
 from study_app.authoring.edited_study import Study
@@ -9,7 +9,7 @@ from study_app.authoring.fields import label_of
 from study_app.authoring.measures.balance import balance_of
 from study_app.authoring.measures.forces import forces
 from study_app.authoring.measures.participant_texts import copied_texts, own_texts, revealing, texts_by_language
-from study_app.authoring.measures.planned import Detectable
+from study_app.authoring.measures.planned import Simulated
 from study_app.authoring.measures.valid_part import valid_part
 from study_app.authoring.names import blocks_using
 from study_app.authoring.outline import title_of
@@ -40,8 +40,6 @@ from study_app.viewmodels.designer.measures.number_cards import (
 from study_app.viewmodels.number_words import duration, duration_figure, duration_range
 
 SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
-Underway: TypeAlias = tuple[str, str]
-"""How far a simulation is, and why it failed; each "" where it is not so."""
 MOST_CODES: Final = 8
 """Of more codes only how even they are is said."""
 MOST_ROWS: Final = 6
@@ -271,15 +269,15 @@ def texts_card(study: Study) -> TextsCard:
     return TextsCard(tuple(lines), revealed)
 
 
-def detectable_card(study: Study, block: Block, who: str, found: Detectable | None, underway: Underway) -> LinesCard:
+def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) -> LinesCard:
     """Return the smallest difference of each statement that studies of so many participants (``who``) show."""
-    title, (progress, failed) = "Smallest differences", underway
+    title, found = "Smallest differences", simulated.detectable
     if not valid_part(study).forces:  # what is answered depends on them
         return LinesCard(title, who, (), (("neutral", "minus", NO_FORCES),))
-    if failed:
-        return LinesCard(title, who, (), (FAILED, ("neutral", "info", failed)))
+    if found is None and simulated.failed:
+        return LinesCard(title, who, (), (FAILED, ("neutral", "info", simulated.failed)))
     if found is None:
-        return LinesCard(title, who, (), (("neutral", "clock", "Studies are simulated."),), progress)
+        return LinesCard(title, who, (), (("neutral", "clock", "Studies are simulated."),), simulated.waiting)
     items = study.document.get("questionnaires", {}).get(block.questionnaire, {}).get("items", ())
     places = {item.get("id"): at for at, item in enumerate(items)}
     lines = []
@@ -295,26 +293,17 @@ def detectable_card(study: Study, block: Block, who: str, found: Detectable | No
     note: Verdict = ("neutral", "info", model)
     if not lines:
         note = ("neutral", "info", "The answer model knows none of the statements.")
-    return LinesCard(title, who, tuple(lines), (note,), progress)
+    return LinesCard(title, who, tuple(lines), (note,), simulated.waiting)
 
 
-def warnings_card(facts: Facts, more: Sequence[str], failed: str = "") -> LinesCard | None:
+def warnings_card(facts: Facts, more: Sequence[str]) -> LinesCard | None:
     """Return the warnings of ``check``; None where there are none.
 
-    Parameters
-    ----------
-    facts : Facts
-        The facts of the study, with its warnings.
-    more : sequence of str
-        Those about a precision that is not reached, which take simulated observers.
-    failed : str
-        Why those are not known, "" where their simulation did not fail.
+    ``more`` are those about a precision that is not reached, which take simulated observers.
     """
     sentences: list[Verdict] = [("warn", "warning", _sentence(one)) for one in (*facts.warnings, *more)]
     if more:
         sentences.append(("neutral", "info", f"{ON_AVERAGE}."))
-    if failed:
-        sentences += [("bad", "warning", "The expected precision is not known."), ("neutral", "info", failed)]
     return LinesCard("Warnings", "of check", (), tuple(sentences)) if sentences else None
 
 

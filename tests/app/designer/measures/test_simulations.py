@@ -2,41 +2,37 @@
 
 import time
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 from typing import Any
 
 import pytest
 from PySide6.QtCore import QSize, Qt
 
 from study_app.analysis.planning.threshold_studies import plans, sweep
-from study_app.app.designer.measures.measures_worker import (
+from study_app.app.designer.measures.page_fit import _pages
+from study_app.app.designer.measures.simulation import (
     THRESHOLD_STUDIES,
-    Advising,
-    Counted,
-    Detecting,
-    Grouping,
-    MeasureOrder,
-    Measuring,
-    Observing,
+    Simulation,
     carry_out,
+    simulation_of,
     start_measure_worker,
 )
-from study_app.app.designer.measures.page_fit import _pages
-from study_app.app.designer.measures.wanted import wanted_of
 from study_app.authoring.edited_study import read
 from study_app.authoring.measures.planned import ENOUGH
 from study_app.authoring.new_study import template
-from study_app.authoring.writer.edits import Set
+from study_app.authoring.writer.edits import Set, Unset
 from study_app.gui.participant.page_widgets import parts_of
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
-from study_app.protocol.checks.expected_precision import imprecise, threshold_plan
+from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped_file
 from study_app.protocol.wording.languages import words
-from study_app.viewmodels.designer.measures.measures_view import Controls, focus_of
+from study_app.viewmodels.designer.measures.level_plots import Controls
+from study_app.viewmodels.designer.measures.measures_view import Focus, focus_of
 from study_app.viewmodels.designer.measures.number_cards import ANEW, FAILED, UNKNOWN
 from study_app.viewmodels.designer.requests import RetypeFile
 from study_app.workers.server import Crashed, Stopped
-from tests.app.designer.measures.conftest import Worker, jnd, shown
+from tests.app.designer.measures.conftest import Worker, answer_to, jnd, shown
 
 
 @pytest.mark.slow
@@ -44,7 +40,6 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     jnd(designer)
     page = designer.place.measures
     qtbot.waitUntil(lambda: bool(worker.orders))
-    assert [type(one) for one in worker.orders[0].wanted] == [Observing, Grouping, Measuring, Advising]
     assert page.numbers.parts[0].number.text() == UNKNOWN
     assert page.numbers.parts[0].note.text() == ANEW
     assert page.numbers.parts[3].number.text() != UNKNOWN  # how long it lasts is known at once
@@ -61,14 +56,14 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     qtbot.waitUntil(lambda: len(worker.orders) == 2)
     assert page.numbers.parts[1].note.text() == ANEW  # grey, with the number of before
     assert page.numbers.parts[1].number.text() == "± 26"
-    assert page.function.shown.anew
+    assert page.function.grey
     designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 100))
     qtbot.waitUntil(lambda: worker.stops == 1)  # what was under way is given up
     qtbot.waitUntil(lambda: len(worker.orders) == 3)
-    assert worker.orders[2].wanted[0].plan.trials == 100
+    assert worker.orders[2].protocol.methods["adaptive"].trials == 100
     designer.editing.undo()
     designer.editing.undo()
-    qtbot.waitUntil(lambda: not page.function.shown.anew)  # kept by what it depends on
+    qtbot.waitUntil(lambda: not page.function.grey)  # kept by what it depends on
     qtbot.wait(120)
     assert len(worker.orders) == 3
     designer.editing.make("Change", Set(("pages", "welcome", "title"), "Hello"))
@@ -79,40 +74,32 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     assert not worker.works  # a session may begin: nothing is simulated any more
     designer.controller.measures.fit.found.emit()  # as what was looked for when it was left
     qtbot.wait(120)
-    assert not designer.controller.measures.slow.rest.isActive()
+    assert not designer.controller.measures.rest.isActive()
 
 
 @pytest.mark.slow
-def test_a_card_says_how_far_its_simulations_are_and_that_one_crashed(
+def test_numbers_appear_as_they_come_and_the_others_say_that_their_simulation_crashed(
     qtbot: Any, designer: Any, worker: Worker
 ) -> None:
     jnd(designer)
     qtbot.waitUntil(lambda: bool(worker.orders))
-    observing, _, *others = worker.orders[0].wanted
-    one, people, *_ = designer.place.measures.numbers.parts[1:]
-    worker.given.append((1, Counted(observing, 240, 400)))
-    qtbot.waitUntil(lambda: one.note.text() == "240 of 400 simulated")
-    assert people.note.text() == ANEW  # it waits for its turn
-    assert designer.place.measures.cards["function"].legend.text() == "240 of 400 simulated"
-    worker.answer(Observing)
+    jnds, one, people, _ = designer.place.measures.numbers.parts
+    assert {part.note.text() for part in (jnds, one, people)} == {ANEW}
+    assert designer.place.measures.cards["function"].legend.text().casefold() == ANEW
+    worker.given.append((1, replace(answer_to(worker.orders[0]), group=None, measurable=None)))
+    shown(qtbot, designer, 1, "± 26")
     worker.given.append((1, Crashed(1)))
     qtbot.waitUntil(lambda: people.note.text() == FAILED[2])
     assert (people.number.text(), one.number.text()) == (UNKNOWN, "± 26")
     assert people.more.text() == "The process ended with exit code 1; the terminal may show why."
-    qtbot.waitUntil(lambda: len(worker.orders) == 2)
-    assert worker.orders[1].wanted == tuple(others)  # those after it are simulated all the same
-    worker.given.append((2, Crashed(-9)))
-    qtbot.waitUntil(lambda: len(worker.orders) == 3)
-    worker.given.append((3, Crashed(-9)))
-    qtbot.waitUntil(lambda: ANEW not in [part.note.text() for part in designer.place.measures.numbers.parts])
     designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
-    qtbot.waitUntil(lambda: len(worker.orders) == 4)
+    qtbot.waitUntil(lambda: len(worker.orders) == 2)
     assert people.note.text() == ANEW  # another study, another try
 
 
 @pytest.mark.slow
 def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> None:
-    designer.controller.measures.slow.rest.setInterval(10)
+    designer.controller.measures.rest.setInterval(10)
     jnd(designer)
     part = designer.place.measures.numbers.parts[1]
     qtbot.waitUntil(lambda: part.note.text() == FAILED[2])
@@ -121,26 +108,37 @@ def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> 
     assert designer.place.measures.numbers.parts[3].number.text() == "17"
 
 
+def order(trials: int, **controls: float) -> Simulation:
+    """Return the simulation of the block of a template with so many trials."""
+    block = ("blocks", "viscosity")
+    study, _ = template("viscosity-jnd").edited(
+        Set(("methods", "adaptive", "trials"), trials), Unset((*block, "break_every")), Unset((*block, "break_page")),
+        Unset(("pages", "rest")),
+    )  # fmt: skip
+    assert study.protocol is not None
+    focus = focus_of(study.protocol, block)
+    found = simulation_of(study.protocol, focus, Controls(**controls))  # type: ignore[arg-type]
+    assert found is not None
+    return found
+
+
 @pytest.mark.slow
 @pytest.mark.nightly
 def test_the_worker_process_simulates_observers_and_studies() -> None:
-    protocol = template("viscosity-jnd").protocol
-    assert protocol is not None
-    plan = threshold_plan(protocol, protocol.blocks["viscosity"])
-    assert plan is not None
     client = start_measure_worker()
-    plan = plan.with_trials(20)
-    client.order(MeasureOrder((Observing(plan, 0.2, 0.02), Grouping(plan, 6, 0.5))))
+    client.order(order(20, participants=6, precision=0.5, threshold=0.2))
     found: list[Any] = []
     for _ in range(600):
         found += client.answers(0.5)
         if found and found[-1][1] is None:
             break
     client.close()
-    observed, group = (answer[1] for _, answer in found if isinstance(answer, tuple))
-    assert observed.threshold == 0.2
-    assert 0.0 <= group.share <= 1.0
-    assert group.more_trials > group.trials == 20
+    last = found[-2][1]
+    assert found[0][1].group is None  # observers come first
+    assert last.observed.threshold == 0.2
+    assert 0.0 <= last.group.share <= 1.0
+    assert last.group.more_trials > last.group.trials == 20
+    assert last.measurable is not None
 
 
 @pytest.mark.slow
@@ -156,7 +154,7 @@ def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worke
     qtbot.waitUntil(page.earlier.isVisible)
     assert [part.number.text() for part in page.numbers.parts] == before
     assert {ink(part) for part in page.numbers.parts} == {grey}
-    assert page.function.shown.anew  # drawn in grey, too
+    assert page.function.grey  # drawn in grey, too
     assert "last valid state" in page.earlier.text()
     designer.editing.undo()
     qtbot.waitUntil(lambda: not page.earlier.isVisible())
@@ -166,7 +164,7 @@ def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worke
     designer.editing.undo()
     qtbot.waitUntil(lambda: not page.earlier.isVisible())
     assert grey not in {ink(part) for part in page.numbers.parts}
-    assert not page.function.shown.anew
+    assert not page.function.grey
 
 
 class Serial(Executor):
@@ -186,11 +184,8 @@ def test_the_share_of_studies_is_that_of_the_command_power() -> None:
     planned = plans(protocol, (20,))
     ((done, found),) = list(sweep(planned, (6,), THRESHOLD_STUDIES, 1, Serial()))[-1:]
     answers: list[Any] = []
-    carry_out(MeasureOrder((Grouping(planned["viscosity"][20], 6, 0.5),)), answers.append, lambda: False)
-    *counted, (_, group) = answers
-    shares = [one.done / one.total for one in counted]
-    assert shares == sorted(shares)
-    assert 0.0 == shares[0] < shares[-1] < 1.0
+    carry_out(order(20, participants=6, precision=0.5), answers.append, lambda: False)
+    group = answers[-1].group
     assert done == group.studies
     assert group.share == found["viscosity", 20].within(0, 0.5)
     assert 0.0 < group.share < ENOUGH
@@ -204,21 +199,23 @@ def test_the_share_of_studies_is_that_of_the_command_power() -> None:
 def test_warnings_that_take_simulated_observers_are_those_of_check() -> None:
     protocol = template("viscosity-jnd").edited(Set(("analysis", "participants"), 4))[0].protocol
     assert protocol is not None
+    wanted = simulation_of(protocol, Focus(), Controls())
+    assert wanted is not None
     answers: list[Any] = []
-    carry_out(MeasureOrder((Advising("", protocol),)), answers.append, lambda: False)
-    assert answers[0][1] == tuple(imprecise(protocol, protocol.blocks["viscosity"]))
-    assert answers[0][1]
+    carry_out(wanted, answers.append, lambda: False)
+    assert answers[-1].warnings == tuple(imprecise(protocol, protocol.blocks["viscosity"]))
+    assert answers[-1].warnings
 
 
 def test_what_is_wanted_depends_on_forces_and_tasks_and_on_no_text() -> None:
     study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
     path = ("blocks", "liquids")
 
-    def wanted(*changes: Set) -> Detecting:
+    def wanted(*changes: Set) -> Simulation:
         changed, _ = study.edited(*changes)
         assert changed.formed is not None
-        (one,) = wanted_of(changed.formed, focus_of(changed.formed, path), Controls())
-        assert isinstance(one, Detecting)
+        one = simulation_of(changed.formed, focus_of(changed.formed, path), Controls())
+        assert one is not None
         return one
 
     same = wanted(Set(("blocks", "liquids", "title", "en"), "Other"), Set(("pages", "consent", "title", "en"), "Hello"))
@@ -244,7 +241,5 @@ def test_a_page_never_shown_has_the_parts_of_one_that_is(qtbot: Any, size: tuple
 
 
 def test_an_order_is_given_up_before_its_first_number() -> None:
-    protocol = template("viscosity-jnd").protocol
-    assert protocol is not None
     with pytest.raises(Stopped):
-        carry_out(MeasureOrder((Grouping(plans(protocol, (20,))["viscosity"][20], 6, 0.5),)), print, lambda: True)
+        carry_out(order(20), print, lambda: True)

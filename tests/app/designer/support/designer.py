@@ -21,7 +21,7 @@ NONE, LEFT = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.LeftButton
 
 
 def no_worker() -> None:
-    """Refuse to start the worker of slow numbers: tests that need it give another one."""
+    """Refuse to start the worker of simulations: tests that need it give another one."""
     raise OSError("no process in this test")
 
 
@@ -34,7 +34,7 @@ class Designer(KeyUser):
         self.file.write_text(DEMO, encoding="utf-8")
         self.results = folder / "results"
         self.controller = DesignerController(self.results)
-        self.controller.measures.slow.make = no_worker
+        self.controller.measures.make = no_worker
         self.editing, self.saving = self.controller.editing, self.controller.saving
         self.place = self.controller.place
         self.messages: list[tuple[str, str]] = []

@@ -4,14 +4,14 @@ import pytest
 
 from study_app.authoring.edited_study import Study, read
 from study_app.authoring.measures.observers import Measurable, Observed
-from study_app.authoring.measures.planned import GroupPrecision
+from study_app.authoring.measures.planned import GroupPrecision, Simulated
 from study_app.authoring.new_study import template
 from study_app.authoring.study_facts import facts
 from study_app.authoring.writer.edits import Set
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.measures.level_plots import AS_ASKED, Simulated
-from study_app.viewmodels.designer.measures.measures_view import Controls, SlowResults, measures_view
+from study_app.viewmodels.designer.measures.level_plots import AS_ASKED, Controls
+from study_app.viewmodels.designer.measures.measures_view import measures_view
 from study_app.viewmodels.designer.measures.number_cards import UNKNOWN, LinesCard, MeasuresView, SessionCard
 
 
@@ -20,10 +20,9 @@ def study_of(name: str) -> Study:
 
 
 def view(
-    study: Study, path: Path, slow: SlowResults | None = None, people: int = 12, planned: int | None = None
+    study: Study, path: Path, simulated: Simulated | None = None, controls: Controls | None = None
 ) -> MeasuresView:
-    controls = Controls(people, planned=planned)
-    return measures_view(study, facts(study), path, controls, slow or SlowResults(), {})
+    return measures_view(study, facts(study), path, controls or Controls(), simulated or Simulated(), {})
 
 
 def test_a_force_that_a_limit_clips_is_said_and_sums_of_a_broken_study_are_not_known() -> None:
@@ -58,7 +57,7 @@ def test_cards_say_which_levels_are_clipped_and_whether_that_is_simulated() -> N
         ),
         (template("viscosity-jnd"), "", ""),
     ):
-        jnds, _, people, _ = view(study, ("blocks", "viscosity"), SlowResults(simulated=measured)).numbers
+        jnds, _, people, _ = view(study, ("blocks", "viscosity"), measured).numbers
         assert jnds.more == said
         own = view(study, ("blocks", "training")).forces
         assert own is not None
@@ -96,16 +95,16 @@ def test_where_nothing_is_measured_the_cards_say_why(
 ) -> None:
     study, _ = template("viscosity-jnd").edited(Set(("stimuli", "damping", key), value))
     if why:
-        slow = SlowResults(simulated=Simulated(measurable=Measurable(None, ())))
-        jnds = view(study, ("blocks", "viscosity"), slow).numbers[0]
+        asked = Controls(threshold=threshold or 0.19)
+        jnds = view(study, ("blocks", "viscosity"), Simulated(measurable=Measurable(None, ())), asked).numbers[0]
         assert (jnds.number, jnds.note) == ("none", ("bad", "warning", why))
         assert jnds.more.startswith(f"{more} clipped" if "clipped" in why else more)
     if threshold is None:
         return
     observed = Observed(threshold, 0.02, 400, 0.75, (0.1,), (0.7,), ((0.7,),), (), ((1, (0.1,) * 5),), (), 0.03, 80)
     group = GroupPrecision(12, 60, 0.15, 80, 1.0, 107, 1.0, 60, 12)
-    slow = SlowResults(simulated=Simulated(observed, group=group, threshold=threshold))
-    _, one, people, _ = view(study, ("blocks", "viscosity"), slow).numbers
+    simulated, asked = Simulated(observed, group=group), Controls(threshold=threshold)
+    _, one, people, _ = view(study, ("blocks", "viscosity"), simulated, asked).numbers
     if threshold == 0.019 or not why:  # its levels are presented in full
         assert (one.number, people.note[2]) == ("± 3", "Enough")
         return
