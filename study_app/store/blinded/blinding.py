@@ -398,12 +398,12 @@ def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
 
 def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> events.Event:
     """Return an event as the journal of a session that began with ``start`` holds it."""
-    fields, names = event.fields(), _SEALED_IN.get(type(event), frozenset())
-    measured = {name: value for name, value in fields.items() if name in names}
+    line, names = event.line(), _SEALED_IN.get(type(event), frozenset())
+    measured = {name: value for name, value in line.items() if name in names}
     if not start.measures_sealed or not measured:
         return event
-    rest = {name: value for name, value in fields.items() if name not in names}
-    return events.read_event({"event": event.event, **rest, "sealed": seal(_whose(start, event), measured, key)})
+    rest = {name: value for name, value in line.items() if name not in names}
+    return events.read_event({**rest, "sealed": seal(_whose(start, event), measured, key)})
 
 
 def seal(whose: Sequence[object], values: Mapping[str, Any], key: Key) -> str:

@@ -116,7 +116,7 @@ def test_the_report_of_a_sealed_study_shows_counts_and_times_by_code_and_no_leve
     assert sum(times["numbers"]["n"] for one in held for times in one["times"]) == 3 * 54
     assert not list(tmp_path.glob("levels-*"))
     key = read_key(sealed_levels)
-    published = raw(read(StudyFolder(sealed_levels).sessions()[0].receipt))["protocol"]
+    published = read(StudyFolder(sealed_levels).sessions()[0].receipt)["protocol"]
     levels = presented_numbers(whole_protocol(published, key))
     assert levels == presented_numbers(load(str(sealed_levels.parent / "levels.toml")))
     words = certain_telltales(key.tables, published, levels)

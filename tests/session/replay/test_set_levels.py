@@ -16,7 +16,7 @@ from study_app.store.verification.leaks import certain_telltales, find_leaks, re
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
-from tests.journal_lines import raw
+from tests.journal_lines import event_from, raw
 from tests.protocol.trials.matching import ALONE, DELAY, text_of
 from tests.store.forging import Lines, change, cut
 
@@ -160,8 +160,8 @@ def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tm
 
 def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: Path) -> None:
     lines, key = lines_of(session_of(study)), read_key(study)
-    protocol = whole_protocol(raw(read(session_of(study) / "receipt.json"))["protocol"], key)
-    numbers = recorded_numbers(protocol, lines)
+    protocol = whole_protocol(read(session_of(study) / "receipt.json")["protocol"], key)
+    numbers = recorded_numbers(protocol, map(event_from, lines))
     assert {line["setting"] for line in lines if line.get("setting") is not None} <= numbers
     assert len(numbers) > sum(line["event"] == "trial_started" for line in lines) + 6
     words = certain_telltales(key.tables, {}, numbers)

@@ -16,7 +16,7 @@ from study_app.errors import StoreError
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal import Journal, SessionClock, read, scan
 from study_app.store.journals.journal_events import problem, unknown_events
-from tests.journal_lines import event_of
+from tests.journal_lines import event_of, raw
 from tests.store.conftest import AWKWARD, Start
 
 
@@ -201,7 +201,7 @@ def test_what_is_wrong_with_a_line_is_named(held: dict[str, Any], sentence: str)
 
 def test_an_event_of_another_version_is_told_once_and_what_the_store_writes_is_known(finished: Start) -> None:
     lines = [line("weather", wind="x"), line("note", kind="note", text=""), line("weather")]
-    assert list(unknown_events(lines)) == ["weather"]
+    assert list(unknown_events(list(map(journal_events.read_event, lines)))) == ["weather"]
     written = finished(recordings=True).lines
     assert list(unknown_events(written)) == []
-    assert {problem(each) for each in (*lines, *written)} == {None}
+    assert {problem(each) for each in (*lines, *raw(written))} == {None}

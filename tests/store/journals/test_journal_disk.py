@@ -201,11 +201,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from study_app.store.journals.journal import Journal
+from study_app.store.journals.journal_events import read_event
 journal = Journal.create(Path(sys.argv[1]))
 count = 0
 while True:
     count += 1
-    journal.append("counted", value=count, text="x" * (count % 977))
+    journal.append(read_event({"event": "counted", "value": count, "text": "x" * (count % 977)}))
     print(count, flush=True)
 """
 
