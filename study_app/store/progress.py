@@ -23,15 +23,6 @@ class TrialAnswer:
     seconds: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class NoteLine:
-    """A note or mark of the operator, ``at_s`` in working time of the session."""
-
-    at_s: float
-    kind: str
-    text: str
-
-
 @dataclass(slots=True)
 class Progress:
     """The progress of a session and its events, from the lines of its journal given to `take`.

@@ -31,7 +31,7 @@ _MAY_BE_NULL = (
     "level", "standard", "part", "value", "answer", "onset_s", "first_s", "last_s", "gap_s", "device",
     "t_task_s", "scene",
 )  # fmt: skip
-_OF_ALL = ("n", "t_s", "at", "previous", "others")
+_OF_ALL = ("n", "t_s", "at", "previous")
 _ANSWER = ("item", "number", "value", "onset_s", "first_s", "last_s", "changes")
 
 
@@ -187,7 +187,9 @@ class Event:
 
     def __init_subclass__(cls, *, group: bool = False) -> None:
         declared = [
-            one for one in dataclasses.fields(dataclass(frozen=True, kw_only=True)(cls)) if one.name not in _OF_ALL
+            one
+            for one in dataclasses.fields(dataclass(frozen=True, kw_only=True)(cls))
+            if one.name not in (*_OF_ALL, "others")
         ]
         cls.declared = tuple(one.name for one in declared)
         cls.required = tuple(one.name for one in declared if one.default is dataclasses.MISSING)
@@ -578,18 +580,13 @@ def problem(line: Mapping[str, Any]) -> str | None:
 
 def read_event(line: Mapping[str, Any]) -> Event:
     """Return the event of a line that has no `problem`."""
-    kind = EVENTS.get(line["event"])
-    if kind is None:
-        return UnknownEvent(**_split(line, _OF_ALL))
-    return kind(**_split({name: value for name, value in line.items() if name != "event"}, (*_OF_ALL, *kind.declared)))
-
-
-def _split(line: Mapping[str, Any], declared: Sequence[str]) -> dict[str, Any]:
-    """Return the declared fields, and the rest as ``others``."""
-    own = {name: value for name, value in line.items() if name in declared}
+    kind, others = EVENTS.get(line["event"], UnknownEvent), dict(line)
+    if kind is not UnknownEvent:
+        del others["event"]
+    own = {name: others.pop(name) for name in (*_OF_ALL, *kind.declared) if name in others}
     if "items" in own:
         own["items"] = tuple(map(Response.read, own["items"]))
-    return {**own, "others": {name: value for name, value in line.items() if name not in declared}}
+    return kind(**own, others=others)
 
 
 def plain(value: Any) -> Any:
