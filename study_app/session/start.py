@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from study_app.devices.registry import check_options, descriptor_of
 from study_app.devices.rig import Rig
-from study_app.errors import SessionError, StoreError
+from study_app.errors import SessionError
 from study_app.outlets.session_outlets import Outlets, OutletStatus
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
@@ -32,7 +32,7 @@ from study_app.store.journals.journal_events import start_of
 from study_app.store.progress import progress_of
 from study_app.store.sessions.begin import SessionStart, begin, check_participant, refuse_never_begun, used_ids
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import check_can_go_on, reopen
+from study_app.store.sessions.recovery import check_can_go_on, refuse_finished, reopen
 from study_app.store.tables.study_files import check_study
 from study_app.store.workstation import MachineSettings
 from study_app.video.sources import Videos
@@ -117,11 +117,7 @@ def resumed(
     refuse_never_begun(folder)
     lines = journal.read(folder.journal)
     start, done = start_of(lines), progress_of(lines)
-    if done.ended is not None:
-        raise StoreError(
-            f"{folder.path} is finished ({done.ended}) and cannot be resumed; use a new session number for another "
-            "visit"
-        )
+    refuse_finished(folder, done)
     read = partial(source_to_resume, session_folder)
     chosen = protocol if protocol is not None else find_protocol(start, candidates, read)
     source = read(chosen)

@@ -158,7 +158,7 @@ class Progress:
         """Take the answers of a trial or a form as confirmed."""
         self.answered[line.form if isinstance(line, events.FormAnswered) else line.trial] = len(line.items)
         if isinstance(line, events.Responses) and line.trial == self.of_intervals:
-            answer = line.items[0].answer
+            answer = line.items[0]
             seconds = None if answer.onset_s is None or answer.first_s is None else answer.first_s - answer.onset_s
             self.trial_answers[line.trial] = TrialAnswer(answer.value, seconds)
         self.answers = {}
@@ -268,7 +268,7 @@ def heard_in(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[Heard, 
             if start.arrangement is None:
                 raise KeyError("arrangement")
             arrangement = arrangement_of(design_of(protocol, block), start.arrangement)
-            answer: Any = line.items[0].answer.value
+            answer: Any = line.items[0].value
             of_trial = line.trial, start.code, start.level, arrangement
             found[line.trial] = heard_of(protocol, block, *of_trial, answer, catch=bool(start.catch))
     return tuple(found[number] for number in sorted(found))

@@ -1,6 +1,6 @@
 """How a step of the schedule is entered, and what the machine does with answers. Pure."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any, Final, TypeAlias
 
 from study_app.errors import SessionError
@@ -263,7 +263,10 @@ def submit(state: SessionState, event: Submitted) -> Result:
     if missing:
         listed = ", ".join(map(str, missing))
         raise SessionError(f"not every required statement is answered: answer {listed} first")
-    items = tuple(Response(item, number, answers[item], _kind(state, item)) for number, item in numbered)
+    items = tuple(
+        Response(item=item, number=number, kind=_kind(state, item), **asdict(answers[item]))
+        for number, item in numbered
+    )
     line: journal.Event = (
         journal.FormAnswered(form=state.step.form, items=items)
         if isinstance(state.step, FormStep)

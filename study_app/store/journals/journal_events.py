@@ -32,7 +32,7 @@ _MAY_BE_NULL = (
     "t_task_s", "scene",
 )  # fmt: skip
 _OF_ALL = ("n", "t_s", "at", "previous")
-_ANSWER = ("item", "number", "value", "onset_s", "first_s", "last_s", "changes")
+_RESPONSE = ("item", "number", "kind", "value", "onset_s", "first_s", "last_s", "changes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,9 @@ def _are_texts(value: object) -> bool:
 def _are_answers(value: object) -> bool:
     return isinstance(value, list) and all(
         isinstance(answer, dict)
-        and all(name in answer and holds(_kind_name(answer, name), answer[name]) for name in _ANSWER)
+        and all(
+            name in answer and holds(_kind_name(answer, name), answer[name]) for name in _RESPONSE if name != "kind"
+        )
         for answer in value
     )
 
@@ -143,27 +145,17 @@ class Answer:
         return Answer(onset_s=self.onset_s)
 
 
-@dataclass(frozen=True, slots=True)
-class Response:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Response(Answer):
     """A confirmed answer; ``number`` is its question's on the page, ``kind`` the kind of question, since format 2."""
 
     item: Text
     number: Integer
-    answer: Answer
     kind: Text | None = None
 
     def fields(self) -> dict[str, Any]:
         """Return it as written in a line."""
-        times = {name: getattr(self.answer, name) for name in ("onset_s", "first_s", "last_s")}
-        kind = {} if self.kind is None else {"kind": self.kind}
-        which = {"item": self.item, "number": self.number, **kind}
-        return {**which, "value": self.answer.value, **times, "changes": self.answer.changes}
-
-    @classmethod
-    def read(cls, row: Mapping[str, Any]) -> "Response":
-        """Return what was written in a line."""
-        answer = Answer(*(row[name] for name in ("onset_s", "first_s", "last_s", "changes", "value")))
-        return cls(row["item"], row["number"], answer, row.get("kind"))
+        return {name: getattr(self, name) for name in _RESPONSE if name != "kind" or self.kind is not None}
 
 
 def _journal_name(kind: type) -> str:
@@ -547,7 +539,7 @@ def _known_kinds() -> Iterator[tuple[str, tuple[Kind, bool]]]:
     aliases: tuple[Any, ...] = (Text, Time, Number, Integer, Flag)
     of_columns = {alias.__metadata__[0].words: alias.__metadata__[0] for alias in aliases}
     yield from ((column.name, (of_columns[column.kind], True)) for column in (*TRIALS, *DELIVERED, *VIDEO))
-    for owner in (Response, Answer, Event, *EVENTS.values()):
+    for owner in (Response, Event, *EVENTS.values()):
         for name, hint in get_type_hints(owner, include_extras=True).items():
             for part in (hint, *get_args(hint)):
                 yield from ((name, (kind, name in _MAY_BE_NULL)) for kind in getattr(part, "__metadata__", ()))
@@ -585,7 +577,7 @@ def read_event(line: Mapping[str, Any]) -> Event:
         del others["event"]
     own = {name: others.pop(name) for name in (*_OF_ALL, *kind.declared) if name in others}
     if "items" in own:
-        own["items"] = tuple(map(Response.read, own["items"]))
+        own["items"] = tuple(Response(**{name: row[name] for name in _RESPONSE if name in row}) for row in own["items"])
     return kind(**own, others=others)
 
 

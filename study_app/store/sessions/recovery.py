@@ -38,7 +38,7 @@ from study_app.store.folders import RECORDING_NAME, SessionFolder, StudyFolder, 
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Contents, Journal, SessionClock
-from study_app.store.progress import progress_of, recordable
+from study_app.store.progress import Progress, progress_of, recordable
 from study_app.store.recorder import hashes_of, lost, recorded, recording_files
 from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, surroundings
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
@@ -312,13 +312,17 @@ def _unfinished(folder: SessionFolder, lines: list[events.Event]) -> events.Sess
         raise StoreError(
             f"{folder.journal} has no line: the program ended before the session began; use a new session number"
         )
-    done = progress_of(lines)
+    refuse_finished(folder, progress_of(lines))
+    return events.start_of(lines)
+
+
+def refuse_finished(folder: SessionFolder, done: Progress) -> None:
+    """Refuse (StoreError) to resume a session that has its end."""
     if done.ended is not None:
         raise StoreError(
             f"{folder.path} is finished ({done.ended}) and cannot be resumed; use a new session number for another "
             "visit"
         )
-    return events.start_of(lines)
 
 
 def _same_protocol(

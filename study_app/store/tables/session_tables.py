@@ -298,18 +298,18 @@ def _group(start: events.SessionStarted) -> Row:
     return {"group": start.group} if (start.protocol_format or 1) > 1 else {}
 
 
-def _response(session: Row, about: Row, response: events.Response, answered_at: str) -> Row:
+def _response(session: Row, about: Row, answer: events.Response, answered_at: str) -> Row:
     """Return the row of an answer; only in format 2 it says its kind, and the answer as text and as number."""
-    answer, value = response.answer, response.answer.value
+    value = answer.value
     row = {
         **session,
         "form": None,
         **about,
-        "kind": response.kind,
-        "response": value if response.kind is None or value is None else _text(value),
+        "kind": answer.kind,
+        "response": value if answer.kind is None or value is None else _text(value),
         "value": value if isinstance(value, int | float) else None,
-        "item": response.item,
-        "number": response.number,
+        "item": answer.item,
+        "number": answer.number,
         "cannot_judge": value is None and answer.given,
         "onset_s": answer.onset_s,
         "first_choice_s": answer.first_s,
@@ -317,7 +317,7 @@ def _response(session: Row, about: Row, response: events.Response, answered_at: 
         "changes": answer.changes,
         "answered_at": answered_at,
     }
-    return {name: row[name] for name in header(tables_of(2 if response.kind else 1)["responses"])}
+    return {name: row[name] for name in header(tables_of(2 if answer.kind else 1)["responses"])}
 
 
 def _text(value: Any) -> str:

@@ -259,7 +259,7 @@ def wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
             line_name = f"line {line.n} ({line.event})"
             hides = any(row.kind is not None for row in line.items)  # format 2: it may have been shown for a while
             for row in line.items:
-                if not _same_answer(row.answer, chosen.pop(row.item, events.Answer())):
+                if not _same_answer(row, chosen.pop(row.item, events.Answer())):
                     wrong = "another answer than was chosen before: it was changed"
                     yield f"{line_name} has for {row.item!r} in {where} {wrong}"
             for item, answer in chosen.items():

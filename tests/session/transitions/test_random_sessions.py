@@ -81,9 +81,7 @@ def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events:
             kept[before.trial.number] = latest[before.trial.number, before.attempt]
         state = after
     confirmed = {write.line.trial: write.line.items for write in disk if write.line.event == "responses"}
-    assert {
-        trial: {row.item: row.answer.value for row in rows if row.answer.given} for trial, rows in confirmed.items()
-    } == kept
+    assert {trial: {row.item: row.value for row in rows if row.given} for trial, rows in confirmed.items()} == kept
     chosen = [write for write in disk if write.line.event == "choice"]
     assert len(chosen) >= sum(len(answers) for answers in kept.values())
     if state.phase is Phase.STALLED:
