@@ -6,9 +6,12 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
+import numpy as np
+
 from study_app.authoring.templates import FOLDER
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.model import Protocol
+from study_app.psychophysics.precision import BETWEEN_PEOPLE
 
 FILE: Final = FOLDER / "known_answers.json"
 STUDIES: Final = 100
@@ -72,10 +75,6 @@ def simulated(protocol: Protocol, planted: float, unit: str, source: str) -> Kno
     ValueError
         The study has no thresholds, or does not say how many people take part.
     """
-    import numpy as np  # noqa: PLC0415
-
-    from study_app.psychophysics.precision import BETWEEN_PEOPLE  # noqa: PLC0415
-
     plan = next((one for block in protocol.main_blocks if (one := threshold_plan(protocol, block)) is not None), None)
     people = protocol.analysis.participants if protocol.analysis is not None else None
     if plan is None or people is None or plan.stimulus.spacing != "log":
@@ -83,8 +82,6 @@ def simulated(protocol: Protocol, planted: float, unit: str, source: str) -> Kno
     rng = np.random.default_rng(SEED)
     apart = math.log10(BETWEEN_PEOPLE) * rng.standard_normal((STUDIES, people))
     estimates = plan.simulate((plan.stimulus.coordinate(planted) + apart).ravel(), rng)
-    if estimates is None:
-        raise ValueError(f'no tracks of the method "{plan.method.kind}" are simulated')
     means = 10.0 ** estimates.medians.reshape(STUDIES, people).mean(axis=1)
     low, high = np.quantile(means, MIDDLE)
     figures = (round(float(one), 4) for one in (means.mean(), low, high))

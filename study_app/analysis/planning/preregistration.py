@@ -277,8 +277,7 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
     reasons = []
     for block in protocol.main_blocks:
         plan = precision_plan(protocol, block)
-        found = None if plan is None else expected_of(plan)
-        if plan is None or found is None or not found.measured:
+        if plan is None or not (found := expected_of(plan)).measured:
             continue
         reached = ""
         if one.participants is not None:

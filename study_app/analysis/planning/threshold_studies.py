@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study_app import __version__
 from study_app.analysis.data.blocks import spoken
@@ -158,15 +157,9 @@ def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Fo
 
 def _estimates(plan: ThresholdPlan, truth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Return posterior medians and variances of observers with these thresholds [u]."""
-    medians: list[NDArray[np.float64]] = []
-    variances: list[NDArray[np.float64]] = []
-    for first in range(0, len(truth), TRACKS_AT_ONCE):
-        found = plan.simulate(truth[first : first + TRACKS_AT_ONCE], rng)
-        if found is None:
-            raise AnalysisError(f'power simulates no tracks of the method "{plan.method.kind}"')
-        medians.append(found.medians)
-        variances.append(found.variances)
-    return np.concatenate(medians), np.concatenate(variances)
+    starts = range(0, len(truth), TRACKS_AT_ONCE)
+    found = [plan.simulate(truth[first : first + TRACKS_AT_ONCE], rng) for first in starts]
+    return np.concatenate([one.medians for one in found]), np.concatenate([one.variances for one in found])
 
 
 def sweep(

@@ -95,8 +95,8 @@ class Measurable:
     planted: tuple[Planted, ...]
 
 
-def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check = unchecked) -> Observed | None:
-    """Return what observers with a threshold (a level) show; None where tracks of the method are not simulated."""
+def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check = unchecked) -> Observed:
+    """Return what observers with a threshold (a level) show."""
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     u = stimulus.coordinate(threshold)
     medians, course, presented = [], None, []
@@ -104,8 +104,6 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
     for _ in range(0, OBSERVERS, AT_ONCE):
         check()
         answered = plan.answered(np.full(AT_ONCE, u), random, lapses)
-        if answered is None:
-            return None
         medians.append(plan.estimates(answered).medians)
         presented += [one.levels[~np.isnan(one.levels)] for one in answered.tracks]
         if first is None:
@@ -133,8 +131,8 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
 
 def measurable(
     plan: ThresholdPlan, lapses: float, least: float, check: Check = unchecked, most: float = math.inf
-) -> Measurable | None:
-    """Return which thresholds a block can measure; None where tracks of the method are not simulated.
+) -> Measurable:
+    """Return which thresholds a block can measure.
 
     ``lapses`` is the lapse rate of the observers. No threshold counts below the level ``least``, twice the largest
     error of a valid trial, or above ``most``, the highest one that is presented in full. ``check``
@@ -149,8 +147,6 @@ def measurable(
         for _ in range(0, OBSERVERS, AT_ONCE):
             check()
             answered = plan.answered(np.full(AT_ONCE, u), random, lapses)
-            if answered is None:
-                return None
             estimates = plan.estimates(answered)
             levels += [stimulus.level_of(one) for one in estimates.medians.tolist()]
             held.append((estimates.lows <= u) & (u <= estimates.highs))

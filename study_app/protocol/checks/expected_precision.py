@@ -60,6 +60,7 @@ class SensitivityPlan:
     roving: bool
     of_each: str
     value: ClassVar[float] = D_PRIME
+    unit: ClassVar[str] = ""
     words: ClassVar[str] = f"at d′ = {D_PRIME:g}: "
     """What is assumed, in words."""
     per = property(lambda self: f" per {self.of_each}")
@@ -96,6 +97,7 @@ class EstimationPlan:
     repetitions: int
     value: float
     per: ClassVar[str] = ""
+    unit: ClassVar[str] = ""
     words = property(lambda self: f"exponent of {self.value:g}: ")
     trials = property(lambda self: len(self.levels) * self.repetitions)
 
@@ -116,6 +118,7 @@ class RatingPlan:
     points: int
     trials: int
     per: ClassVar[str] = " per level"
+    unit: ClassVar[str] = ""
     value: ClassVar[float] = D_PRIME
     words: ClassVar[str] = f"at d_a = {D_PRIME:g}: "
 
@@ -219,6 +222,7 @@ class ThresholdPlan:
     clipping: Clipping | None = None
 
     per: ClassVar[str] = " per standard"
+    words: ClassVar[str] = ""
     trials = property(lambda self: self.method.presentations(self.stimulus) * self.method.tracks)
     """Comparisons of each standard, at most."""
 
@@ -230,6 +234,12 @@ class ThresholdPlan:
         changed = {"trials": each * method.tracks} if method.adaptive else {"repetitions": each}
         catch = round(self.catch * each / max(1, self.trials // least))
         return replace(self, method=method.model_copy(update=changed), catch=catch)
+
+    @property
+    def unit(self) -> str:
+        """That of a threshold, after a space."""
+        weber = self.stimulus.level_kind == "weber"
+        return "" if weber else f" {quantity(self.stimulus.vary).unit}".rstrip()
 
     def each_standard(self) -> tuple[ThresholdPlan, ...]:
         """Return the plan of each standard, the highest first, as limits clip it; this one where all are alike."""
@@ -257,8 +267,8 @@ class ThresholdPlan:
         with np.errstate(divide="ignore"):  # a level of 0 has the logarithm −∞
             return np.log10(np.maximum(found, 0.0)) if log else found
 
-    def answered(self, thresholds: Floats, random: Generator, lapses: float = LAPSES) -> Answered | None:
-        """Return what observers with thresholds (n,) [u] answer; None: the method's tracks are not simulated."""
+    def answered(self, thresholds: Floats, random: Generator, lapses: float = LAPSES) -> Answered:
+        """Return what observers with thresholds (n,) [u] answer."""
         stimulus, design = self.stimulus, self.design
         assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
         if guess is None:
@@ -269,10 +279,7 @@ class ThresholdPlan:
         tracks, yes = [], np.zeros(len(thresholds))
         for number in range(1, self.method.tracks + 1):
             noise = random.random((len(thresholds), noise_trials)) if noise_trials else None
-            one = self.method.simulated(TrackSetting(stimulus, design, number), observers, random, noise)
-            if one is None:
-                return None
-            tracks.append(one)
+            tracks.append(self.method.simulated(TrackSetting(stimulus, design, number), observers, random, noise))
             yes += 0 if noise is None else (noise < guess).sum(axis=1)
         caught = observers.probability(high) > random.random((self.catch * len(tracks), len(thresholds)))
         right = caught.sum(axis=0)
@@ -301,10 +308,9 @@ class ThresholdPlan:
         fits = (fit(places, right, wrong, grid) for right, wrong in counts.transpose(1, 0, 2))
         return Estimates(*np.array([(one.threshold, *one.interval, one.variance) for one in fits]).T)
 
-    def simulate(self, thresholds: Floats, random: Generator) -> Estimates | None:
-        """Return what the analysis estimates of observers with these thresholds [u]; None: tracks are not simulated."""
-        found = self.answered(thresholds, random)
-        return None if found is None else self.estimates(found)
+    def simulate(self, thresholds: Floats, random: Generator) -> Estimates:
+        """Return what the analysis estimates of observers with these thresholds [u]."""
+        return self.estimates(self.answered(thresholds, random))
 
 
 def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
@@ -322,8 +328,8 @@ def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
 
 
 @lru_cache(maxsize=32)
-def expected(plan: ThresholdPlan) -> Expected | None:
-    """Return how precise thresholds are expected to be; None where the method's tracks are not simulated.
+def expected(plan: ThresholdPlan) -> Expected:
+    """Return how precise thresholds are expected to be.
 
     Only thresholds below the highest level that is presented in full have estimates; where those are not the larger
     half of all, none is expected.
@@ -338,8 +344,6 @@ def expected(plan: ThresholdPlan) -> Expected | None:
     halves, variances = [], []
     for one in simulated.each_standard():
         found = one.simulate(truth, np.random.default_rng(SEED))
-        if found is None:
-            return None
         full = one.measures(truth)
         halves.append(float((found.highs - found.lows)[full].mean()) / 2 if full.mean() > 0.5 else math.inf)
         variances.append(float((found.medians - truth)[full].var()) if full.mean() > 0.5 else math.inf)
@@ -359,26 +363,20 @@ def precision_plan(protocol: Protocol, block: Block) -> ThresholdPlan | MeanPlan
     return threshold_plan(protocol, block) or mean_plan(protocol, block)
 
 
-def expected_of(plan: ThresholdPlan | MeanPlan) -> Expected | None:
-    """Return how precise results are expected to be; None where the method's tracks are not simulated."""
+def expected_of(plan: ThresholdPlan | MeanPlan) -> Expected:
+    """Return how precise results are expected to be."""
     return expected(plan) if isinstance(plan, ThresholdPlan) else expected_mean(plan)
 
 
 def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
     """Yield the expected 95 % intervals of one participant and of the planned group, where any are expected."""
     plan = precision_plan(protocol, block)
-    found = None if plan is None else expected_of(plan)
-    if plan is None or found is None:
+    if plan is None:
         return
-    if not found.measured:
+    if not (found := expected_of(plan)).measured:
         yield "Expected precision", "none: the levels of most thresholds are clipped"
         return
-    unit, words = "", ""
-    if not isinstance(plan, ThresholdPlan):
-        words = plan.words
-    elif plan.stimulus.level_kind != "weber":
-        unit = f" {quantity(plan.stimulus.vary).unit}".rstrip()
-    one = f"±{found.half:.2g}{unit}" if found.factor is None else f"×/÷ {found.factor:.1f}"
+    one = f"±{found.half:.2g}{plan.unit}" if found.factor is None else f"×/÷ {found.factor:.1f}"
     people, precision = _planned(protocol)
     over = "" if found.standards == 1 else " over all standards"
     group = ""
@@ -386,14 +384,15 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
         group = f"; {people} participants ±{100 * found.of_group(people):.0f} %{over}"
     elif precision is not None and (needed := found.participants_for(precision)) is not None:
         group = f"; ±{100 * precision:g} %{over} takes {needed} participants"
-    yield "Expected precision", f"{words}one participant {one}{group} (95 % intervals)"
+    yield "Expected precision", f"{plan.words}one participant {one}{group} (95 % intervals)"
 
 
 def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield that the planned participants and trials do not reach the planned precision."""
     plan, (people, precision) = precision_plan(protocol, block), _planned(protocol)
-    if plan is None or people is None or precision is None or (found := expected_of(plan)) is None:
+    if plan is None or people is None or precision is None:
         return
+    found = expected_of(plan)
     if isinstance(plan, ThresholdPlan) and not found.measured:
         clips, named = plan.clipping, "" if plan.clipping is None else plan.clipping.named
         what = f"levels above {plan.highest:.3g}{named and f' of standard{named}'} are"

@@ -153,14 +153,12 @@ class Method(Table):
         """Return the classical estimate of a track, a level; None where it has none."""
         return None
 
-    def simulated(
-        self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None
-    ) -> Answers | None:
-        """Return the answers of simulated observers to one track each; None: the method has no such tracks.
+    def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
+        """Return the answers of simulated observers to one track each, of a method whose levels answers can have.
 
         ``noise`` (tracks, noise trials) are the uniform numbers of the answers to noise trials.
         """
-        return None
+        raise NotImplementedError(self.kind)
 
     def rounds(self, stimulus: Stimulus) -> int:
         """Return how many rounds of drawn levels a track has."""

@@ -1,6 +1,5 @@
 """What check says of the precision that a block's thresholds are expected to have."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -14,7 +13,6 @@ from study_app.protocol.checks.expected_precision import (
     threshold_plan,
 )
 from study_app.protocol.load import examined, parse, read_document
-from study_app.protocol.trials.methods import Adjustment
 
 TEXT = """
 format = 2
@@ -81,10 +79,6 @@ def test_long_tracks_are_scaled_from_shorter_ones():
     long, short = expected(plan), expected(plan.with_trials(200))
     assert long.trials == 1000
     assert long.spread == pytest.approx(short.spread / math.sqrt(5))
-
-
-def test_a_method_whose_tracks_are_not_simulated_has_no_expected_precision():
-    assert expected(dataclasses.replace(plan_of(study()), method=Adjustment())) is None
 
 
 @pytest.mark.slow
