@@ -7,16 +7,16 @@ from typing import Any
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QDialog, QFileDialog, QGridLayout, QLineEdit, QProgressBar, QWidget
+from PySide6.QtWidgets import QDialog, QGridLayout, QLineEdit, QProgressBar, QWidget
 
 from study_app.devices.registry import descriptor_of, list_devices
 from study_app.errors import StoreError, StudyError
 from study_app.gui.display.screens import screens_shown
 from study_app.gui.kit.fields import Editor, Field, choice, seed
-from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Question
@@ -471,24 +471,14 @@ class WorkspaceDialog(Question):
         )
         self.setModal(True)
         self.setMinimumWidth(620)
-        self.path = QLineEdit(str(offered))
-        self.path.setFont(font("body"))
-        self.path.setAccessibleName("Workspace folder")
-        self.choose = ActionButton("", "Choose …", height=40)
-        self.choose.setAutoDefault(False)
-        self.choose.clicked.connect(self._choose)
-        add_layout(self.column, hbox((self.path, 1), self.choose, spacing=8))
-        holds = label("It will contain the folders protocols and results.", "label", "text2")
-        self.column.addWidget(holds)
+        holds = "It will contain the folders protocols and results."
+        self.path = Editor(Field("workspace", "Workspace folder", "folder", hint=holds))
+        self.path.show_value(str(offered))
+        self.column.addWidget(self.path)
         self.add_buttons("Not now", ActionButton("check", "Use this folder", role="primary"))
-        self.path.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
+        self.path.edited.connect(lambda _name: self.go_on.setEnabled(bool(self.path.value)))
         self.go_on.setFocus()
 
     @property
     def folder(self) -> Path:
-        return Path(self.path.text().strip()).expanduser()
-
-    def _choose(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, "Workspace", self.path.text())
-        if chosen:
-            self.path.setText(chosen)
+        return Path(self.path.value).expanduser()

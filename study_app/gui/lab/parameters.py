@@ -1,11 +1,11 @@
 """The form of a liquid's parameters: groups of rows, each with slider, field and unit."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel, QStackedLayout, QWidget
 
 from study_app.gui.lab.header import Badge
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import apply_theme_within
+from study_app.gui.theme.themed import apply_theme_within, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
@@ -252,52 +252,33 @@ HIDDEN = "Hidden during a blind comparison"
 
 
 class SectionBlock(QWidget):
-    """A heading with its rows, and how many of them are changed."""
+    """A heading with its rows, and how many of them are changed; two switches share a line."""
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, section: FormSection) -> None:
         super().__init__()
-        self.rows: dict[str, ParameterRow] = {}
+        self.rows = {row.parameter.name: row_for(row.parameter) for row in section.rows}
         self.count = label("", "small", "text2")
-        head = hbox(label(title, "strong", heading=True), STRETCH, self.count)
-        self._grid = QGridLayout()
-        self._grid.setContentsMargins(0, 0, 0, 0)
-        self._grid.setHorizontalSpacing(8)
-        self._grid.setVerticalSpacing(2)
-        vbox(head, self._grid, spacing=4, margins=(0, 8, 0, 8), parent=self)
-
-    def show_section(self, section: FormSection) -> list[ParameterRow]:
-        """Show the section's rows; return those that came new."""
-        names = [row.parameter.name for row in section.rows]
-        for name in self.rows.keys() - set(names):
-            gone = self.rows.pop(name)
-            self._grid.removeWidget(gone)
-            gone.hide()
-            gone.deleteLater()
-        came = []
-        for row in section.rows:
-            if row.parameter.name not in self.rows:
-                came.append(row_for(row.parameter))
-                self.rows[row.parameter.name] = came[-1]
-        self.rows = {name: self.rows[name] for name in names}
-        if came or len(names) != self._grid.count():
-            self._place()
-        for row in section.rows:
-            self.rows[row.parameter.name].show_row(row)
-        changed = sum(row.changed for row in section.rows)
-        self.count.setText(f"{changed} of {len(names)} changed" if changed else "")
-        return came
-
-    def _place(self) -> None:
-        """Place two switches per line, and every other row on a line of its own."""
+        head = hbox(label(section.title, "strong", heading=True), STRETCH, self.count)
+        grid = QGridLayout()
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(8)
+        grid.setVerticalSpacing(2)
+        vbox(head, grid, spacing=4, margins=(0, 8, 0, 8), parent=self)
         line, column = 0, 0
         for row in self.rows.values():
             if isinstance(row, SwitchRow):
-                self._grid.addWidget(row, line, column)
+                grid.addWidget(row, line, column)
                 line, column = (line + 1, 0) if column else (line, 1)
                 continue
             line, column = (line + 1, 0) if column else (line, 0)
-            self._grid.addWidget(row, line, 0, 1, 2)
+            grid.addWidget(row, line, 0, 1, 2)
             line += 1
+
+    def show_section(self, section: FormSection) -> None:
+        for row in section.rows:
+            self.rows[row.parameter.name].show_row(row)
+        changed = sum(row.changed for row in section.rows)
+        self.count.setText(f"{changed} of {len(section.rows)} changed" if changed else "")
 
 
 class FormPanel(Card):
@@ -342,10 +323,7 @@ class FormPanel(Card):
 
     def _lay_out(self) -> None:
         head = hbox(self.badge, (self.liquid, 1), self.copy, spacing=8)
-        inside = QWidget()
-        self._column = vbox(STRETCH, spacing=0, margins=(0, 0, 6, 0), parent=inside)
-        self._rules: list[Rule] = []
-        self.area = scrolled(inside)
+        self.area = scrolled(QWidget())
         whole = QWidget()
         column = vbox(head, Rule(), (self.area, 1), spacing=8, margins=0, parent=whole)
         foot = hbox((self.open, 1), (self.use, 1), spacing=8)
@@ -395,51 +373,39 @@ class FormPanel(Card):
         self.copy.show_action("copy", words)
 
     def _show_form(self, sections: tuple[FormSection, ...], *, forget: bool) -> None:
-        titles = [section.title for section in sections]
-        new = titles != list(self.blocks)
-        for title in self.blocks.keys() - set(titles):
-            gone = self.blocks.pop(title)
-            self._column.removeWidget(gone)
-            gone.hide()
-            gone.deleteLater()
-        for title in titles:
-            if title not in self.blocks:
-                self.blocks[title] = SectionBlock(title)
-        self.blocks = {title: self.blocks[title] for title in titles}
-        if new:
-            self._stack_up()
-        if forget:
+        shape = [(section.title, tuple(row.parameter.name for row in section.rows)) for section in sections]
+        if shape != [(title, tuple(block.rows)) for title, block in self.blocks.items()]:
+            self._make(sections)
+        elif forget:
             for row in self.rows.values():
                 row.let_go()
-        came = [row for section in sections for row in self.blocks[section.title].show_section(section)]
-        for row in came:
-            row.changed.connect(self.changed)
+        for section in sections:
+            self.blocks[section.title].show_section(section)
+
+    def _make(self, sections: tuple[FormSection, ...]) -> None:
+        """Make the rows anew; the keyboard stays in the row that has it, and what is read in its place."""
+        rows = self.rows.items()
+        focused = [(name, at) for name, row in rows for at, part in enumerate(row.parts()) if part.hasFocus()]
+        scrolled_px = self.area.verticalScrollBar().value()
+        self.blocks = {section.title: SectionBlock(section) for section in sections}
         self.rows = {name: row for block in self.blocks.values() for name, row in block.rows.items()}
-        if new or came:
-            self._order()
-            for block in self.blocks.values():
-                apply_theme_within(block, self.theme)
-
-    def _stack_up(self) -> None:
-        for rule in self._rules:
-            self._column.removeWidget(rule)
-            rule.hide()
-            rule.deleteLater()
-        for block in self.blocks.values():
-            self._column.removeWidget(block)
-        self._rules = [Rule() for _ in list(self.blocks)[1:]]
-        for rule in self._rules:
-            rule.apply_theme(self.theme)
-        parts = [part for pair in zip(self.blocks.values(), self._rules, strict=False) for part in pair]
-        for at, part in enumerate([*parts, *list(self.blocks.values())[-1:]]):
-            self._column.insertWidget(at, part)
-
-    def _order(self) -> None:
-        before: QWidget = self.copy
         for row in self.rows.values():
-            for part in row.parts():
-                QWidget.setTabOrder(before, part)
-                before = part
+            row.changed.connect(self.changed)
+        inside, first = QWidget(), next(iter(self.blocks.values()), None)
+        parts = [
+            part for block in self.blocks.values() for part in ((Rule(), block) if block is not first else (block,))
+        ]
+        vbox(*parts, STRETCH, spacing=0, margins=(0, 0, 6, 0), parent=inside)
+        apply_theme_within(inside, self.theme)
+        replace_inside(self.area, inside)
+        before: QWidget = self.copy
+        for part in (part for row in self.rows.values() for part in row.parts()):
+            QWidget.setTabOrder(before, part)
+            before = part
+        QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(scrolled_px))
+        for name, at in focused:
+            if name in self.rows:
+                self.rows[name].parts()[at].setFocus()
 
     def _choose(self, index: int) -> None:
         self.liquid_chosen.emit(self._side, self._liquids[index])

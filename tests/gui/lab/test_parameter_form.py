@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
-from study_app.gui.lab.parameters import NumberRow
+from study_app.gui.lab.parameters import OFF, NumberRow
 from study_app.gui.widgets.escape_key import HOLD_MS, EscapeKey
 from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import blind, heard
@@ -145,3 +145,13 @@ def test_a_knob_held_while_the_other_side_is_called_for_changes_nothing_there(pl
     QTest.mouseMove(slider, QPoint(50, 16))
     QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=QPoint(50, 16))
     assert said == []
+
+
+def test_the_keyboard_stays_in_a_switch_that_takes_parameters_away(place: Any, told: Any, still: LabView) -> None:
+    switch = place.form.rows["effects.wake"]
+    switch.parts()[0].setFocus()
+    place.show_view(dataclasses.replace(still, workbench=still.workbench.change("effects.wake", OFF)))
+    assert "wake.length" not in place.form.rows
+    again = place.form.rows["effects.wake"]
+    assert again is not switch
+    assert again.parts()[0].hasFocus()
