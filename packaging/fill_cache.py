@@ -8,7 +8,7 @@ from random import Random
 from study_app.devices.registry import discover
 from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import StudyError
-from study_app.haptics.runtime.compile_progress import following_compilation
+from study_app.haptics.kernels.compiled import following_compilation
 from study_app.protocol.load import load
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse

@@ -85,7 +85,7 @@ print(f"    {len(entries())} pages")
 COMPILING = """
 import sys, time
 from pathlib import Path
-from study_app.haptics.runtime.compile_progress import following_compilation
+from study_app.haptics.kernels.compiled import following_compilation
 from study_app.session.simulated.rehearsal import rehearse
 shares = []
 began, worked = time.perf_counter(), time.process_time()

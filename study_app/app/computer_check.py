@@ -43,8 +43,7 @@ class ComputerCheck(QObject):
     def _look(self) -> tuple[Check, ...] | StudyError:
         from study_app.devices.registry import backends  # noqa: PLC0415 - the compiler: only in this thread
         from study_app.devices.rig import open_rig, study_settings  # noqa: PLC0415
-        from study_app.haptics.kernels.compiled import CACHE  # noqa: PLC0415
-        from study_app.haptics.runtime.compile_progress import following_compilation  # noqa: PLC0415
+        from study_app.haptics.kernels.compiled import CACHE, following_compilation  # noqa: PLC0415
         from study_app.protocol.load import load  # noqa: PLC0415
         from study_app.session.preflight_measurements import measure  # noqa: PLC0415
 

@@ -19,7 +19,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal, SignalInstance
 from PySide6.QtGui import QGuiApplication, QSessionManager
 
 from study_app.errors import SessionError
-from study_app.haptics.runtime.suspension import allow_suspension, refuse_suspension
+from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
 
 log = logging.getLogger(__name__)
 

@@ -10,7 +10,7 @@ import click
 
 from study_app.cli.options import SCENE_FILE, Target, echo_files, end_if, progress
 from study_app.errors import StudyError
-from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, MOST_DELAY
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 
 if TYPE_CHECKING:
     from study_app.haptics.model.scene import Scene
@@ -35,7 +35,8 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
 
     Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz differs).
     """
-    from study_app.haptics.model import motion, paths
+    from study_app.haptics.model import motion
+    from study_app.haptics.model import motion as paths
     from study_app.haptics.runtime import offline
     from study_app.store.tables import csv_files
 
@@ -67,7 +68,7 @@ def _changed(file: str, liquid: str, changes: tuple[str, ...]) -> Scene:
 @click.option(
     "--delay",
     type=click.IntRange(0, MOST_DELAY),
-    default=BELIEVED_TICKS,
+    default=ASSUMED_TICKS,
     show_default=True,
     metavar="TICKS",
     help="The device's delay, for the expected error.",
@@ -191,9 +192,8 @@ def estimate(
     identify the parameters.
     """
     from study_app.lab.estimation.estimator import OnlineEstimator
-    from study_app.lab.estimation.growing_csv import GrowingCsv
-    from study_app.lab.estimation.liquid_model import prepare
-    from study_app.lab.estimation.lsl_stream import LslForce
+    from study_app.lab.estimation.fits import prepare
+    from study_app.lab.estimation.sources import GrowingCsv, LslForce
 
     if (measured is None) == (stream is None):
         raise StudyError("name either a file (--measured CSV) or a stream (--lsl NAME)")

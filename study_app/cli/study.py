@@ -20,7 +20,7 @@ from study_app.cli.options import (
     takes_session,
 )
 from study_app.devices import DEFAULT_DEVICE
-from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, MOST_DELAY
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 from study_app.number_text import counted
 
 SEED = click.IntRange(0, 2**31 - 1)
@@ -36,7 +36,7 @@ STARTED = 16  # letters of a time down to the minute
 @click.option(
     "--delay-ticks",
     type=click.IntRange(1, MOST_DELAY),
-    default=BELIEVED_TICKS,
+    default=ASSUMED_TICKS,
     show_default=True,
     help="Delay of the device's forces [ticks] for which levels are checked; the pre-flight uses the measured delay.",
 )

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import IO, Final, Self
 
 from study_app.errors import DeviceError
-from study_app.haptics.runtime.suspension import allow_suspension, refuse_suspension
+from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
 
 WORD: Final = b"done\n"
 READY: Final = b"ready\n"

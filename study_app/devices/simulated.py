@@ -26,7 +26,7 @@ from study_app.haptics.kernels.c_functions import (
     c_function,
     record_at,
 )
-from study_app.haptics.kernels.plant import HANDLE, let_go, measure, new_handle, push
+from study_app.haptics.kernels.plant import HANDLE, measure, new_handle, push, release_handle
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, records
 
@@ -89,7 +89,7 @@ class SimulatedDevice(HandOrders, Device):
         self.state.unplugged = 0
 
     def close(self) -> None:
-        let_go(self.state.handle)
+        release_handle(self.state.handle)
 
     def describe(self) -> dict[str, Any]:
         handle = self.state.handle

@@ -8,11 +8,10 @@ import numpy as np
 from study_app.evidence import reference_model
 from study_app.evidence.appraisal import Costs, EffectCost, Errors
 from study_app.evidence.cost import measure
-from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, Dynamics
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, Dynamics
 from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.gate import calls_for, resolve
-from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.paths import path
+from study_app.haptics.model.motion import Motion, path
 from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
 from study_app.haptics.runtime.offline import samples_along, simulate
 from study_app.protocol.trials.tasks import Stroke
@@ -83,7 +82,7 @@ def velocity_errors(scene: Scene, dynamics: Dynamics) -> tuple[float, float]:
     The hand moves by `HAND_M` at `HAND_HZ`. An unknown encoder count is taken to be `FINE_M`, an unknown delay a tick.
     """
     known = dynamics._replace(
-        delay_s=BELIEVED_TICKS / scene.rate_hz if dynamics.delay_s is None else dynamics.delay_s,
+        delay_s=ASSUMED_TICKS / scene.rate_hz if dynamics.delay_s is None else dynamics.delay_s,
         count_m=FINE_M if "count_m" in dynamics.assumed else dynamics.count_m,
         assumed=(),
     )

@@ -10,10 +10,9 @@ import numpy as np
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
-from study_app.haptics.model.bounds import bounds
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.effects import NAMED
-from study_app.haptics.model.gate import describe_gate, resolve
+from study_app.haptics.model.gate import bounds, describe_gate, resolve
 from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Effect, Liquid, Scene

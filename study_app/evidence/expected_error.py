@@ -23,7 +23,7 @@ from study_app.evidence.reference_model import (
 )
 from study_app.evidence.reference_solutions import COUNT_M, CYCLES, ROUNDING, Case, Truth, error_of, stroke
 from study_app.evidence.scene_variants import with_effects
-from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, Dynamics
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, Dynamics
 from study_app.haptics.model.effect import GRAVITY_MPS2
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.gate import resolve
@@ -63,12 +63,12 @@ class Expected(NamedTuple):
     against: str
 
 
-def expected(scene: Scene, delay_ticks: int = BELIEVED_TICKS) -> Expected:
+def expected(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> Expected:
     """Measure a scene's cost and predict its error; of several liquids that with the greatest one."""
     return Expected(measure(scene).scene_ns, *_errors(resolve(scene), delay_ticks))
 
 
-def error_report(scene: Scene, delay_ticks: int = BELIEVED_TICKS) -> str:
+def error_report(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> str:
     """Return the expected error on a device with a delay as a line of text."""
     error_share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
     split = (f"{name} {f'{100 * it:.2g} %' if it > ROUNDING else 'none'}" for name, it in causes._asdict().items())

@@ -16,8 +16,7 @@ from study_app.haptics.kernels.compiled import kernel, workings
 from study_app.haptics.kernels.vector import copy, distance, norm
 from study_app.haptics.model.effects.non_newtonian import STIFFNESS_NPM
 from study_app.haptics.model.effects.wake import Wake
-from study_app.haptics.model.laws import rheology
-from study_app.haptics.model.laws.rheology import Maxwell
+from study_app.haptics.model.laws import Maxwell, rheology
 from study_app.haptics.model.layout import records
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Ewma, Knee, Scene

@@ -4,7 +4,7 @@ from typing import Any
 
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.laws.drag_laws import Law
+from study_app.haptics.model.laws import Law
 from study_app.haptics.model.scene import Effect, Everywhere, Scene
 
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from study_app import figure_style as style
-from study_app.haptics.model import paths
+from study_app.haptics.model import motion as paths
 from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Given, Liquid, Scene

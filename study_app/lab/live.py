@@ -6,6 +6,7 @@ provides telemetry; at the end of the lab `close` writes zero force before it cl
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,18 +18,58 @@ import numpy as np
 from study_app.devices.hand import hand_of
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, RigSettings, open_rig
-from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.layout import LIMITER_NORM, LIMITER_SLEW, LIMITERS, SAMPLE, records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slew_limit_n
 from study_app.lab.ab_comparison import Side, Workbench, other
-from study_app.lab.limiters import LimiterCount, LimiterCounts
 from study_app.lab.programmed_paths import led_to, programme
-from study_app.lab.shadow import Shadow, Trace
-from study_app.lab.wake_tail import Tail
+from study_app.lab.shadow import Shadow, Tail, Trace
 from study_app.protocol.streams import stream
 
 if TYPE_CHECKING:
     from study_app.haptics.model.motion import Motion
+
+
+SPAN_NS: Final = 10_000_000_000
+NOW_NS: Final = 150_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class LimiterCount:
+    """A limiter, the number of ticks in the last 10 s in which it acted, and whether it acts now."""
+
+    name: str
+    ticks: int
+    acting: bool
+
+
+class LimiterCounts:
+    """Counts of the last 10 s, batch by batch."""
+
+    def __init__(self) -> None:
+        self._batches: deque[tuple[int, Any]] = deque()
+
+    def add(self, samples: Any) -> None:
+        """Count in samples of telemetry (recarray of ``SAMPLE``)."""
+        if len(samples) == 0:
+            return
+        newest_ns = int(samples.time_ns[-1])
+        self._batches.append((newest_ns, np.array([np.count_nonzero(samples.limiters & it.bit) for it in LIMITERS])))
+        while self._batches[0][0] <= newest_ns - SPAN_NS:
+            self._batches.popleft()
+
+    def rows(self, force_limit_n: float, slew_n: float) -> tuple[LimiterCount, ...]:
+        """Return every limiter, for these limits of the force and of its change per tick."""
+        newest_ns = self._batches[-1][0] if self._batches else 0
+        nothing = np.zeros(len(LIMITERS), np.int64)
+        counts = sum((batch for _, batch in self._batches), nothing)
+        acting = sum((batch for when, batch in self._batches if when > newest_ns - NOW_NS), nothing)
+        limits = {LIMITER_SLEW: f", {slew_n:g} N per tick", LIMITER_NORM: f", {force_limit_n:g} N"}
+        return tuple(
+            LimiterCount(limiter.label + limits.get(limiter.bit, ""), int(ticks), bool(now))
+            for limiter, ticks, now in zip(LIMITERS, counts, acting, strict=True)
+        )
+
 
 Vector = tuple[float, float, float]
 
@@ -247,7 +288,8 @@ class Live:
 
     def _presentable(self, scene: Scene) -> Scene:
         """Return a scene at the servo's rate."""
-        return scene if scene.rate_hz == self.servo.rate_hz else _at_rate(scene, self.servo.rate_hz)
+        same = scene.rate_hz == self.servo.rate_hz
+        return scene if same else Scene(**(dict(scene) | {"rate_hz": self.servo.rate_hz}))
 
     def _programme(self, name: str) -> Motion:
         scene = Scene() if self.felt is None else self.felt.in_hand.scene
@@ -326,10 +368,6 @@ def open_live(
         rig.stop()
         raise
     return live
-
-
-def _at_rate(scene: Scene, rate_hz: float) -> Scene:
-    return Scene(**(dict(scene) | {"rate_hz": rate_hz}))
 
 
 def _vector(values: Any) -> Vector:

@@ -1,12 +1,11 @@
-"""Programmed paths for a hand: those of the figures (``haptics.model.paths``), scaled to the workspace."""
+"""Programmed paths for a hand: those of the figures (``haptics.model.motion``), scaled to the workspace."""
 
 from typing import Any, Final
 
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.paths import RADIUS_M, path
+from study_app.haptics.model.motion import RADIUS_M, Motion, path
 from study_app.haptics.model.scene import Scene
 
 Vector = tuple[float, float, float]

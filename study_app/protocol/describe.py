@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
-from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Scene
@@ -45,7 +45,7 @@ BLINDINGS = {
 }
 
 
-def describe(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> str:
+def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> str:
     """Return the whole study in words, in its first language; ``delay_ticks`` is how many ticks late a force acts."""
     language = protocol.study.languages[0]
     effects = [line for name in protocol.liquids for line in (*describe_gate(protocol.scene_of(name)), "")]

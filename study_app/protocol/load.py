@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, Field, ValidationError
 
 from study_app.errors import Problem, ProtocolError
-from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.haptics.model.scene import Liquid, RateHz, Scene, Withdrawn
 from study_app.protocol import formats
 from study_app.protocol.checks.consistency import check
@@ -67,7 +67,7 @@ class SceneFile(Table):
     liquids: Named[Liquid] = Field(min_length=1)
 
 
-def load(name_or_path: str | File, *, delay_ticks: int = BELIEVED_TICKS) -> Protocol:
+def load(name_or_path: str | File, *, delay_ticks: int = ASSUMED_TICKS) -> Protocol:
     """Return the protocol of a file, or of a name (see ``files.find``); ProtocolError lists every problem of the file.
 
     Levels are checked for a device whose forces act ``delay_ticks`` ticks late.
@@ -83,7 +83,7 @@ def load(name_or_path: str | File, *, delay_ticks: int = BELIEVED_TICKS) -> Prot
     return parse(source_bytes(name_or_path), str(name_or_path), delay_ticks=delay_ticks)
 
 
-def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Protocol:
+def parse(source: bytes, name: str, *, delay_ticks: int = ASSUMED_TICKS) -> Protocol:
     """Return the protocol written in ``source``; ``name`` is what messages call it, the rest is as in `load`."""
     document, places = read_document(source, name)
     protocol, faults = examined(document, delay_ticks=delay_ticks)
@@ -92,7 +92,7 @@ def parse(source: bytes, name: str, *, delay_ticks: int = BELIEVED_TICKS) -> Pro
     return protocol
 
 
-def examined(document: dict[str, Any], *, delay_ticks: int = BELIEVED_TICKS) -> tuple[Protocol | None, list[Fault]]:
+def examined(document: dict[str, Any], *, delay_ticks: int = ASSUMED_TICKS) -> tuple[Protocol | None, list[Fault]]:
     """Return the protocol of a document that `read_document` read, and its faults.
 
     There is a protocol where the only faults are forces beyond a limit, so that these can be shown; else, with faults,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.devices.registry import descriptor_of
-from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, UNKNOWN, Dynamics
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, UNKNOWN, Dynamics
 from study_app.haptics.model.slope_limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.number_text import counted
@@ -97,7 +97,7 @@ class Facts:
     key_hash: str | None = None
     grant: Grant = NO_THREAD
     dynamics: Dynamics = UNKNOWN
-    delay_ticks: int = BELIEVED_TICKS
+    delay_ticks: int = ASSUMED_TICKS
     withheld: Mapping[str, float] | None = None
     velocity_errors: tuple[float, float] | None = None
     outlets: tuple[OutletStatus, ...] = ()
@@ -163,7 +163,7 @@ def _servo(facts: Facts, protocol: Protocol) -> Iterator[Check]:
         about = f"delay until a force acts: {1e3 * facts.dynamics.delay_s:.2f} ms, measured by the device"
         if facts.delay_ticks > facts.dynamics.delay_ticks(requested_hz):
             about += " when it was opened; it measured more since"
-    well = facts.dynamics.delay_s is None or facts.delay_ticks <= BELIEVED_TICKS
+    well = facts.dynamics.delay_s is None or facts.delay_ticks <= ASSUMED_TICKS
     advice = "Forces are limited more strictly: connect the device without a hub."
     yield _warned("Loop delay", counted(facts.delay_ticks, "tick"), about, advice, well=well)
 

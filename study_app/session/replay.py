@@ -28,9 +28,8 @@ from study_app.haptics.model.device_dynamics import Dynamics, dynamics_from
 from study_app.haptics.model.force_rules import ForceRules, rules_from
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_GLITCH, SAMPLE, records
 from study_app.haptics.model.scene import FADE_S, Scene
-from study_app.haptics.runtime.offline import law_along
+from study_app.haptics.runtime.offline import law_along, recompute_scenes
 from study_app.haptics.runtime.pack import adjust_into, pack
-from study_app.haptics.runtime.recompute import recompute_scenes
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.presentation import link_seed, presented_by, scene_of
 from study_app.protocol.trials.stimuli import Stimulated

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 from study_app.errors import StoreError
-from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.haptics.model.layout import (
     FORCE_STEP_N,
     MEASURED_GRIPPER,
@@ -182,7 +182,7 @@ def read_samples(path: Path) -> Any:
     samples = records(SAMPLE, len(columns["tick"]))
     for name in ("tick", "time_ns", "fresh", "buttons", "limiters", "scene", "status"):
         samples[name] = columns[name]
-    samples["delay_ticks"] = columns.get("delay_ticks", BELIEVED_TICKS)
+    samples["delay_ticks"] = columns.get("delay_ticks", ASSUMED_TICKS)
     samples["lateness_ns"] = columns["time_ns"] - columns["due_ns"]
     for i, axis in enumerate(AXES):
         samples["position_m"][:, i] = columns[f"position_{axis}_m"]

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from study_app.haptics.model.effect import Parameter, Value
 from study_app.lab.ab_comparison import Setting, Side, Workbench
-from study_app.lab.limiters import LimiterCount
+from study_app.lab.live import LimiterCount
 from study_app.lab.parameters import sections
 from study_app.lab.presets import Choice
-from study_app.lab.wake_tail import Tail
+from study_app.lab.shadow import Tail
 
 if TYPE_CHECKING:
     from study_app.lab.shadow import Trace

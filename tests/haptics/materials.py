@@ -3,7 +3,7 @@
 import numpy as np
 
 from study_app.haptics.kernels.plant import measure, move, new_handle, push
-from study_app.haptics.model.laws import rheology
+from study_app.haptics.model import laws
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.protocol.load import load
 from tests.haptics.scenes import Hand
@@ -28,7 +28,7 @@ def creep_mps(name, share, *, noise=0.0, scale=3.0):
     ``noise`` is a share of samples that are off by a count.
     """
     tank_scene = tank(name, scale=scale)
-    pull_n = share * rheology.yield_n(tank_scene.liquids[0].non_newtonian, tank_scene.body.diameter_m)
+    pull_n = share * laws.yield_n(tank_scene.liquids[0].non_newtonian, tank_scene.body.diameter_m)
     handle = new_handle(mass_kg=0.1, viscous_nspm=0.5, stiffness_npm=1.0, quantum_m=38e-6, delay=1)
     hand, random = Hand(tank_scene), np.random.default_rng(0)
     seen_m, place_m = np.zeros(3), np.zeros((4000, 3))

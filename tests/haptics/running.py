@@ -7,8 +7,8 @@ import numpy as np
 
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import UNKNOWN
+from study_app.haptics.runtime.offline import new_wake_places, recompute_sample
 from study_app.haptics.runtime.pack import pack
-from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from tests.haptics.scenes import HONEY
 
 

@@ -10,7 +10,7 @@ from study_app.haptics.model.estimators import ESTIMATORS
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Body, Cylinder, Given, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.offline import simulate
-from study_app.lab.changes import changed
+from study_app.lab.parameters import changed
 from tests.haptics.scenes import UNBENT, vectors
 
 NAMES = [effect.name for effect in EFFECTS]

@@ -74,9 +74,9 @@ import study_app
 from study_app.lab.identify.parameters import find
 from study_app.haptics.model.gate import describe_gate
 from study_app.haptics.model.overrides import override_all
-from study_app.haptics.model.paths import path
+from study_app.haptics.model.motion import path
 from study_app.haptics.runtime.offline import simulate
-from study_app.lab.changes import changed
+from study_app.lab.parameters import changed
 from study_app.lab.parameters import sections
 from study_app.protocol.load import load_scene
 

@@ -1,7 +1,7 @@
 """The counts of the lab's card of limiters."""
 
 from study_app.haptics.model import layout
-from study_app.lab.limiters import LimiterCounts
+from study_app.lab.live import LimiterCounts
 
 
 def test_a_limiter_acts_only_now_and_is_counted_for_ten_seconds() -> None:

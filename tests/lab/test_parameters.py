@@ -8,8 +8,7 @@ from study_app.errors import StudyError
 from study_app.haptics.model.effects.current import Channel
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.scene import Given, Liquid, Scene
-from study_app.lab.changes import changed
-from study_app.lab.parameters import parameter, sections, value_of
+from study_app.lab.parameters import changed, parameter, sections, value_of
 from study_app.protocol.load import load_scenes, shipped
 
 SCENES = {f"{file}/{name}": scene for file in shipped() for name, scene in load_scenes(file).items()}

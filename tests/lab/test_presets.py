@@ -9,7 +9,7 @@ from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.haptics.model.scene import Ewma, Kalman, Scene
 from study_app.lab.ab_comparison import Setting
-from study_app.lab.changes import changed
+from study_app.lab.parameters import changed
 from study_app.lab.presets import Choice, liquids_at_hand, preset_text, save
 from study_app.protocol.load import load_scene, load_scenes, shipped
 

@@ -7,9 +7,8 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.lab.ab_comparison import Setting
-from study_app.lab.changes import changed
-from study_app.lab.presets import Choice, preset_text, save
-from study_app.lab.setting_in_study import use_in_study
+from study_app.lab.parameters import changed
+from study_app.lab.presets import Choice, preset_text, save, use_in_study
 from study_app.protocol.load import load, load_scene, source_bytes
 
 

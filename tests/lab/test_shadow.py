@@ -10,7 +10,7 @@ if numba.config.DISABLE_JIT:
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Kalman, Scene
 from study_app.lab.ab_comparison import Setting, Workbench
-from study_app.lab.changes import changed
+from study_app.lab.parameters import changed
 from study_app.lab.shadow import Shadow
 from tests.haptics.scenes import EVERYTHING
 from tests.lab.benches import SCENES, bench, live_with, run, scripted

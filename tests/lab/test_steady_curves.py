@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from study_app.haptics.model.laws.rheology import yield_n
+from study_app.haptics.model.laws import yield_n
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.haptics.model.slope_limits import steady
-from study_app.lab.changes import changed
-from study_app.lab.steady_curves import RATES_PER_S, SPEEDS_MPS, has_flow_curve, steady_curves
+from study_app.lab.ab_comparison import RATES_PER_S, SPEEDS_MPS, has_flow_curve, steady_curves
+from study_app.lab.parameters import changed
 from study_app.protocol.load import load_scene
 from tests.haptics.materials import PRESETS
 

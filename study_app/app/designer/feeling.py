@@ -13,7 +13,7 @@ from study_app.authoring.outline import title_of
 from study_app.authoring.writer.edits import Edit, Set, Unset
 from study_app.authoring.writer.refused import Refused
 from study_app.gui.designer.view import DesignerPlace
-from study_app.haptics.model.liquid import Liquid
+from study_app.haptics.model.scene import Liquid
 from study_app.lab.ab_comparison import Setting, Side
 from study_app.lab.parameters import parameter
 from study_app.protocol.model import Protocol

@@ -16,8 +16,7 @@ from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
 from study_app.evidence.appraisal import AppraisalClient, Costs, Errors, Question
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting
-from study_app.lab.presets import Choice, liquids_at_hand, liquids_of, preset_text, save, spoken
-from study_app.lab.setting_in_study import use_in_study
+from study_app.lab.presets import Choice, liquids_at_hand, liquids_of, preset_text, save, spoken, use_in_study
 
 if TYPE_CHECKING:
     from study_app.lab.live import Live

@@ -14,7 +14,7 @@ from study_app.app.failures import guarded
 from study_app.errors import StudyError
 from study_app.gui.lab.view import LabPlace
 from study_app.lab.ab_comparison import Workbench
-from study_app.lab.estimation.lsl_stream import available
+from study_app.lab.estimation.sources import available
 from study_app.protocol.quantities import QUANTITIES
 from study_app.viewmodels.lab import DRAG, LSL, OFF, SOURCES, WAKE, EstimateRow, EstimateShown
 
@@ -173,7 +173,7 @@ class LabEstimation(QObject):
 
 def _load(executor: ThreadPoolExecutor) -> LiveEstimation:
     """Load and compile the estimation, in its thread."""
-    from study_app.lab.estimation.liquid_model import prepare  # noqa: PLC0415
+    from study_app.lab.estimation.fits import prepare  # noqa: PLC0415
     from study_app.lab.estimation.live_estimation import LiveEstimation  # noqa: PLC0415 - loads the compiler
 
     prepare()

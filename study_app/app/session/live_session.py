@@ -149,7 +149,7 @@ class LiveSession(QObject):
         videos: Videos | None = None
         try:
             load_windows()
-            from study_app.haptics.runtime.compile_progress import following_compilation  # noqa: PLC0415 - the compiler: only in this thread
+            from study_app.haptics.kernels.compiled import following_compilation  # noqa: PLC0415 - the compiler: only in this thread
 
             study = self.chosen.read_protocol()
             check(self.chosen, study)

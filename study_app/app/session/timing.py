@@ -13,7 +13,7 @@ from typing import Final
 
 from PySide6.QtCore import QTimer
 
-from study_app.haptics.runtime.clocks.rtkit import make_high_priority
+from study_app.haptics.runtime.clocks.linux import make_high_priority
 
 MOST_PERIODS: Final = 4  # so long a work waits for room; then it is done without
 MOST_SHARE: Final = 0.15  # of the time that a work may take: what takes longer is done less often

@@ -104,7 +104,8 @@ def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scen
 def motion_along(path: str, scene: Scene) -> Motion:
     """Return the motion of a path's name or a motion file, at the scene's rate."""
     from study_app.evidence.reference_solutions import stir
-    from study_app.haptics.model import motion, paths
+    from study_app.haptics.model import motion
+    from study_app.haptics.model import motion as paths
     from study_app.lab.identify.measured_force import at_rate
 
     if path == DEFAULT_PATH:

@@ -14,7 +14,7 @@ from numba import types
 from study_app.devices.hand import HAND, move_held_handle
 from study_app.haptics.kernels.c_functions import c_function, record_at
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.plant import HANDLE, let_go, measure, push
+from study_app.haptics.kernels.plant import HANDLE, measure, push, release_handle
 
 SOCKET_CALL = types.intp(types.intp, types.intp, types.uintp, types.int32)
 IDLE_NS: Final = 100_000_000
@@ -262,7 +262,7 @@ def act(service: Any, x_n: float, y_n: float, z_n: float) -> None:
 @kernel
 def rest(service: Any) -> None:
     """Take the force off: the device is idle."""
-    let_go(service.handle)
+    release_handle(service.handle)
     for axis in range(3):
         service.force_n[axis] = 0.0
 

@@ -23,7 +23,7 @@ from study_app.haptics.kernels.vector import norm, subtract
 from study_app.haptics.model.effects.drag import REFERENCE
 from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.laws.drag_laws import Law
+from study_app.haptics.model.laws import Law
 from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Effect, Estimator, Ewma, Given, Raw, Scene

@@ -13,7 +13,7 @@ from study_app.evidence.cfd.stored_flows import held_out, solver_truths, stored,
 from study_app.evidence.expected_error import Expected, expected
 from study_app.evidence.reference_solutions import error_of, measured_drag_n
 from study_app.evidence.table import Evidence
-from study_app.haptics.model.laws.drag_laws import LAWS, finite_reynolds
+from study_app.haptics.model.laws import LAWS, finite_reynolds
 from study_app.haptics.model.scene import Liquid, Scene
 
 NO_REFERENCE_REYNOLDS: Final = 1000.0

@@ -21,7 +21,7 @@ from study_app.evidence.reference_solutions import measured_drag_n
 from study_app.evidence.table import Evidence, plot_files
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.effects.wake import Wake
-from study_app.haptics.model.laws.drag_laws import LAWS
+from study_app.haptics.model.laws import LAWS
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Effect, Given, Liquid, Scene

@@ -23,7 +23,7 @@ from study_app.evidence.cfd.flow import ORDER, Flow, Grid, library
 from study_app.evidence.cfd.solver import made
 from study_app.evidence.cfd.stored_flows import package, read, text
 from study_app.evidence.table import Evidence
-from study_app.haptics.model.laws.rheology import HerschelBulkley, creeping_n
+from study_app.haptics.model.laws import HerschelBulkley, creeping_n
 from study_app.haptics.model.motion import Floats
 from study_app.store.atomic import write_file
 from study_app.store.output_files import make_folder

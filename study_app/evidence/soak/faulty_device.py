@@ -22,7 +22,7 @@ from study_app.haptics.kernels.c_functions import (
     record_at,
 )
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.tick_schedule import random
+from study_app.haptics.kernels.plant import random
 from study_app.haptics.kernels.vector import copy, norm
 from study_app.haptics.model.layout import BUTTON_STOP, COMMAND, READING, records
 from study_app.haptics.runtime.clocks.clock import VIRTUAL, Clock

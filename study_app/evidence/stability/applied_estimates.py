@@ -36,11 +36,10 @@ from study_app.evidence.table import Evidence
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.offline import ModelAlong
 from study_app.haptics.runtime.pack import adjust_into
-from study_app.lab.estimation.application import most_drag_coefficient, stepped
 from study_app.lab.estimation.estimator import Estimate, OnlineEstimator
-from study_app.lab.estimation.liquid_model import DRAG
-from study_app.lab.estimation.rows import Floats, Rows
-from study_app.lab.estimation.telemetry_force import NOISE_N, as_measured
+from study_app.lab.estimation.fits import DRAG
+from study_app.lab.estimation.live_estimation import most_drag_coefficient, stepped
+from study_app.lab.estimation.sources import NOISE_N, Floats, Rows, as_measured
 
 LIQUIDS: Final = ("water", "light_oil", "honey", "dense")
 MOVING_S: Final = 4.0

@@ -21,9 +21,8 @@ from study_app.evidence.stability.stability_cases import (
     scene_of,
 )
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.plant import new_handle
+from study_app.haptics.kernels.plant import new_handle, new_schedule
 from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.tick_schedule import new_schedule
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Floats, Motion

@@ -28,13 +28,12 @@ import numpy as np
 
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.estimators import take_force
-from study_app.haptics.kernels.force_link import delay_force
 from study_app.haptics.kernels.loop import follow_delay
 from study_app.haptics.kernels.passivity import log_acted, log_command, update_observer
-from study_app.haptics.kernels.plant import measure, move, push
+from study_app.haptics.kernels.plant import measure, move, next_tick, push, random
+from study_app.haptics.kernels.safety import delay_force
 from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
 from study_app.haptics.kernels.tick import step_model, tick, write_sample
-from study_app.haptics.kernels.tick_schedule import next_tick, random
 from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.layout import MEASURED_VELOCITY, records

@@ -20,8 +20,8 @@ from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_in
 from study_app.gui.widgets.live_plots import Plot, draw_quickly, number
 from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.haptics.model.scene import Scene
-from study_app.lab.limiters import LimiterCount
-from study_app.lab.steady_curves import RATES_PER_S, SPEEDS_MPS, SteadyCurves, has_flow_curve, steady_curves
+from study_app.lab.ab_comparison import RATES_PER_S, SPEEDS_MPS, SteadyCurves, has_flow_curve, steady_curves
+from study_app.lab.live import LimiterCount
 from study_app.viewmodels.lab import OFF, PARAMETERS, Choices, CostRow, ErrorRow, EstimateRow, Floats, LabView
 from study_app.viewmodels.number_words import grouped
 

@@ -40,7 +40,7 @@ from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Ink, label
-from study_app.lab.wake_tail import Tail
+from study_app.lab.shadow import Tail
 from study_app.viewmodels.lab import Floats, LabView, Point
 from study_app.viewmodels.number_words import grouped
 

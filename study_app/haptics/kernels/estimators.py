@@ -1,4 +1,4 @@
-"""The velocity that the liquids act on, from positions: estimator, then compression of high speeds (knee).
+"""The velocity that the liquids act on, from positions: estimator, then compression of high speeds.
 
 The Kalman filter of velocity uses the sent force and estimates the mass that the force moves.
 
@@ -129,8 +129,8 @@ def begin_filter(parameters: Record, filtered: Record) -> None:
     filtered.covariance[5] = FIRST_ACCELERATION_MPS2 * FIRST_ACCELERATION_MPS2
     filtered.per_kg = min(USUAL_PER_KG, 1.0 / parameters.mass_kg)
     filtered.per_kg_variance = 0.25 * USUAL_PER_KG * USUAL_PER_KG
-    filtered.distrusted = 0
-    filtered.delay_ticks = filtered.believed_ticks
+    filtered.on_ewma = 0
+    filtered.delay_ticks = filtered.assumed_ticks
     filtered.surprise = 0.0
     filtered.quiet_s = 0.0
     filtered.repeated = 0
@@ -147,7 +147,7 @@ def take_force(state: Record, safety: Record) -> None:
         filtered.force_n[axis] = late_n[axis]
         if lasted_s > 0.0:
             filtered.force_n[axis] = (passivity.acted_impulse_ns[axis] + late_n[axis] * safety.tick_s) / lasted_s
-    filtered.believed_ticks = safety.delay_ticks
+    filtered.assumed_ticks = safety.delay_ticks
 
 
 @part
@@ -156,17 +156,17 @@ def filter_velocity(parameters: Record, state: Record, interval_s: float) -> Non
     filtered = state.kalman
     _filter_force(filtered, interval_s)
     ratio = _correct(parameters, state, filtered, interval_s)
-    distrusted = _distrust(filtered, ratio, interval_s)
+    on_ewma = _needs_ewma(filtered, ratio, interval_s)
     share = interval_s / CARRIED_S
     kept = 1.0 - share / (1.0 + share * (0.5 + share / 12.0))
     for axis in range(3):
-        source_mps = filtered.smoothed_mps[axis] if distrusted else parameters.scale * filtered.estimate_mps[axis]
-        if distrusted != filtered.distrusted:
+        source_mps = filtered.smoothed_mps[axis] if on_ewma else parameters.scale * filtered.estimate_mps[axis]
+        if on_ewma != filtered.on_ewma:
             filtered.carried_mps[axis] = state.estimate_mps[axis] - source_mps
         else:
             filtered.carried_mps[axis] = _or_zero(kept * filtered.carried_mps[axis])
         state.estimate_mps[axis] = source_mps + filtered.carried_mps[axis]
-    filtered.distrusted = distrusted
+    filtered.on_ewma = on_ewma
 
 
 @part
@@ -259,17 +259,17 @@ def _repeats(parameters: Record, state: Record, filtered: Record, t: float, vari
 
 
 @part
-def _distrust(filtered: Record, ratio: float, interval_s: float) -> int:
+def _needs_ewma(filtered: Record, ratio: float, interval_s: float) -> int:
     """Return 1 if this tick uses EWMA, 0 if it uses the filter."""
     share = interval_s / TROUBLE_S
     weight = share / (1.0 + share * (0.5 + share / 12.0))
     filtered.surprise += weight * (min(ratio, 2.0 * TROUBLE) - filtered.surprise)
     filtered.quiet_s += interval_s
-    if filtered.surprise > TROUBLE or filtered.delay_ticks != filtered.believed_ticks:
+    if filtered.surprise > TROUBLE or filtered.delay_ticks != filtered.assumed_ticks:
         filtered.quiet_s = 0.0
-        filtered.delay_ticks = filtered.believed_ticks
+        filtered.delay_ticks = filtered.assumed_ticks
         return 1
-    return 1 if filtered.distrusted and filtered.quiet_s < QUIET_S else 0
+    return 1 if filtered.on_ewma and filtered.quiet_s < QUIET_S else 0
 
 
 @part

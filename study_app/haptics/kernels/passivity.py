@@ -11,7 +11,7 @@ The energy E is 0 at the start of a scene and is limited to what the liquid can 
 The first terms are what the effects can return, summed by them (``state.returnable_j``): a wake of speed u gives a
 body of speed v the power c (u - v)² v, at most that at v = u/3, and it lasts for N ticks of T; m is the mass of
 inertial effects in the share that is sent (`pack`). τ is the lag of the velocity estimator and P = max(-f·v̂, 0) the
-power that it absorbs: a filtered damper stores up to K τ P (`stored_energy`). Without these the lag of each quick
+power that it absorbs: a filtered damper stores up to K τ P (`filter_storage`). Without these the lag of each quick
 reversal would count as a debt.
 
 Motors that saturate give a force between 0 and the logged one: in each step the one counts that supplies more energy.
@@ -23,7 +23,7 @@ counts. A delayed force belongs to an earlier velocity: a delayed balance may in
 
 - `reduce_gain`: a debt of 0.125 mJ halves the force, one of 0.375 mJ halves it again, and the gain recovers at 50 % per
   second: the gain of an oscillating loop falls until it no longer oscillates. A debt of the fast part of force and
-  motion counts likewise (`incremental_passivity`);
+  motion counts likewise (see below);
 - `apply_controller`: the force along the motion may spend in 20 ms no more than the energy left; in debt it is removed,
   and damping is added so that the next step would repay the debt, up to half the maximum stable damping times the gain.
   The direction of motion is that of the last 2 ms; below 40 mm/s it may be encoder noise and is not used;
@@ -39,6 +39,21 @@ return with the gain.
 With a force link, no debt is forgiven, the gain does not recover before the next scene, and it falls further as long as
 there is a debt: with a delayed force a handle would continue to oscillate at the forgiven power, or at the gain at
 which it neither supplies nor absorbs energy.
+
+The energy that the velocity estimator stores and may therefore return is `filter_storage`.
+
+The incremental observer asks whether the fast part of a force drives the fast part of the hand's motion.
+
+A loop may oscillate during a slow motion without an energy debt: the slow motion supplies more energy than the
+oscillation takes. So the fast part has a balance of its own. Force and velocity pass the same two high-pass filters of
+20 Hz, above the frequencies of a hand and below those of an oscillating loop. The filtered signals give the work -f·v
+Δt of the hand from one sample to the next::
+
+    B ← min(B - f·v Δt, 0)
+
+The force is taken one tick later than the assumed loop delay, as in the last balance below: the observer stays
+correct if the delay is one tick longer than assumed. A breaking wake and a reversal of the hand take some mJ, once: B
+may fall to -2 mJ, and recovers at 5 mW. Beyond that `reduce_gain` lowers the gain.
 """
 
 from __future__ import annotations
@@ -47,10 +62,7 @@ import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import kernel, part
-from study_app.haptics.kernels.incremental_passivity import ALLOWANCE_J as INCREMENTAL_ALLOWANCE_J
-from study_app.haptics.kernels.incremental_passivity import begin_incremental, close_incremental, observe_incremental
 from study_app.haptics.kernels.sample_validation import is_gap
-from study_app.haptics.kernels.stored_energy import filter_storage
 from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm, square, square_distance
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.layout import (
@@ -58,10 +70,82 @@ from study_app.haptics.model.layout import (
     DEBT_NONE,
     DEBT_OWN,
     DEBT_PUSHED,
+    GROWS_AS_SPEED,
+    GROWS_LESS,
     LIMITER_ENERGY,
     LIMITER_SATURATED,
     Record,
 )
+
+CORNER_RADPS = 2.0 * math.pi * 20.0
+INCREMENTAL_ALLOWANCE_J = 2e-3
+INCREMENTAL_FORGIVEN_W = 5e-3
+
+
+@part
+def begin_incremental(fast: Record) -> None:
+    """Reset the balance to 0, at rest and without force."""
+    for axis in range(3):
+        fast.force_n[axis] = fast.force_once_n[axis] = fast.force_twice_n[axis] = 0.0
+    clear(fast.velocity_mps)
+    clear(fast.velocity_once_mps)
+    clear(fast.velocity_twice_mps)
+    fast.balance_j = 0.0
+
+
+@part
+def observe_incremental(fast: Record, axis: int, force_n: float, velocity_mps: float, interval_s: float) -> None:
+    """Add the work along one axis, from the mean force and velocity since the last sample."""
+    x = CORNER_RADPS * interval_s
+    kept = 1.0 / (1.0 + x * (1.0 + 0.5 * x))
+    once_n = kept * (fast.force_once_n[axis] + force_n - fast.force_n[axis])
+    twice_n = kept * (fast.force_twice_n[axis] + once_n - fast.force_once_n[axis])
+    once_mps = kept * (fast.velocity_once_mps[axis] + velocity_mps - fast.velocity_mps[axis])
+    twice_mps = kept * (fast.velocity_twice_mps[axis] + once_mps - fast.velocity_once_mps[axis])
+    fast.force_n[axis], fast.force_once_n[axis], fast.force_twice_n[axis] = force_n, once_n, twice_n
+    fast.velocity_mps[axis], fast.velocity_once_mps[axis], fast.velocity_twice_mps[axis] = (
+        velocity_mps,
+        once_mps,
+        twice_mps,
+    )
+    fast.balance_j -= twice_n * twice_mps * interval_s
+
+
+@part
+def close_incremental(fast: Record, interval_s: float) -> None:
+    """Forgive a part of the debt; the balance is at most 0."""
+    fast.balance_j = min(fast.balance_j + INCREMENTAL_FORGIVEN_W * interval_s, 0.0)
+
+
+@part
+def filter_storage(model: Any, passivity: Record) -> float:
+    """Return the energy [J at the hand] that the velocity estimator stores because it lags behind.
+
+    With v̂' = (v − v̂)/τ a damper F(v̂) takes ∫F v dt = ∫F v̂ dt + τ∫F dv̂ from the hand: the second term is a storage,
+    K τ F v̂ with K = 1/3 for a force that grows as v̂², 1/2 for one that grows as v̂. If the force limit leaves only
+    the share s of F, K = 1 - 2/3 √s and 1 - s/2; for a force that grows less than v̂, K is at most 1. After a debt the
+    storage is multiplied by the controller's gain: otherwise it would sustain an oscillating loop.
+    """
+    parameters, state = model.parameters[0], model.state[0]
+    lag_s = parameters.fallback_lag_s if state.kalman.on_ewma else parameters.filter_lag_s
+    if lag_s == 0.0:
+        return 0.0
+    sent_n, saturated_n = passivity.sent_n[passivity.row], passivity.saturated_n[passivity.row]
+    power_w = missing_w = 0.0
+    for axis in range(3):
+        v_mps = state.estimate_mps[axis] - state.drift_mps[axis]
+        power_w -= sent_n[axis] * v_mps
+        missing_w -= saturated_n[axis] * v_mps
+    power_w -= max(missing_w, 0.0)
+    if power_w <= 0.0:
+        return 0.0
+    share = 1.0 - 2.0 / 3.0 * math.sqrt(passivity.norm_share)
+    if state.growth == GROWS_AS_SPEED:
+        share = max(share, 1.0 - 0.5 * passivity.norm_share)
+    elif state.growth == GROWS_LESS:
+        share = 1.0
+    return float(passivity.gain * share * lag_s * power_w / parameters.scale)
+
 
 ALLOWANCE_J = 1e-3
 SPENDING_S = 20e-3

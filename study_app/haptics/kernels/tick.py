@@ -141,5 +141,5 @@ def write_sample(state: Record, sample: Record) -> None:
     copy(state.velocity_mps, sample.velocity_mps)
     copy(state.wake_mps, sample.wake_mps)
     copy(state.force_n, sample.force_n)
-    if state.kalman.distrusted:
+    if state.kalman.on_ewma:
         sample.limiters |= LIMITER_ESTIMATOR

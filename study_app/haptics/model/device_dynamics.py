@@ -6,7 +6,7 @@ from typing import Any, Final, NamedTuple
 
 MOST_DELAY: Final = 4
 """Greatest delay of a force [ticks]: beyond this no stable force is known."""
-BELIEVED_TICKS: Final = 1
+ASSUMED_TICKS: Final = 1
 """The delay assumed if a device does not measure its own."""
 _ROUNDING_TICKS: Final = 1e-6
 
@@ -28,8 +28,8 @@ class Dynamics(NamedTuple):
     assumed: tuple[str, ...] = ()
 
     def delay_ticks(self, rate_hz: float) -> int:
-        """Return the delay in whole ticks, rounded up; `BELIEVED_TICKS` where it is not measured."""
-        return BELIEVED_TICKS if self.delay_s is None else math.ceil(self.delay_s * rate_hz - _ROUNDING_TICKS)
+        """Return the delay in whole ticks, rounded up; `ASSUMED_TICKS` where it is not measured."""
+        return ASSUMED_TICKS if self.delay_s is None else math.ceil(self.delay_s * rate_hz - _ROUNDING_TICKS)
 
     @property
     def unknown(self) -> tuple[str, ...]:

@@ -110,9 +110,9 @@ KALMAN_STATE: Fields = (
     ("estimate_mps", FLOAT, (3,)),  # velocity estimated with the force
     ("smoothed_mps", FLOAT, (3,)),  # by EWMA, in the scene: used after a fault of the filter
     ("carried_mps", FLOAT, (3,)),  # in the scene: the remaining difference after a change between the two
-    ("believed_ticks", INT),  # delay of the loop assumed at this sample
+    ("assumed_ticks", INT),  # delay of the loop assumed at this sample
     ("delay_ticks", INT),  # the same at the sample before
-    ("distrusted", INT),  # 1 while EWMA is used
+    ("on_ewma", INT),  # 1 while EWMA is used
     ("surprise", FLOAT),  # mean of squared innovations over their variance
     ("quiet_s", FLOAT),  # time since the last fault
     ("repeated", INT),  # 1 if the last sample counted as a repeated one

@@ -174,7 +174,7 @@ KNEE_NONE = 0
 KNEE_SQRT = 1
 KNEE_SQUARE = 2
 
-# The force link (haptics.kernels.force_link).
+# The force link (haptics.kernels.safety).
 LINK = np.dtype(
     [
         ("acts", np.int64),  # 0: the force of a tick is sent in that tick
@@ -299,7 +299,7 @@ LIQUID_STATE = np.dtype(
     align=True,
 )
 
-# The fast part of force and motion, and its work, at the hand (haptics.kernels.incremental_passivity).
+# The fast part of force and motion, and its work, at the hand (haptics.kernels.passivity).
 INCREMENTAL = np.dtype(
     [
         ("force_n", np.float64, (3,)),  # mean force since the last sample

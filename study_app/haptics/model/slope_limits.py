@@ -11,14 +11,13 @@ from importlib import resources
 from typing import Final, Literal, NamedTuple
 
 from study_app.errors import StudyError
-from study_app.haptics.model.bounds import met_mps
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.effects.drag import resistance_n
 from study_app.haptics.model.effects.non_newtonian import VISCOUS_SHARE, steady_n
 from study_app.haptics.model.effects.unsteady_drag import LATE_SHARE, even_n
 from study_app.haptics.model.estimators import LINES, NAMED, DeviceVelocity
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
-from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.gate import met_mps, resolve
 from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene, Velocity, Withdrawn
 
 SLOWEST_HZ: Final = 500.0

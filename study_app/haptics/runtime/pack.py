@@ -18,8 +18,19 @@ from study_app.haptics.model.estimators import MOST_LAG_TICKS, DeviceVelocity
 from study_app.haptics.model.estimators import NAMED as ESTIMATORS
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.liquid import Box, Cylinder, Liquid, Region
-from study_app.haptics.model.scene import MAX_LIQUIDS, STORED_FORCES, Ewma, Given, Kalman, Scene, Withdrawn
+from study_app.haptics.model.scene import (
+    MAX_LIQUIDS,
+    STORED_FORCES,
+    Box,
+    Cylinder,
+    Ewma,
+    Given,
+    Kalman,
+    Liquid,
+    Region,
+    Scene,
+    Withdrawn,
+)
 from study_app.haptics.model.slope_limits import DampingLimits, handle_limits, slew_limit_n
 
 KINDS: Final[tuple[Rows, ...]] = tuple(rows for effect in EFFECTS for rows in effect.rows)

@@ -147,10 +147,10 @@ def _position_at(ring: Any, written: Any, time_ns: int, position: Any) -> Any:
         else:
             high = middle
     before = low
-    while before >= oldest and not _believed(ring[before % size]):
+    while before >= oldest and not _plausible(ring[before % size]):
         before -= 1
     after = high
-    while after < end and not _believed(ring[after % size]):
+    while after < end and not _plausible(ring[after % size]):
         after += 1
     if before < oldest and after >= end:
         return 0
@@ -173,7 +173,7 @@ def _place(sample: Any, position: Any) -> Any:
 
 
 @kernel
-def _believed(sample: Any) -> bool:
+def _plausible(sample: Any) -> bool:
     if sample.limiters & LIMITER_GLITCH != 0:
         return False
     position = sample.position_m

@@ -1,6 +1,6 @@
 """Estimates parameters of a liquid from a stream of measured force, or gives the reason without an estimate.
 
-The drag coefficient alone follows each batch of rows by recursive least squares (``recursive_drag``). With length and
+The drag coefficient alone follows each batch of rows by recursive least squares (`fits.RecursiveDrag`). With length and
 scaling of the wake the newest rows are searched once per second of the stream (``wake_fit``), in an executor if the
 caller has windows. A value counts only if the motion identifies it (``information``).
 """
@@ -15,11 +15,20 @@ import numpy as np
 from study_app.errors import StudyError
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import Scene
-from study_app.lab.estimation.information import NEEDED, information, interval
-from study_app.lab.estimation.liquid_model import DRAG, NAMES, LiquidModel, refusal, values_of
-from study_app.lab.estimation.recursive_drag import RecursiveDrag
-from study_app.lab.estimation.rows import GAP_S, Rows, joined, no_rows
-from study_app.lab.estimation.wake_fit import WakeFit, WakeSearch
+from study_app.lab.estimation.fits import (
+    DRAG,
+    NAMES,
+    NEEDED,
+    LiquidModel,
+    RecursiveDrag,
+    WakeFit,
+    WakeSearch,
+    information,
+    interval,
+    refusal,
+    values_of,
+)
+from study_app.lab.estimation.sources import GAP_S, Rows, joined, no_rows
 
 MEMORY_S: Final = 10.0
 LEAST_S: Final = 1.0

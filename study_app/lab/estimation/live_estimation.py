@@ -1,27 +1,87 @@
-"""The lab's estimation: source of the force, estimated parameters, and their application to the selected setting."""
+"""The lab's estimation: source of the force, estimated parameters, and their application to the selected setting.
+
+Applies an estimate to the selected scene, at once or continuously, within the slope and force limits.
+
+With the constant law of drag, F = c w², the damping F/w grows up to √(F_max c) at the force limit F_max. The drag
+coefficient is applied up to the value at which this equals the slope limit of the loop: so no estimate causes the slope
+limit to act. The force limit always acts. In continuous application a value changes by at most `MOST_PER_S`. The length
+of the wake is only applied at once, because another length clears the wake.
+"""
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from study_app.errors import StudyError
+from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.slope_limits import LIGHTER, MEASURED_KG, slope_limit
 from study_app.lab.ab_comparison import Workbench, other
-from study_app.lab.changes import changed
-from study_app.lab.estimation.application import applicable, stepped
 from study_app.lab.estimation.estimator import NOTHING, Estimate, OnlineEstimator
-from study_app.lab.estimation.growing_csv import GrowingCsv
-from study_app.lab.estimation.liquid_model import DRAG, NAMES, PLACES, SCALING, values_of
-from study_app.lab.estimation.lsl_stream import LslForce
-from study_app.lab.estimation.rows import Rows, no_rows
-from study_app.lab.estimation.telemetry_force import DeviceForce, OtherLiquidForce, as_measured
+from study_app.lab.estimation.fits import DRAG, LENGTH, NAMES, PLACES, SCALING, values_of
+from study_app.lab.estimation.sources import (
+    DeviceForce,
+    GrowingCsv,
+    LslForce,
+    OtherLiquidForce,
+    Rows,
+    as_measured,
+    no_rows,
+)
+from study_app.lab.parameters import changed
 
 if TYPE_CHECKING:
     from study_app.haptics.runtime.telemetry import Reader
     from study_app.lab.live import Live
+
+
+MOST_PER_S: Final = 0.5
+"""Greatest rate of change of the logarithm of a value."""
+UNCHANGED: Final = 2e-3
+"""A value whose relative difference from the estimate is less than this stays."""
+
+
+def most_drag_coefficient(scene: Scene, dynamics: Dynamics, device_limit_n: float) -> float:
+    """Return the greatest drag coefficient that may be applied to a scene with one liquid: at least its present one."""
+    delay = min(dynamics.delay_ticks(scene.rate_hz), MOST_DELAY)
+    lighter = min(dynamics.mass_kg / MEASURED_KG, 1.0) ** LIGHTER
+    slope_nspm: float = lighter * slope_limit(1 / scene.rate_hz, delay, scene.velocity) / scene.scale
+    limit_n = min(device_limit_n, scene.force_limit_n)
+    by_one_kg_m: float = 0.5 * scene.liquids[0].density_kg_m3 * math.pi / 4 * scene.body.diameter_m**2
+    return float(max(slope_nspm**2 / (limit_n * by_one_kg_m), scene.body.drag_coefficient))
+
+
+def applicable(scene: Scene, estimate: Estimate, dynamics: Dynamics, device_limit_n: float) -> dict[str, float]:
+    """Return the values of an estimate within the limits, by name; none if the motion identifies none."""
+    if not estimate.identified:
+        return {}
+    values = dict(estimate.values)
+    values[DRAG] = min(values[DRAG], most_drag_coefficient(scene, dynamics, device_limit_n))
+    if SCALING in values:
+        length = values.get(LENGTH, values_of(scene).get(LENGTH, 1.0))
+        values[SCALING] = max(values[SCALING], length)
+    return values
+
+
+def stepped(
+    scene: Scene, estimate: Estimate, dynamics: Dynamics, device_limit_n: float, elapsed_s: float
+) -> dict[str, float]:
+    """Return the values that continuous application sets next, by name; none without a change."""
+    now, most = values_of(scene), MOST_PER_S * elapsed_s
+    found = {}
+    for name, target in applicable(scene, estimate, dynamics, device_limit_n).items():
+        if name == LENGTH or now.get(name, 0.0) <= 0:
+            continue
+        wanted = max(target, now[LENGTH]) if name == SCALING else target  # the length is not changed
+        way = math.log(wanted / now[name])
+        if abs(way) > UNCHANGED:
+            found[name] = wanted if abs(way) <= most else now[name] * math.exp(math.copysign(most, way))
+    return found
+
 
 Source: TypeAlias = Literal["off", "other", "device", "file", "lsl"]
 
@@ -126,8 +186,8 @@ class LiveEstimation:
     def _begin(self, live: Live | None, bench: Workbench) -> None:
         """Restart if the device or parameters that are not estimated changed."""
         scene = bench.in_hand.scene
-        planted = bench.setting(other(bench.felt)).scene if self.chosen.source == "other" else None
-        basis = (_without(scene, self.chosen.names), planted)
+        reference = bench.setting(other(bench.felt)).scene if self.chosen.source == "other" else None
+        basis = (_without(scene, self.chosen.names), reference)
         if basis == self._basis and live is self._live:
             return
         if live is None and self.chosen.source in OF_TELEMETRY:
@@ -139,7 +199,7 @@ class LiveEstimation:
             as_measured(scene) if of_telemetry else scene, self.chosen.names, executor=self._executor
         )
         self._device_force = DeviceForce()
-        self._sensor = None if planted is None else OtherLiquidForce(planted)
+        self._sensor = None if reference is None else OtherLiquidForce(reference)
         self._reader = None if live is None else live.servo.telemetry.reader()
 
     def _rows(self, bench: Workbench) -> Rows:

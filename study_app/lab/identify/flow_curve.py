@@ -1,7 +1,7 @@
 """Parameters of a non-Newtonian liquid from a rheometer's flow curve: shear stress over shear rate.
 
 The sum of (fitted/measured stress − 1)² is minimised, since flow curves span decades and a rheometer's error is
-relative to the stress. The curve is `study_app.haptics.model.laws.rheology.stress_pa`, that of steady shear.
+relative to the stress. The curve is `study_app.haptics.model.laws.stress_pa`, that of steady shear.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.laws.rheology import stress_pa
+from study_app.haptics.model.laws import stress_pa
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Scene
 from study_app.lab.identify.estimates import Estimates, estimate

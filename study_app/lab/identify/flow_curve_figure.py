@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
 from study_app import figure_style as style
-from study_app.haptics.model.laws.rheology import stress_pa
+from study_app.haptics.model.laws import stress_pa
 from study_app.lab.identify.flow_curve import TABLE, CurveFit
 
 MARGIN: Final = 1.3

@@ -15,9 +15,8 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict
 
-from study_app.haptics.model.bounds import Extremes
 from study_app.haptics.model.effects import EFFECTS
-from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.gate import Extremes, resolve
 from study_app.haptics.model.scene import MAX_LIQUIDS, Box, Everywhere, Liquid, MotionBox, Scene
 from study_app.protocol.checks import cross_references as named
 from study_app.protocol.checks.designs import kinds

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import Final
 
-from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import MOST_DELAY_MS, Scene, Velocity
@@ -50,7 +50,7 @@ _GIVES: Final = ("gives", "give")
 _IS: Final = ("is", "are")
 
 
-def paced(protocol: Protocol, delay_ticks: int = BELIEVED_TICKS) -> Iterator[Fault]:
+def paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterator[Fault]:
     """Yield what is wrong with tasks of kind "follow", and with balls that are hidden where a hand must aim.
 
     The study is sound but for this; a force acts ``delay_ticks`` ticks late.

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 from itertools import combinations
 
-from study_app.haptics.model.bounds import met_mps
 from study_app.haptics.model.effects.drag import REFERENCE, resistance_n
+from study_app.haptics.model.gate import met_mps
 from study_app.haptics.model.slope_limits import HAND_MPS, Steady, steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.delayed_force import delay_warnings

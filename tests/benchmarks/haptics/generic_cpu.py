@@ -18,7 +18,7 @@ PROGRAM = """
 import hashlib, json, sys
 from study_app.evidence.cost import TickTimer
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.paths import path
+from study_app.haptics.model.motion import path
 from study_app.haptics.runtime.offline import simulate
 from study_app.protocol.load import load_scenes
 

@@ -15,8 +15,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from study_app.lab.estimation.estimator import Estimate, OnlineEstimator
-from study_app.lab.estimation.liquid_model import DRAG, NAMES, LiquidModel, prepare
-from study_app.lab.estimation.rows import CentredVelocity
+from study_app.lab.estimation.fits import DRAG, NAMES, LiquidModel, prepare
+from study_app.lab.estimation.sources import CentredVelocity
 from tests.lab.estimation.measured import BATCH, WATER, fed, measured, planted, stirring, wandering
 
 TRUE = {DRAG: 0.42, "length": 1200.0, "scaling": 1500.0}

@@ -19,9 +19,8 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Ewma, Kalman, Knee, Raw, Scene, Velocity
-from study_app.haptics.runtime.offline import samples_along
+from study_app.haptics.runtime.offline import new_wake_places, recompute_sample, samples_along
 from study_app.haptics.runtime.pack import pack
-from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 
 EXCERPT: Final = Path(__file__).with_name("encoders.npz")
 COUNTS_M: Final = {"spindle": 38e-6, "motor": 38e-6 * 8192 / (4196 * 35)}

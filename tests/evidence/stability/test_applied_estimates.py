@@ -9,7 +9,7 @@ from study_app.cli import commands
 from study_app.evidence.stability import applied_estimates
 from study_app.evidence.stability.applied_estimates import AppliedCase, evidence, judge_applied
 from study_app.evidence.stability.stability_cases import parse
-from study_app.lab.estimation.liquid_model import DRAG
+from study_app.lab.estimation.fits import DRAG
 from tests.haptics.scenes import COMPILED
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")]

@@ -10,10 +10,10 @@ import numpy as np
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.offline import new_wake_places, recompute_sample
 from study_app.haptics.runtime.pack import pack
-from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from study_app.lab.ab_comparison import Setting, Workbench
-from study_app.lab.limiters import LimiterCounts
+from study_app.lab.live import LimiterCounts
 from study_app.lab.presets import spoken
 from study_app.lab.shadow import Shadow
 from study_app.protocol.load import load_scene

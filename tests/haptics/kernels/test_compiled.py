@@ -172,7 +172,7 @@ def test_a_changed_constant_of_a_kernel_changes_the_digest_and_a_word_elsewhere_
         ("haptics/model/effect.py", "INT, FLOAT", "FLOAT, INT"),  # imported by what it imports
     ):
         assert digest_with(package, file, old, new) != digest, file
-    assert digest_with(package, "haptics/model/paths.py", '"""', '"""The ') == digest
+    assert digest_with(package, "haptics/model/overrides.py", '"""', '"""The ') == digest
     (package / "haptics/model/effects/unlisted.py").write_text("")  # found by `iter_modules`
     assert compiled.digest_of(compiled.compiled_sources(package)) != digest
 

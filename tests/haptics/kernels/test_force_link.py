@@ -5,8 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from study_app.errors import StudyError
-from study_app.haptics.kernels.force_link import delay_force, uniform
-from study_app.haptics.kernels.safety import begin_scene
+from study_app.haptics.kernels.safety import begin_scene, delay_force, uniform
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_STOP
 from study_app.haptics.model.motion import Motion

@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
-from study_app.haptics.kernels.incremental_passivity import (
-    ALLOWANCE_J,
+from study_app.haptics.kernels.passivity import (
     CORNER_RADPS,
-    FORGIVEN_W,
+    HALVING_J,
+    INCREMENTAL_ALLOWANCE_J,
+    INCREMENTAL_FORGIVEN_W,
     begin_incremental,
     close_incremental,
     observe_incremental,
+    reduce_gain,
+    reset_observer,
 )
-from study_app.haptics.kernels.passivity import HALVING_J, reduce_gain, reset_observer
 from study_app.haptics.model.layout import LIMITER_ENERGY, PARAMETERS, PASSIVITY, SAMPLE, records
 from tests.haptics.scenes import HONEY, Hand
 
@@ -38,14 +40,14 @@ def test_a_force_along_a_fast_motion_owes_the_filtered_power(frequency_hz, perio
     kept, tick = np.exp(-CORNER_RADPS * period_s), np.exp(-1j * omega * period_s)
     passed = np.abs(kept * (1 - tick) / (1 - kept * tick)) ** 4
     power_w = (found[len(t_s) // 2] - found[-1]) / 0.5
-    assert power_w == pytest.approx(0.5 * 2.0 * 0.1 * passed - FORGIVEN_W, rel=0.02)
+    assert power_w == pytest.approx(0.5 * 2.0 * 0.1 * passed - INCREMENTAL_FORGIVEN_W, rel=0.02)
 
 
 def test_a_damper_owes_nothing_and_what_it_took_is_not_kept():
     wave = np.sin(2 * np.pi * 40 * np.arange(1000) * 1e-3)
     found = balances(np.where(np.arange(1000) < 500, -2.0, 2.0) * wave, 0.1 * wave)
     assert found[:490].min() > -1e-4
-    assert found[-1] < -ALLOWANCE_J
+    assert found[-1] < -INCREMENTAL_ALLOWANCE_J
 
 
 def test_a_swing_is_owed_for_although_the_motion_pays_more():
@@ -54,7 +56,7 @@ def test_a_swing_is_owed_for_although_the_motion_pays_more():
     slow, fast = 0.3 * np.sin(2 * np.pi * 2 * t_s), 0.05 * np.sin(2 * np.pi * 40 * t_s)
     force_n, velocity_mps = -20 * slow + 20 * fast, slow + fast
     assert -np.sum(force_n * velocity_mps) * 1e-3 > 0.5
-    assert balances(force_n, velocity_mps)[-1] < -ALLOWANCE_J
+    assert balances(force_n, velocity_mps)[-1] < -INCREMENTAL_ALLOWANCE_J
     assert balances(-20 * slow, slow).min() > -1e-4
 
 
@@ -62,10 +64,10 @@ def test_a_debt_beyond_the_allowance_lowers_the_gain():
     parameters, passivity, sample = records(PARAMETERS, 1)[0], records(PASSIVITY, 1)[0], records(SAMPLE, 1)[0]
     reset_observer(passivity)
     sample.device_force_n[0] = 4.0
-    passivity.fast.balance_j = -ALLOWANCE_J
+    passivity.fast.balance_j = -INCREMENTAL_ALLOWANCE_J
     reduce_gain(parameters, passivity, sample)
     assert (sample.device_force_n[0], sample.limiters) == (4.0, 0)
-    passivity.fast.balance_j = -ALLOWANCE_J - HALVING_J
+    passivity.fast.balance_j = -INCREMENTAL_ALLOWANCE_J - HALVING_J
     reduce_gain(parameters, passivity, sample)
     assert sample.device_force_n[0] == pytest.approx(2.0)
     assert sample.limiters == LIMITER_ENERGY

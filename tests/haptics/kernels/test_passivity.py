@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.haptics.kernels.safety import begin_scene
-from study_app.haptics.model import paths
+from study_app.haptics.model import laws
+from study_app.haptics.model import motion as paths
 from study_app.haptics.model.force_rules import VERSIONS
-from study_app.haptics.model.laws import drag_laws as laws
 from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Body, ForceLink

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("too many sub-steps for plain Python", allow_module_level=True)
 
-from study_app.haptics.kernels.plant import move, new_handle, push
-from study_app.haptics.kernels.tick_schedule import new_schedule, next_tick
+from study_app.haptics.kernels.plant import move, new_handle, new_schedule, next_tick, push
 from study_app.haptics.model.layout import MOST_DELAY
 
 STILL = np.zeros(3)

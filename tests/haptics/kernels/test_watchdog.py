@@ -16,8 +16,8 @@ from study_app.errors import ServoFault
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.layout import LIMITER_STALE, LIMITER_STOP, STATUS_OK
 from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.offline import take_sample
 from study_app.haptics.runtime.pack import pack
-from study_app.haptics.runtime.recompute import take_sample
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.recording_device import Probe
 from tests.haptics.running import felt, force_n, is_zero, wait_until

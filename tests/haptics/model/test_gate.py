@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.haptics.model.bounds import Extremes, bounds, lowered_mps
 from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
 from study_app.haptics.model.effects.drag import Drag, cheapest_law, resistance_n
 from study_app.haptics.model.effects.wake import Wake
-from study_app.haptics.model.gate import calls_for, describe_gate, resolve
+from study_app.haptics.model.gate import Extremes, bounds, calls_for, describe_gate, lowered_mps, resolve
 from study_app.haptics.model.scene import Accuracy, Body, Box, Cylinder, Knee, Liquid, MotionBox, Scene
 
 LIQUIDS = {

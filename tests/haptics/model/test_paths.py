@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from study_app.errors import StudyError
-from study_app.haptics.model.paths import NAMES, circle, path, reach, reverse, stop
+from study_app.haptics.model.motion import NAMES, circle, path, reach, reverse, stop
 
 
 @pytest.mark.slow

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.model.layout import LIMITER_FADE
+from study_app.haptics.model.motion import path
 from study_app.haptics.model.overrides import override_all
-from study_app.haptics.model.paths import path
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import SLEW_N
 from study_app.haptics.runtime.clocks.clock import VirtualClock

@@ -8,7 +8,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from study_app.haptics.runtime.compile_progress import EXPECTED, following_compilation
+from study_app.haptics.kernels.compiled import EXPECTED, following_compilation
 from tests.compiled import needs_servo
 
 pytestmark = needs_servo
@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[3]
 OPENED = """
 from random import Random
 from study_app.devices.rig import open_rig, study_settings
-from study_app.haptics.runtime.compile_progress import following_compilation
+from study_app.haptics.kernels.compiled import following_compilation
 from study_app.protocol.load import load
 
 shares = []

@@ -13,7 +13,7 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import SAMPLE
 from study_app.haptics.model.scene import Box, Knee
 from study_app.haptics.runtime.pack import built_alike
-from study_app.lab.changes import changed
+from study_app.lab.parameters import changed
 from study_app.protocol.load import load_scenes
 from tests.golden import compare
 from tests.golden_values import value_lines

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.layout import LIMITER_SLEW
-from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.paths import circle
+from study_app.haptics.model.motion import Motion, circle
 from study_app.haptics.model.slope_limits import SLEW_N
 from study_app.haptics.runtime.offline import COLUMNS, simulate
 from study_app.store.tables.csv_files import write_columns

@@ -8,8 +8,8 @@ import numpy as np
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.offline import ModelAlong
 from study_app.lab.estimation.estimator import Estimate, OnlineEstimator
-from study_app.lab.estimation.liquid_model import with_wake
-from study_app.lab.estimation.rows import Rows
+from study_app.lab.estimation.fits import with_wake
+from study_app.lab.estimation.sources import Rows
 from study_app.protocol.load import load_scene
 
 WATER = load_scene("rek2024", "water")

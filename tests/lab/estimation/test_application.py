@@ -6,9 +6,8 @@ import pytest
 
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.slope_limits import slope_limit, steady
-from study_app.lab.estimation.application import MOST_PER_S, applicable, most_drag_coefficient, stepped
 from study_app.lab.estimation.estimator import Estimate
-from study_app.lab.estimation.live_estimation import set_values
+from study_app.lab.estimation.live_estimation import MOST_PER_S, applicable, most_drag_coefficient, set_values, stepped
 from tests.lab.benches import bench
 from tests.lab.estimation.measured import WATER
 

@@ -9,8 +9,8 @@ import pytest
 from study_app.errors import StudyError
 from study_app.haptics.model.effects.drag import Drag
 from study_app.lab.estimation.estimator import OnlineEstimator
-from study_app.lab.estimation.liquid_model import DRAG, NAMES, LiquidModel
-from study_app.lab.estimation.rows import CentredVelocity, Rows, joined
+from study_app.lab.estimation.fits import DRAG, NAMES, LiquidModel
+from study_app.lab.estimation.sources import CentredVelocity, Rows, joined
 from study_app.protocol.load import load_scene
 from tests.lab.estimation.measured import NOISE_N, WATER, fed, measured, planted, stirring, wandering
 

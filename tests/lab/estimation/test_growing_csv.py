@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from study_app.errors import StudyError
-from study_app.lab.estimation.growing_csv import GrowingCsv
-from study_app.lab.estimation.rows import Rows, joined
+from study_app.lab.estimation.sources import GrowingCsv, Rows, joined
 from tests.lab.estimation.measured import COLUMNS, WATER, begun, lines, measured, stirring
 
 

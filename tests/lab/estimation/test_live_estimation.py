@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from study_app.lab.ab_comparison import Setting, Workbench
-from study_app.lab.estimation.liquid_model import DRAG, NAMES
+from study_app.lab.estimation.fits import DRAG, NAMES
 from study_app.lab.estimation.live_estimation import Chosen, LiveEstimation, set_values
 from study_app.lab.live import Live
 from tests.compiled import needs_servo

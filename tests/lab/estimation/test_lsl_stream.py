@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from study_app.errors import StudyError
-from study_app.lab.estimation.lsl_stream import LABELS, LslForce
+from study_app.lab.estimation.sources import LABELS, LslForce
 from tests.lab.estimation.measured import WATER, measured, stirring
 
 pylsl = pytest.importorskip("pylsl", reason="pylsl is not installed", exc_type=(ImportError, RuntimeError))

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from study_app.haptics.model import paths
+from study_app.haptics.model import motion as paths
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion

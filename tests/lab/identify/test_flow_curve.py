@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.errors import StudyError
-from study_app.haptics.model.laws.rheology import stress_pa
+from study_app.haptics.model.laws import stress_pa
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.lab.identify import measured_force

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import t as student
 
 from study_app.errors import StudyError
-from study_app.haptics.model import paths
+from study_app.haptics.model import motion as paths
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Box, Liquid, Scene

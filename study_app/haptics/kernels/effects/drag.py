@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import norm
+from study_app.haptics.model import laws
 from study_app.haptics.model.effects.drag import LAW_BROWN_LAWLER, LAW_CONSTANT, LAW_HAIDER_LEVENSPIEL, LAW_LINEAR
-from study_app.haptics.model.laws import drag_laws as laws
 from study_app.haptics.model.layout import GROWS_AS_SPEED, Record
 
 _schiller_naumann = part(laws.schiller_naumann)

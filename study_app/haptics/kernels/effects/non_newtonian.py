@@ -22,14 +22,14 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import clear, copy, norm, square
+from study_app.haptics.model import laws
 from study_app.haptics.model.effects.non_newtonian import (
     KIND_CARREAU,
     KIND_HERSCHEL_BULKLEY,
     KIND_MAXWELL,
     VISCOUS_SHARE,
 )
-from study_app.haptics.model.laws import rheology
-from study_app.haptics.model.laws.drag_laws import finite_reynolds
+from study_app.haptics.model.laws import finite_reynolds
 from study_app.haptics.model.layout import GROWS_AS_SPEED, GROWS_LESS, Record
 
 SLACK_COUNTS = 2.0
@@ -38,9 +38,9 @@ SLACK_COUNTS = 2.0
 MOST_STRAIN = 3.0
 """In a tick that strains the liquid more, it flows, with the yield stress as shear stress."""
 
-_herschel_bulkley = part(rheology.herschel_bulkley)
-_carreau = part(rheology.carreau)
-_shear_thickening = part(rheology.shear_thickening)
+_herschel_bulkley = part(laws.herschel_bulkley)
+_carreau = part(laws.carreau)
+_shear_thickening = part(laws.shear_thickening)
 _over_stokes = part(finite_reynolds)
 
 
@@ -183,5 +183,5 @@ def _add_excess_force(local: Record, state: Record, w: Any, resistance_nspm: flo
 
 @part
 def _inertial_factor(law: Any, force_n: float, speed_mps: float) -> float:
-    """Return φ(Re) of `rheology.inertial_factor`."""
+    """Return φ(Re) of `laws.inertial_factor`."""
     return float(_over_stokes(law.inertia_kg_m * speed_mps * speed_mps / force_n)) if force_n > 0.0 else 1.0

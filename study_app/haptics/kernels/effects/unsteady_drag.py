@@ -25,8 +25,8 @@ from typing import Any
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.effects.added_mass import accelerate, storing_square
 from study_app.haptics.kernels.vector import clear, copy, dot, norm, square
+from study_app.haptics.model import laws
 from study_app.haptics.model.effects.unsteady_drag import EXPONENTIALS, LATE_SHARE
-from study_app.haptics.model.laws import drag_laws as laws
 from study_app.haptics.model.layout import GROWS_AS_SPEED, Record
 
 MEMORY_LOSS = 0.268  # c_m

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Self, TypeAlias
 from pydantic import Field, model_validator
 
 from study_app.haptics.model.effect import FLOAT, INT, Effect, ExtremesLike, Fields, LiquidLike, Parameter, SceneLike
-from study_app.haptics.model.laws.drag_laws import LAWS, Law, drag_n
+from study_app.haptics.model.laws import LAWS, Law, drag_n
 from study_app.haptics.model.ranges import Frozen, later, within
 
 BIT = 1 << 0

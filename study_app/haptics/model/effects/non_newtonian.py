@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from study_app.haptics.model.effect import FLOAT, INT, Effect, ExtremesLike, Fields, LiquidLike, Parameter, SceneLike
-from study_app.haptics.model.laws.rheology import (
+from study_app.haptics.model.laws import (
     CARREAU_RATE,
     RESOLVED_S,
     Carreau,

@@ -15,7 +15,7 @@ from study_app.haptics.model.effect import (
     smoothing_s,
 )
 from study_app.haptics.model.effects import added_mass, drag, history
-from study_app.haptics.model.laws.drag_laws import finite_reynolds
+from study_app.haptics.model.laws import finite_reynolds
 
 BIT = 1 << 8
 

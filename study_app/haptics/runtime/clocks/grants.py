@@ -1,10 +1,15 @@
-"""The priority that the system granted to the servo's thread, and advice on how to get more."""
+"""What the system grants to a program that exerts force: a priority, and no suspension by a terminal.
+
+Loads no compiler.
+"""
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 Level: TypeAlias = Literal["real-time", "raised", "normal", "none"]
 Blocks: TypeAlias = Sequence[tuple[int, int]]
@@ -44,3 +49,41 @@ class Grant:
 REFUSED = "the system grants no more"
 NOT_ASKED = Grant("normal", "no more was requested")
 NO_THREAD = Grant("none", "not in a thread of its own")
+
+
+SUSPENDING: Final = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
+"""Signals by which a terminal stops programs: Ctrl-Z, and access to the terminal from the background."""
+
+_pushing: set[int] = set()
+_refused: set[int] = set()
+
+
+def refuse_suspension(by: object) -> None:
+    """Ignore the terminal's stop signals until `allow_suspension` is called for all callers of this function.
+
+    Handlers already set stay. Only the main thread can do so; from any other thread nothing changes.
+    """
+    _pushing.add(id(by))
+    _settle()
+
+
+def allow_suspension(by: object) -> None:
+    """End the refusal for ``by``; a second call does nothing."""
+    _pushing.discard(id(by))
+    _settle()
+
+
+def _settle() -> None:
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for name in SUSPENDING:
+        number = getattr(signal, name, None)  # of POSIX
+        if number is None:
+            continue
+        if _pushing and signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.SIG_IGN)
+            _refused.add(number)
+        elif not _pushing and number in _refused:
+            _refused.discard(number)
+            if signal.getsignal(number) is signal.SIG_IGN:
+                signal.signal(number, signal.SIG_DFL)

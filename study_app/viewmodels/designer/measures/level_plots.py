@@ -7,7 +7,7 @@ from typing import Final
 
 from study_app.authoring.measures.observers import Observed
 from study_app.authoring.measures.planned import ENOUGH, Simulated
-from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.force_limits import clipped, clipped_unpaced
@@ -306,7 +306,7 @@ def forces_plot(of: LevelBlock, problems: Mapping[ProblemRow, tuple[str, ...]]) 
     asked = len(of.levels) - count
     rows = [row for row in problems if row.fault.path == ("stimuli", str(of.block.stimulus), "levels")]
     repair = next((RepairOffer(words[0], row) for row in rows if (words := problems[row])), None)
-    messages = [fault.message for fault in clipped(of.protocol, [of.block], BELIEVED_TICKS)]
+    messages = [fault.message for fault in clipped(of.protocol, [of.block], ASSUMED_TICKS)]
     said = ". ".join(f"{one[:1].upper()}{one[1:]}" for one in messages)
     warning = said or clipped_unpaced(of.protocol, [of.block]) or ""
     top = max(limit_n, *(bar.asked_n for bar in bars))

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.laws.drag_laws import LAWS, drag_n
+from study_app.haptics.model.laws import LAWS, drag_n
 from study_app.haptics.model.scene import Body
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.haptics.runtime.offline import simulate

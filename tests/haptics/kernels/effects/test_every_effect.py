@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from study_app.errors import StudyError
-from study_app.haptics.model.bounds import bounds
 from study_app.haptics.model.effects import NAMED
+from study_app.haptics.model.gate import bounds
 from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
-from study_app.lab.changes import changed
-from study_app.lab.parameters import parameter, sections
+from study_app.lab.parameters import changed, parameter, sections
 from tests.haptics.scenes import COMPILED, moving, vectors
 from tests.haptics.single_effects import NAMES, all_forces, force_n, given, in_lab, wandering
 

@@ -7,8 +7,7 @@ from study_app.evidence.reference_model import local_wakes
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.local_wake import CELLS, LocalWake
 from study_app.haptics.model.force_rules import VERSIONS
-from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.paths import path
+from study_app.haptics.model.motion import Motion, path
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, UNBENT, WATER_FACTOR, Hand, examples, liquid, moving, scene, vectors
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from study_app.evidence.reference_model import non_newtonian_n
+from study_app.haptics.model import laws
 from study_app.haptics.model.effects.non_newtonian import steady_n
-from study_app.haptics.model.laws import rheology
-from study_app.haptics.model.laws.rheology import Carreau, HerschelBulkley, Maxwell, ShearThickening
+from study_app.haptics.model.laws import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.layout import LIMITER_SLOPE
 from study_app.haptics.model.slope_limits import steady
 from study_app.haptics.runtime.offline import simulate
@@ -94,7 +94,7 @@ def test_after_a_stop_slime_relaxes_and_ketchup_holds():
     relaxation_s = PRESETS["slime"][1].relaxation_time_s
     later = round(1e3 * relaxation_s)
     assert slime[999 + later] / slime[999] == pytest.approx(np.exp(-1), rel=0.03)
-    assert ketchup[1001:] == pytest.approx(-rheology.yield_n(PRESETS["ketchup"][1], D), rel=1e-3)
+    assert ketchup[1001:] == pytest.approx(-laws.yield_n(PRESETS["ketchup"][1], D), rel=1e-3)
 
 
 @compiled

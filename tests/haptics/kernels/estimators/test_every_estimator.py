@@ -9,7 +9,7 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.slope_limits import table
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import built_alike, pack, pack_into
-from study_app.lab.changes import changed
+from study_app.lab.parameters import changed
 from study_app.protocol.checks.force_limits import passed_share
 from tests.haptics.scenes import COMPILED, Hand, vectors
 from tests.haptics.single_effects import EMPTY, ESTIMATOR_NAMES

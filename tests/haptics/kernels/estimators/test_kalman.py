@@ -17,9 +17,8 @@ from study_app.haptics.model.layout import LIMITER_ESTIMATOR, records
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Kalman, Scene
 from study_app.haptics.model.slope_limits import damping_limits, table
-from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.offline import new_wake_places, recompute_sample, simulate
 from study_app.haptics.runtime.pack import pack
-from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from tests.haptics.scenes import COMPILED, HONEY, UNBENT, WATER, Hand, vectors
 
 pytestmark = pytest.mark.slow

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.laws.drag_laws import HIGHEST_REYNOLDS, LAWS, drag_n
+from study_app.haptics.model.laws import HIGHEST_REYNOLDS, LAWS, drag_n
 from study_app.haptics.model.layout import LIMITER_NORM
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, THESIS, UNBENT, Hand, liquid, moving, scene, vectors

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.haptics.model.laws.drag_laws import LAWS, drag_n
+from study_app.haptics.model.laws import LAWS, drag_n
 
 # Measured drag coefficients of smooth spheres below the drag crisis, Re against C_d. The point at Re 0.0588 lies 20 %
 # above Stokes' 24/Re and cannot be right: it is left out.

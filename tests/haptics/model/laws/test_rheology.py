@@ -5,10 +5,10 @@ import pytest
 from pydantic import ValidationError
 
 from study_app.errors import StudyError
+from study_app.haptics.model import laws
 from study_app.haptics.model.effects.non_newtonian import steady_n
 from study_app.haptics.model.gate import describe_gate, resolve
-from study_app.haptics.model.laws import rheology
-from study_app.haptics.model.laws.rheology import Carreau, HerschelBulkley, Maxwell, ShearThickening
+from study_app.haptics.model.laws import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Kalman, Liquid, Scene
 from study_app.haptics.model.slope_limits import steady
@@ -19,7 +19,7 @@ SPEEDS = (0.003, 0.05, 0.6)
 
 
 def force_n(table, speed_mps):
-    return sum(rheology.creeping_n(table, D, speed_mps))
+    return sum(laws.creeping_n(table, D, speed_mps))
 
 
 def stokes_n(viscosity_pa_s, speed_mps):
@@ -48,8 +48,8 @@ def test_a_power_law_grows_by_its_index(index):
 
 
 def test_the_shape_factor_is_that_of_gu_and_tanner_and_continuous():
-    assert [rheology.shape_factor(n) for n in (1.0, 0.9, 0.5, 0.3)] == pytest.approx([1.0, 1.14, 1.42, 1.458])
-    fine = [rheology.shape_factor(n) for n in np.linspace(0.1, 1, 901)]
+    assert [laws.shape_factor(n) for n in (1.0, 0.9, 0.5, 0.3)] == pytest.approx([1.0, 1.14, 1.42, 1.458])
+    fine = [laws.shape_factor(n) for n in np.linspace(0.1, 1, 901)]
     assert abs(np.diff(fine)).max() <= 1.5e-3
 
 
@@ -68,20 +68,20 @@ def test_shear_thickening_is_newtonian_below_and_above_and_never_steeper_than_as
     assert force_n(table, 2 * onset_mps) == pytest.approx(stokes_n(20, 2 * onset_mps))
     speeds = np.linspace(0, 1, 5001)
     for steepest in (5.0, 17.7, 100.0):
-        forces = np.array([sum(rheology.creeping_n(table, D, v, steepest)) for v in speeds])
+        forces = np.array([sum(laws.creeping_n(table, D, v, steepest)) for v in speeds])
         assert (np.diff(forces) / np.diff(speeds)).max() <= max(steepest, 0) * (1 + 1e-9) or steepest > 39
         assert (forces <= [force_n(table, v) + 1e-12 for v in speeds]).all()
 
 
 def test_flow_curves_are_those_of_the_rheometer():
     hb = HerschelBulkley(yield_stress_pa=15, consistency_pa_sn=10, flow_index=0.25)
-    assert rheology.stress_pa(hb, 0.0) == 15
-    assert rheology.stress_pa(hb, 16.0) == pytest.approx(35)
+    assert laws.stress_pa(hb, 0.0) == 15
+    assert laws.stress_pa(hb, 16.0) == pytest.approx(35)
     carreau = Carreau(zero_shear_viscosity_pa_s=6, time_constant_s=0.15, flow_index=0.3)
-    assert rheology.stress_pa(carreau, 20.0) == pytest.approx(6 * 20 * (1 + 9) ** -0.35)
-    assert rheology.stress_pa(Maxwell(zero_shear_viscosity_pa_s=30, relaxation_time_s=0.3), 2.0) == 60
+    assert laws.stress_pa(carreau, 20.0) == pytest.approx(6 * 20 * (1 + 9) ** -0.35)
+    assert laws.stress_pa(Maxwell(zero_shear_viscosity_pa_s=30, relaxation_time_s=0.3), 2.0) == 60
     thick = ShearThickening(zero_shear_viscosity_pa_s=1, thickened_viscosity_pa_s=20, onset_shear_rate_per_s=5)
-    assert [rheology.stress_pa(thick, it) for it in (5.0, 7.5, 10.0, 20.0)] == pytest.approx([5, 102.5, 200, 400])
+    assert [laws.stress_pa(thick, it) for it in (5.0, 7.5, 10.0, 20.0)] == pytest.approx([5, 102.5, 200, 400])
 
 
 def test_the_force_grows_with_inertia_and_has_none_at_rest():
@@ -89,7 +89,7 @@ def test_the_force_grows_with_inertia_and_has_none_at_rest():
     slow, fast = (sum(steady_n(tank("shampoo"), liquid, v)) / force_n(liquid.non_newtonian, v) for v in (1e-7, 0.6))
     assert slow == pytest.approx(1, abs=1e-6)
     assert fast == pytest.approx(
-        rheology.finite_reynolds(1030 * 0.6 * D / (force_n(liquid.non_newtonian, 0.6) / stokes_n(1, 0.6)))
+        laws.finite_reynolds(1030 * 0.6 * D / (force_n(liquid.non_newtonian, 0.6) / stokes_n(1, 0.6)))
     )
 
 
@@ -131,7 +131,7 @@ def test_the_steady_force_keeps_the_limits(name, velocity):
     tank_scene = tank(name, scale=3.0).model_copy(update={"velocity": velocity})
     for hand_mps in (0.001, 0.05, 0.3, 1.0):
         found = steady(tank_scene, hand_mps)
-        held_n = rheology.yield_n(tank_scene.liquids[0].non_newtonian, D)
+        held_n = laws.yield_n(tank_scene.liquids[0].non_newtonian, D)
         assert found.force_n <= min(held_n + 53 * hand_mps, 8.0) + 1e-9
         assert found.drag_n == pytest.approx(sum(steady_n(tank_scene, tank_scene.liquids[0], 3 * hand_mps)))
         assert (found.limit is None) == (found.force_n == found.drag_n)

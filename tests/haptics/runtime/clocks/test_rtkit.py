@@ -12,7 +12,7 @@ if sys.platform != "linux":
 
 import resource
 
-from study_app.haptics.runtime.clocks.rtkit import make_high_priority, make_real_time
+from study_app.haptics.runtime.clocks.linux import make_high_priority, make_real_time
 
 
 class Service:

@@ -1,1 +1,0 @@
-"""Laws of drag and of flow: published formulas, without a scene."""

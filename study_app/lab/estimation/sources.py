@@ -1,0 +1,414 @@
+"""Sources of measured motion and force: a CSV file that grows, an inlet of LSL (``pylsl``), the lab's own telemetry.
+
+A stream of LSL is used if its channels have the labels of a CSV file's columns (`HEADER`, without ``t_s``); its time
+stamps are the times of the rows. Telemetry has the force that a device sent, or that a sensor in another liquid would
+measure; samples hold the velocity after the knee, so the liquids here have none.
+"""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import importlib.util
+import math
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.errors import StudyError
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.layout import LIMITER_ESTIMATOR, LIMITER_FADE, LIMITER_GLITCH, STATUS_OK
+from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES, refuse_device
+from study_app.haptics.model.scene import Knee, Scene
+from study_app.haptics.runtime.offline import ModelAlong
+
+Floats: TypeAlias = NDArray[np.float64]
+
+FORCES: Final = ("fx_n", "fy_n", "fz_n")
+HALF_S: Final = 0.0125
+"""Half width of the window for velocities: a tenth of the period of strokes of 4 Hz in total. [choice]"""
+GAP_S: Final = 0.05
+"""A longer time between two rows restarts the estimation, since the motion between them is unknown."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """Rows of a stream in the scene frame.
+
+    ``t_s`` (n,) increases; ``position_m``, ``velocity_mps`` and ``force_n`` (the liquid's on the body) are (n, 3).
+    Where ``usable`` (n,) is false only the motion is known.
+    """
+
+    t_s: Floats
+    position_m: Floats
+    velocity_mps: Floats
+    force_n: Floats
+    usable: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    def part(self, first: int, behind: int | None = None) -> Rows:
+        """Return the rows from one number on, up to another."""
+        return Rows(*(getattr(self, name)[first:behind] for name in self.__slots__))
+
+
+def no_rows() -> Rows:
+    """Return no rows."""
+    return Rows(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, bool))
+
+
+def joined(*parts: Rows) -> Rows:
+    """Return successive rows joined."""
+    return Rows(*(np.concatenate([getattr(it, name) for it in parts]) for name in Rows.__slots__))
+
+
+class CentredVelocity:
+    """Computes velocities of a stream without them: the slope through the positions 12.5 ms to both sides.
+
+    A row is returned once the positions after it are known. A gap restarts the window.
+    """
+
+    def __init__(self) -> None:
+        self._t_s: Floats = np.empty(0)
+        self._position_m: Floats = np.empty((0, 3))
+        self._force_n: Floats = np.empty((0, 3))
+
+    def take(self, t_s: Floats, position_m: Floats, force_n: Floats) -> Rows:
+        """Return the rows that are complete: times (n,) [s], positions [m] and forces [N] (n, 3) are the next ones."""
+        self._t_s = np.concatenate([self._t_s, t_s])
+        self._position_m = np.concatenate([self._position_m, position_m])
+        self._force_n = np.concatenate([self._force_n, force_n])
+        gaps = np.flatnonzero(np.diff(self._t_s) > GAP_S)
+        if len(gaps):
+            self._drop(int(gaps[-1]) + 1)
+        if len(self._t_s) < 3:
+            return no_rows()
+        half = max(1, round(HALF_S / float(np.median(np.diff(self._t_s)))))
+        width = 2 * half + 1
+        if len(self._t_s) < width:
+            return no_rows()
+        times_s = np.lib.stride_tricks.sliding_window_view(self._t_s, width)
+        places_m = np.lib.stride_tricks.sliding_window_view(self._position_m, width, axis=0)
+        lever_s = times_s - times_s.mean(axis=1, keepdims=True)
+        slopes = np.einsum("nw,naw->na", lever_s, places_m) / np.sum(lever_s**2, axis=1)[:, np.newaxis]
+        inner = slice(half, half + len(slopes))
+        out = Rows(self._t_s[inner], self._position_m[inner], slopes, self._force_n[inner], np.ones(len(slopes), bool))
+        self._drop(len(slopes))
+        return out
+
+    def _drop(self, count: int) -> None:
+        self._t_s, self._position_m = self._t_s[count:], self._position_m[count:]
+        self._force_n = self._force_n[count:]
+
+
+HEADER: Final = f"{','.join(PLACES + FORCES)}, with {','.join(VELOCITIES)} where they are known"
+_MOST_BYTES: Final = 65_536
+"""Greatest number of bytes per call: later calls read the rest of a long file."""
+
+
+class GrowingCsv:
+    """A file with the columns of `HEADER`, in any order; other columns and lines that begin with # are ignored.
+
+    Parameters
+    ----------
+    path : Path
+        It may have rows already, or only a header. A last line is read once its line end is written.
+
+    Raises
+    ------
+    StudyError
+        It cannot be read, or has another header.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._read = 0
+        self._line = 0
+        self._rest = b""
+        self._places: list[int] = []
+        self._has_velocities = False
+        self._last_s = -math.inf
+        self._centred = CentredVelocity()
+        self._bytes()  # raises at once if it cannot be read
+        self._read, self._rest = 0, b""
+
+    def poll(self) -> Rows:
+        """Return the rows that were appended since.
+
+        Raises
+        ------
+        StudyError
+            The file cannot be read, became shorter, or has a line that cannot be used.
+        """
+        numbered = []
+        for line in self._bytes():
+            self._line += 1
+            if line.strip() and not line.startswith("#"):
+                numbered.append((self._line, next(csv.reader([line]))))
+        if numbered and not self._places:
+            self._take_header(numbered.pop(0)[1])
+        if not numbered:
+            return no_rows()
+        rows = np.array([self._row(number, fields) for number, fields in numbered])
+        self._check_times(rows[:, 0], numbered)
+        if self._has_velocities:
+            return Rows(rows[:, 0], rows[:, 1:4], rows[:, 7:], rows[:, 4:7], np.ones(len(rows), bool))
+        return self._centred.take(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
+
+    def _bytes(self) -> list[str]:
+        """Return the complete lines not yet read."""
+        try:
+            refuse_device(self.path)
+            with self.path.open("rb") as file:
+                size = file.seek(0, 2)
+                if size < self._read:
+                    raise StudyError(f"{self.path} became shorter while it was read: append to it, or choose it again")
+                file.seek(self._read)
+                found = file.read(_MOST_BYTES)
+        except OSError as error:
+            raise StudyError(f"cannot read {self.path}: {error.strerror}; name a CSV file of {HEADER}") from error
+        first = self._read == 0
+        self._read += len(found)
+        *lines, self._rest = (self._rest + found).split(b"\n")
+        try:
+            text = [line.decode("utf-8") for line in lines]
+        except UnicodeDecodeError as error:
+            raise StudyError(f"cannot read {self.path}: it is not UTF-8 text; name a CSV file of {HEADER}") from error
+        return [text[0].removeprefix("\ufeff"), *text[1:]] if first and text else text
+
+    def _take_header(self, header: list[str]) -> None:
+        names = [name.strip() for name in header]
+        wanted = PLACES + FORCES
+        if lacking := [name for name in wanted if name not in names]:
+            raise StudyError(f"{self.path} has no column {', '.join(lacking)}: the first line must name {HEADER}")
+        self._has_velocities = all(name in names for name in VELOCITIES)
+        self._places = [names.index(name) for name in wanted + (VELOCITIES if self._has_velocities else ())]
+
+    def _row(self, number: int, fields: list[str]) -> list[float]:
+        if len(fields) <= max(self._places):
+            raise StudyError(f"{self.path}, line {number}: has {len(fields)} fields, fewer than the header names")
+        row = []
+        for place in self._places:
+            try:
+                value = float(fields[place])
+            except ValueError:
+                value = math.nan
+            if not math.isfinite(value):
+                raise StudyError(
+                    f"{self.path}, line {number}: {fields[place][:SHOWN]!r} is not a finite number; correct it"
+                )
+            row.append(value)
+        return row
+
+    def _check_times(self, t_s: Floats, numbered: list[tuple[int, list[str]]]) -> None:
+        falls = np.flatnonzero(np.diff(t_s, prepend=self._last_s) <= 0)
+        if len(falls):
+            raise StudyError(f"{self.path}, line {numbered[falls[0]][0]}: t_s must increase, but does not here")
+        self._last_s = float(t_s[-1])
+
+
+LABELS: Final = (*PLACES[1:], *FORCES)
+_INSTALL: Final = "the Lab Streaming Layer needs pylsl: pip install 'liquid-study[lsl]'"
+_BUFFER_S: Final = 30
+_OPENS_S: Final = 0.5
+
+
+def available() -> bool:
+    """Return whether ``pylsl`` is installed."""
+    return importlib.util.find_spec("pylsl") is not None
+
+
+class LslForce:
+    """The first stream with the labels `LABELS`, and VELOCITIES where they are known.
+
+    Parameters
+    ----------
+    name : str
+        Of the stream; "" takes any.
+    executor : Executor, optional
+        Connects to streams, which may not answer for a second; by default `poll` does so itself.
+
+    Raises
+    ------
+    StudyError
+        ``pylsl`` or its library is not installed.
+    """
+
+    def __init__(self, name: str = "", executor: Executor | None = None) -> None:
+        try:
+            self._lsl: Any = importlib.import_module("pylsl")
+        except (ImportError, RuntimeError, OSError) as error:  # without its library it raises RuntimeError
+            raise StudyError(_INSTALL) from error
+        self._resolver = self._lsl.ContinuousResolver(*(("name", name) if name else ()))
+        self._executor = executor
+        self._connecting: Future[tuple[Any, list[str]] | None] | None = None
+        self._refused: set[str] = set()
+        self._inlet: Any = None
+        self._places: list[int] = []
+        self._has_velocities = False
+        self._last_s = -math.inf
+        self._centred = CentredVelocity()
+
+    @property
+    def connected(self) -> bool:
+        """Whether a stream was found."""
+        return self._inlet is not None
+
+    def poll(self) -> Rows:
+        """Return the rows received since the last call; none before a stream was found."""
+        if self._inlet is None and not self._connected_now():
+            return no_rows()
+        try:
+            samples, stamps = self._inlet.pull_chunk(timeout=0.0, max_samples=4096)
+        except RuntimeError as error:  # the base of what pylsl raises
+            raise StudyError("the LSL stream of measured force ended: start it again, then choose it again") from error
+        if not stamps:
+            return no_rows()
+        t_s = np.asarray(stamps, float)
+        rows = np.asarray(samples, float)[:, self._places]
+        newer = np.concatenate([[self._last_s], np.maximum.accumulate(t_s)])
+        kept = (t_s > newer[:-1]) & np.isfinite(rows).all(axis=1)
+        t_s, rows = t_s[kept], rows[kept]
+        if len(t_s) == 0:
+            return no_rows()
+        self._last_s = float(t_s[-1])
+        if self._has_velocities:
+            return Rows(t_s, rows[:, :3], rows[:, 6:], rows[:, 3:6], np.ones(len(rows), bool))
+        return self._centred.take(t_s, rows[:, :3], rows[:, 3:6])
+
+    def close(self) -> None:
+        """End the inlet."""
+        inlet, self._inlet = self._inlet, None
+        if inlet is not None:
+            inlet.close_stream()
+
+    def _connected_now(self) -> bool:
+        """Use a stream that was opened meanwhile, or search for one; return whether there is one."""
+        if self._executor is None:
+            found = self._connect()
+        elif self._connecting is None:
+            self._connecting = self._executor.submit(self._connect)
+            return False
+        elif not self._connecting.done():
+            return False
+        else:
+            connecting, self._connecting = self._connecting, None
+            found = connecting.result()
+        if found is None:
+            return False
+        inlet, labels = found
+        self._has_velocities = set(VELOCITIES) <= set(labels)
+        self._places = [labels.index(it) for it in (*LABELS, *(VELOCITIES if self._has_velocities else ()))]
+        self._inlet = inlet
+        return True
+
+    def _connect(self) -> tuple[Any, list[str]] | None:
+        """Open the first stream with the labels; return its inlet and labels, None where there is none."""
+        for found in self._resolver.results():
+            if found.uid() in self._refused:
+                continue
+            inlet = self._lsl.StreamInlet(found, max_buflen=_BUFFER_S, recover=False)
+            try:
+                labels = _labels(inlet.info(timeout=_OPENS_S))
+                if not set(LABELS) <= set(labels):
+                    self._refused.add(found.uid())
+                    continue
+                inlet.open_stream(timeout=_OPENS_S)
+            except (RuntimeError, TimeoutError):  # it ended, or does not answer now
+                continue
+            return inlet, labels
+        return None
+
+
+def _labels(info: Any) -> list[str]:
+    """Return the labels of a stream's channels."""
+    labels, channel = [], info.desc().child("channels").child("channel")
+    while not channel.empty():
+        labels.append(channel.child_value("label"))
+        channel = channel.next_sibling("channel")
+    return labels
+
+
+NOISE_N: Final = 0.03
+"""Standard deviation of the simulated sensor along each axis."""
+_SEED: Final = 1
+
+
+def as_measured(scene: Scene) -> Scene:
+    """Return the scene for velocities of telemetry."""
+    return resolve(scene).model_copy(update={"knee": Knee(law="none")})
+
+
+class DeviceForce:
+    """The force that the device sent; usable where no limiter changed it.
+
+    ``began`` tells after `take` that the servo began a new scene, so that the last wake is lost.
+    """
+
+    def __init__(self) -> None:
+        self._serial: int | None = None
+        self.began = False
+
+    def take(self, samples: Any, scene: Scene) -> Rows:
+        """Return rows of the servo's next samples (recarray of ``SAMPLE``) in a scene."""
+        samples = _accepted(samples)
+        self.began = False
+        if len(samples) == 0:
+            return no_rows()
+        changes = np.flatnonzero(
+            np.diff(samples.scene, prepend=samples.scene[0] if self._serial is None else self._serial)
+        )
+        self._serial = int(samples.scene[-1])
+        for first in changes[::-1]:
+            if samples.limiters[first] & LIMITER_FADE:
+                self.began, samples = True, samples[first:]
+                break
+        usable = (samples.limiters & ~LIMITER_ESTIMATOR == 0) & (samples.status == STATUS_OK)
+        return _rows(samples, scene, np.array(samples.device_force_n, np.float64), usable)
+
+
+class OtherLiquidForce:
+    """The force of another liquid on the same motion, with sensor noise: known values for trials of the estimation.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of that liquid.
+    noise_n : float
+        Standard deviation along each axis [N].
+    """
+
+    def __init__(self, scene: Scene, noise_n: float = NOISE_N) -> None:
+        self._model = ModelAlong(as_measured(scene), given=True)
+        self._scene, self._noise_n = scene, noise_n
+        self._noise = np.random.default_rng(_SEED)
+
+    def take(self, samples: Any) -> Rows:
+        """Return rows of the servo's next samples (recarray of ``SAMPLE``)."""
+        samples = _accepted(samples)
+        if len(samples) == 0:
+            return no_rows()
+        rows = _rows(samples, self._scene, np.zeros((len(samples), 3)), np.ones(len(samples), bool))
+        force_n = self._model.follow(rows.t_s, rows.position_m, rows.velocity_mps).force_n
+        rows.force_n[:] = force_n + self._noise_n * self._noise.standard_normal(force_n.shape)
+        return rows
+
+
+def _accepted(samples: Any) -> Any:
+    """Return the samples in which the model moved."""
+    return samples[(samples.fresh != 0) & (samples.limiters & LIMITER_GLITCH == 0) & (samples.status == STATUS_OK)]
+
+
+def _rows(samples: Any, scene: Scene, force_n: Floats, usable: Any) -> Rows:
+    return Rows(
+        samples.time_ns * 1e-9,
+        np.array(samples.position_m) * scene.scale + np.asarray(scene.origin_m),
+        np.array(samples.velocity_mps, np.float64),
+        force_n,
+        np.asarray(usable, bool),
+    )
