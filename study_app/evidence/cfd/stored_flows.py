@@ -196,5 +196,6 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
         )
         source = f"fluid solver: {notes.get('command', 'unknown command')}"
         title = notes.get("title", "a solved flow")
-        found.append(Truth(title, source, (case,), computing_s, notes.get("machine", ""), without.get(table.case.name)))
+        constants = without.get(table.case.name) if without else None
+        found.append(Truth(title, source, (case,), computing_s, notes.get("machine", ""), constants))
     return tuple(found)
