@@ -54,10 +54,18 @@ class Bench:
         Tried in place of the table's.
     scene : Scene, optional
         Presented in place of the case's.
+    dynamics : Dynamics, optional
+        Stated by the device in place of the case's.
     """
 
     def __init__(
-        self, case: Case, *, safe: bool = True, limits: DampingLimits | None = None, scene: Scene | None = None
+        self,
+        case: Case,
+        *,
+        safe: bool = True,
+        limits: DampingLimits | None = None,
+        scene: Scene | None = None,
+        dynamics: Dynamics | None = None,
     ) -> None:
         self.safety = new_safety(FORCE_LIMIT_N, case.believed_delay)
         self.safety[0].fade, self.safety[0].fade_s = 1.0, 0.0
@@ -97,7 +105,7 @@ class Bench:
             quantum_m=case.quantum_um * 1e-6,
             **device,
         )
-        self.model: Model = pack(scene or scene_of(case), limits=limits, dynamics=dynamics_of(case))
+        self.model: Model = pack(scene or scene_of(case), limits=limits, dynamics=dynamics or dynamics_of(case))
         self.pace = new_schedule(1.0 / case.rate_hz, jitter_s=case.jitter / case.rate_hz, missed=case.missed)
         self.sample = records(SAMPLE, 1)
 

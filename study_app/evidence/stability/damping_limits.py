@@ -11,7 +11,7 @@ import numpy as np
 from study_app.evidence.stability.bench import Bench
 from study_app.evidence.stability.closed_loop import TRACE
 from study_app.evidence.stability.stability_cases import STROKE, THROWN, Case
-from study_app.haptics.model.device_dynamics import MOST_DELAY
+from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.layout import records
@@ -178,7 +178,9 @@ def _comes_to_rest(
         drag=Drag(law="schiller-naumann"),
     )
     scene = Scene(scale=1.0, rate_hz=1.0 / period_s, liquids=(stokes,), velocity=velocity, knee=Knee(law="none"))
-    bench = Bench(case, safe=False, limits=DampingLimits(damping_nspm, damping_nspm), scene=scene)
+    limits = DampingLimits(damping_nspm, damping_nspm)
+    dynamics = Dynamics(delay_s=delays[1] * period_s, count_m=COUNT_M, mass_kg=mass_kg)
+    bench = Bench(case, safe=False, limits=limits, scene=scene, dynamics=dynamics)
     bench.loop.moving_s, bench.handle.motor_step_n = math.inf, 0.0
     bench.handle.quantum_m = COUNT_M if counts else 0.0
     bench.begin()
