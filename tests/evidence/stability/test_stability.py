@@ -152,7 +152,7 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
 
 @compiled
 def test_the_table_of_limits_is_written_as_it_ships(monkeypatch, tmp_path):
-    monkeypatch.setattr(stability, "measure_limits", lambda **_: iter(table()))
+    monkeypatch.setattr(stability, "measure_limits", lambda **_: (it for it in table() if it.estimator != "line"))
     ran = command("--table", str(tmp_path / "limits.csv"))
     assert ran.exception is None
     whole = (resources.files("study_app.haptics.model") / "slope_limits.csv").read_bytes()
