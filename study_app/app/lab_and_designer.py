@@ -133,7 +133,7 @@ def load_modules() -> None:
     import study_app.app.designer.controller  # noqa: PLC0415
     import study_app.app.lab.controller  # noqa: PLC0415
     import study_app.lab.live  # noqa: F401, PLC0415
-    from study_app.gui.participant.tank.caustics import brightness  # noqa: PLC0415
+    from study_app.gui.participant.tank.glass import brightness  # noqa: PLC0415
     from study_app.protocol.source.json_schema import schema  # noqa: PLC0415
 
     brightness()

@@ -3,7 +3,7 @@
 Every element of the wake is stored as it was, with its segment and the time; every wake sums all elements again, each
 decayed by its age, with compensation of rounding errors (Neumaier 1974, ZAMM 54:39). Unsteady drag is written from the
 law's equations, with exact exponentials for every step, and with the acceleration and the constants given. The steady
-force of non-Newtonian drag is that of ``haptics.model.laws.rheology``; its states are integrated in many steps per
+force of non-Newtonian drag is that of ``haptics.model.laws``; its states are integrated in many steps per
 tick. Nothing shares code or constants with ``haptics.kernels.effects``.
 """
 
@@ -14,9 +14,10 @@ import numpy as np
 
 from study_app.haptics.kernels.compiled import kernel, workings
 from study_app.haptics.kernels.vector import copy, distance, norm
+from study_app.haptics.model import laws
 from study_app.haptics.model.effects.non_newtonian import STIFFNESS_NPM
 from study_app.haptics.model.effects.wake import Wake
-from study_app.haptics.model.laws import Maxwell, rheology
+from study_app.haptics.model.laws import Maxwell
 from study_app.haptics.model.layout import records
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Ewma, Knee, Scene
@@ -396,10 +397,10 @@ def non_newtonian_n(scene: Scene, w_mps: Floats, interval_s: Floats, *, slack_m:
         held, speeds_mps = np.zeros_like(w_mps), np.linalg.norm(met_mps, axis=1)
     else:
         met_mps, held = w_mps, np.zeros_like(w_mps)
-        if (yield_n := rheology.yield_n(law, diameter_m)) > 0:
+        if (yield_n := laws.yield_n(law, diameter_m)) > 0:
             per_m = STIFFNESS_NPM / scene.scale / yield_n
             held = _strains(w_mps, interval_s, per_m, slack_m)
-    parts_n = [rheology.even_n(law, liquid.density_kg_m3, diameter_m, float(speed)) for speed in speeds_mps]
+    parts_n = [laws.even_n(law, liquid.density_kg_m3, diameter_m, float(speed)) for speed in speeds_mps]
     held_n, viscous_n = np.array(parts_n).T
     directions = met_mps / np.maximum(speeds_mps, math.ulp(0.0))[:, np.newaxis]
     force_n: Floats = -(held_n[:, np.newaxis] * held + viscous_n[:, np.newaxis] * directions)

@@ -1,7 +1,7 @@
 """What the home window says of protocols and sessions, as values. No Qt here."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
@@ -13,8 +13,11 @@ from study_app.authoring.drafts import draft_files, draft_of, unsaved_files
 from study_app.authoring.kept_settings import kept_original
 from study_app.errors import ProtocolError, StudyError
 from study_app.number_text import counted
+from study_app.protocol.describe import spread
 from study_app.protocol.load import at_hand, is_scene_file, load, parse
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.durations import expected_duration_s, variants
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.protocol.source.files import find, shipped, shipped_file
 from study_app.protocol.wording.languages import language_name
@@ -26,10 +29,48 @@ from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.workstation import recent_protocols
-from study_app.viewmodels.extent import counted_each, extent_of
+from study_app.viewmodels.number_words import duration_range
 from study_app.viewmodels.session import operator_language, step_title
 from study_app.viewmodels.sessions import SessionFacts, started_words
 from study_app.workspace import workspace
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """Parts, settings, answers and expected duration [s] of each kind of session of a study.
+
+    ``setting`` is the word for what a trial presents: a "setting", or a "trial" where blocks have designs.
+    """
+
+    parts: tuple[int, ...]
+    settings: tuple[int, ...]
+    setting: str
+    answers: tuple[int, ...]
+    expected_s: tuple[float, ...]
+
+    @property
+    def duration(self) -> str:
+        """The expected duration, from that of the shortest kind of session to that of the longest."""
+        return duration_range(min(self.expected_s), max(self.expected_s))
+
+
+def extent_of(protocol: Protocol) -> Extent:
+    """Return how much the sessions of a study ask; of one session where its own protocol is given."""
+    sessions = [one.protocol for one in variants(protocol)]
+    orders = [orders_of(one) for one in sessions]
+    return Extent(
+        parts=tuple(one.parts for one in sessions),
+        settings=tuple(sum(block.trials for block in one.blocks if block.phase == "main") for one in orders),
+        setting="setting" if all(block.design is None for block in protocol.blocks.values()) else "trial",
+        answers=tuple(one.answers for one in orders),
+        expected_s=tuple(expected_duration_s(one) for one in sessions),
+    )
+
+
+def counted_each(numbers: Sequence[int], word: str) -> str:
+    """Return "1 part", "2 parts", or "1 to 2 parts" where sessions differ."""
+    return f"{spread(numbers)} {word}" if set(numbers) == {1} else f"{spread(numbers)} {word}s"
+
 
 SHIPPED: Final = "Shipped study"
 

@@ -22,7 +22,7 @@ from study_app.session.preflight import Check, Facts, checks
 from study_app.session.resume import resume_at
 from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of
-from study_app.viewmodels.extent import extent_of
+from study_app.viewmodels.home import extent_of
 from study_app.viewmodels.session import operator_language, step_title
 
 WAITING = "measuring …"

@@ -5,10 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from study_app.app.session.bridge import SessionBridge
-from study_app.app.session.operator import Parts
+from study_app.app.session.operator import Parts, WatchedJournal
 from study_app.errors import StoreError
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream

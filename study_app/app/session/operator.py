@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Qt, Signal
@@ -13,13 +13,15 @@ from study_app.app.failures import guarded_session_slot
 from study_app.errors import StudyError
 from study_app.gui.operator.header import Strip
 from study_app.gui.operator.plots import ForceCard
-from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import Page
+from study_app.session.ports import JournalPort
 from study_app.session.resume import FIRST, Start
 from study_app.session.runner import Runner
 from study_app.session.transitions.events import EndAsked, ForceStopped, Note, PauseAsked, RepeatAsked, ResumeAsked
+from study_app.store.journals.journal_events import Event, SessionEnded
+from study_app.store.progress import Progress
 from study_app.video.sources import Videos
 from study_app.viewmodels.operator import OperatorView, Session, operator_view
 from study_app.viewmodels.servo_health import Forces, ServoHealth
@@ -29,6 +31,41 @@ if TYPE_CHECKING:
     from study_app.outlets.session_outlets import Outlets
     from study_app.session.simulated.observers import Hand
     from study_app.store.recorder import Recorder
+
+
+class WatchedJournal:
+    """Passes everything on to the store, and folds what it has kept into ``progress``."""
+
+    def __init__(self, store: JournalPort, progress: Progress, clock: Callable[[], float]) -> None:
+        self.progress = progress
+        self._store = store
+        self._clock = clock
+
+    def append(self, event: Event, *, t_s: float | None = None, waits: bool = True) -> None:
+        """Put an event into the journal (StoreError: nothing has changed)."""
+        self._store.append(event, t_s=t_s, waits=waits)
+        self.progress.take(replace(event, t_s=self._clock() if t_s is None else t_s))
+
+    @property
+    def fingerprint(self) -> str:
+        """The session's fingerprint; empty until it has ended."""
+        return self._store.fingerprint
+
+    def check_flushed(self) -> None:
+        """Raise StoreError if lines that were not waited for could not be flushed."""
+        self._store.check_flushed()
+
+    def write_tables(self) -> None:
+        """Bring the tables up to date."""
+        self._store.write_tables()
+
+    def finish(self, status: str, reason: str = "") -> None:
+        """Close the session (StoreError: the last table or line could not be written; it counts as ended here)."""
+        try:
+            self._store.finish(status, reason)
+        finally:
+            proof = {"fingerprint": self._store.fingerprint}
+            self.progress.take(SessionEnded(status=status, reason=reason, t_s=self._clock(), others=proof))
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,14 +6,13 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from study_app.app.session.bridge import SessionBridge
-from study_app.app.session.operator import Parts
+from study_app.app.session.operator import Parts, WatchedJournal
 from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
 from study_app.errors import DisplayError
 from study_app.gui.display.screens import has_card, place
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.header import Strip
-from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of

@@ -38,12 +38,12 @@ from study_app.session.start import resumed
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.viewmodels.designer.keys import key_cap, with_key
 from study_app.viewmodels.devices import DeviceShown, looking
-from study_app.viewmodels.extent import extent_of
 from study_app.viewmodels.home import (
     SHIPPED,
     DraftFacts,
     Interrupted,
     StudyFacts,
+    extent_of,
     file_states,
     held,
     holds_liquids_alone,

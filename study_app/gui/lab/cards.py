@@ -14,11 +14,10 @@ from study_app.gui.lab.parameters import HIDDEN
 from study_app.gui.theme.theme import LIGHT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
+from study_app.gui.widgets.cards import Bar, Card, Icon, MaskedPanel, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_ink
 from study_app.gui.widgets.live_plots import Plot, draw_quickly, number
-from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import RATES_PER_S, SPEEDS_MPS, SteadyCurves, has_flow_curve, steady_curves
 from study_app.lab.live import LimiterCount

@@ -14,10 +14,9 @@ from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.boxes import add_layout, vbox
-from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.cards import Card, MaskedPanel
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, number, pen
-from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.viewmodels.lab import SPAN_S, Floats, LabView
 
 POINTS = 240  # of a curve: one for one to two pixels; painting takes as long as there are points

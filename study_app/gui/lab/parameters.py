@@ -7,10 +7,9 @@ from study_app.gui.lab.header import Badge
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Card, Icon, Rule, scrolled
+from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
 from study_app.gui.widgets.labels import Clamped, label
-from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.gui.widgets.number_field import NumberField, read_number, write_number
 from study_app.gui.widgets.sliders import Range, Slider
 from study_app.haptics.model.effect import Parameter, Value

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
-from study_app.gui.widgets.cards import Card, Chip, Icon
+from study_app.gui.widgets.cards import Card, Chip, Icon, MaskedPanel
 from study_app.gui.widgets.labels import Elided, Ink, figures, label
 from study_app.gui.widgets.live_plots import (
     LINE_PX,
@@ -25,7 +25,6 @@ from study_app.gui.widgets.live_plots import (
     step_for,
     time_ticks,
 )
-from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.viewmodels.operator import OperatorView
 from study_app.viewmodels.servo_health import TRACE_WINDOW_S, Forces, ServoHealth, Tile, Verdict
 
