@@ -133,6 +133,11 @@ def stylesheet(theme: Theme) -> str:
                 for role in ("text2", "text3", "ok", "warn", "bad", "accent")
             ),
             f"QWidget#earlier QLabel:disabled {{ color: {t.text3}; }}",
+            "QListWidget { background: transparent; border: none; outline: none; }",
+            f"QFrame[role='entry'] {{ border: 1px solid {t.ctl}; border-radius: {RADIUS_CONTROL}px; }}",
+            f"QFrame[role='entry'][state='refused'] {{ border: 2px solid {t.bad}; }}",
+            f"QListWidget::item {{ border-radius: {RADIUS_CONTROL}px; }}",
+            f"QListWidget::item:selected {{ background: {t.selected}; }}",
             _buttons(t),
             _fields(t),
             _scrollbars(t),

@@ -11,7 +11,6 @@ from shiboken6 import isValid
 
 from study_app.authoring.kept_settings import begin_settings
 from study_app.protocol.source.files import shipped
-from study_app.viewmodels.designer.requests import SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -57,24 +56,6 @@ def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_type
     qtbot.mouseClick(next(one for one in designer.place.form.adds.values() if one.isVisible()), LEFT)
     assert designer.value("liquids", "honey", "density_kg_m3") == 1402
     assert "thick" not in designer.value("liquids")
-
-
-def test_a_difference_that_is_reverted_outlives_the_click(qtbot: Any, designer: Any) -> None:
-    """Qt still handles the click on its button; content that a scroll area drops is deleted at once."""
-    designer.open()
-    designer.editing.ask(SetValue(("blocks", "liquids", "repetitions"), 3))
-    designer.place.show_tab("changes")
-    shown = designer.controller.changes.card.list
-    qtbot.waitUntil(lambda: bool(shown.lines))
-    gone: list[bool] = []
-    after: list[int] = []
-    button = shown.lines[0].revert
-    button.destroyed.connect(lambda: gone.append(True))
-    shown.revert_asked.connect(lambda _row: after.append(len(gone)))
-    qtbot.mouseClick(button, LEFT)
-    assert shown.lines == []
-    assert after == [0]
-    qtbot.waitUntil(lambda: gone == [True])
 
 
 @pytest.mark.parametrize("way", ["Enter", "double click"])

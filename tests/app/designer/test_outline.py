@@ -3,8 +3,8 @@
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QGuiApplication, QMouseEvent
+from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt
+from PySide6.QtGui import QDropEvent, QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.designer.outline.rows import ROW_ROLE
@@ -117,11 +117,10 @@ def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: An
 
     designer.go_to(*path[:2])
     first, second, third = listed()
-    row = designer.field(*path).rows[0]
-    qtbot.mousePress(row, LEFT, pos=QPoint(10, 16))
-    event_move(row, QPoint(10, 40))
-    event_move(row, QPoint(10, 70))
-    qtbot.mouseRelease(row, LEFT, pos=QPoint(10, 70))
+    field = designer.field(*path)
+    field.choose((0,))
+    at = QPointF(field.rows[1].geometry().bottomLeft())
+    field.list.dropEvent(QDropEvent(at, Qt.DropAction.MoveAction, QMimeData(), LEFT, Qt.KeyboardModifier.NoModifier))
     assert listed() == (second, first, third)
     QApplication.processEvents()
     row = designer.field(*path).rows[1]
@@ -132,6 +131,7 @@ def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: An
     row.setFocus()
     qtbot.keyClick(row, Qt.Key.Key_Up, Qt.KeyboardModifier.AltModifier)
     assert listed() == (second, first, third)
+    designer.field(*path).choose((0,))
     row = designer.field(*path).rows[0]
     row.setFocus()
     qtbot.keyClick(row, Qt.Key.Key_C, CONTROL)

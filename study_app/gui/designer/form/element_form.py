@@ -7,8 +7,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.designer.form.caret import Caret
-from study_app.gui.designer.form.entry_list import EntryList
-from study_app.gui.designer.form.entry_row import EntryRow
+from study_app.gui.designer.form.entries import EntryList
 from study_app.gui.designer.form.form_foot import FormFoot
 from study_app.gui.designer.form.form_head import LABEL_PX, FormHead
 from study_app.gui.designer.form.languages_field import LanguagesField, stacked
@@ -271,13 +270,13 @@ class FormCard(Card):
             made.field.changes.connect(lambda asked, after: self._change_entries(made.row.row.path, asked, after))
             if self._chosen is not None and self._chosen[0] == row.row.path:
                 made.field.choose(self._chosen[1])
+            if self.read_only:
+                made.field.freeze()
         made.field.came.connect(lambda: self._come(made))
         made.field.setEnabled(not self.read_only or row.row.kind in {"list", "tables", "references", "reference"})
         for part in (made.remove, made.keys):
             if part is not None:
                 part.setEnabled(not self.read_only)
-        for entry in made.field.findChildren(EntryRow):
-            entry.grip = entry.grip and not self.read_only
         self._made.append(made)
         return made
 

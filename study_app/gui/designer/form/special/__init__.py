@@ -4,9 +4,10 @@ import sys
 from typing import Final
 
 from study_app.discovery import modules_of
+from study_app.gui.designer.form import entries
 from study_app.gui.designer.form.special_editor import SpecialEditor
 
 EDITORS: Final[dict[tuple[str, str], SpecialEditor]] = {
-    key: module.EDITOR for module in modules_of(sys.modules[__name__]) for key in module.EDITOR.keys
+    key: module.EDITOR for module in (entries, *modules_of(sys.modules[__name__])) for key in module.EDITOR.keys
 }
 """The special editor of each (model, key) that has one."""
