@@ -1,14 +1,15 @@
 """The form: one element at a time, its rows in sections, with help for the focused field at its foot."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, QRectF, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QLineEdit, QPlainTextEdit, QVBoxLayout, QWidget
 
-from study_app.gui.designer.form.caret import Caret
 from study_app.gui.designer.form.entries import EntryList
-from study_app.gui.designer.form.form_foot import FormFoot
 from study_app.gui.designer.form.form_head import LABEL_PX, FormHead
 from study_app.gui.designer.form.languages_field import LanguagesField, stacked
 from study_app.gui.designer.form.question_rows import Panel, QuestionRow, QuestionRows
@@ -16,13 +17,13 @@ from study_app.gui.designer.form.row_fields import add_button
 from study_app.gui.designer.form.row_widget import RowWidget, is_wide, language_heads, structure_of
 from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.gui.designer.repair_button import RepairButton
-from study_app.gui.theme.themed import apply_theme_within
+from study_app.gui.theme.theme import RADIUS_CONTROL
+from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Rule, scrolled
 from study_app.gui.widgets.controls import IconButton
-from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.form.form_changes import added_row, shape_of
-from study_app.viewmodels.designer.form.form_rows import Form, FormRow, Section
+from study_app.gui.widgets.labels import Elided, label
+from study_app.viewmodels.designer.form.form_rows import Form, FormRow, Section, added_row, shape_of
 from study_app.viewmodels.designer.problem_rows import ProblemRow
 from study_app.viewmodels.designer.requests import AddKey, LeaveText, RemoveKey, RenameElement
 from study_app.viewmodels.designer.special.questions import QuestionLine
@@ -32,6 +33,62 @@ ROW_PX = FIELD_PX + 7
 FOOT_FROM = 460
 """The height of the form from which it has a foot [px]."""
 SHOWN_OR_HIDDEN = Qt.WidgetAttribute.WA_WState_ExplicitShowHide
+WORDS_PX = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Caret:
+    """The name of an editor of text, and before which of its letters the next one is typed."""
+
+    editor: str
+    at: int
+
+    @classmethod
+    def of(cls, editor: QWidget | None) -> Caret | None:
+        """Return where the keyboard is; None where no text is edited."""
+        if isinstance(editor, QLineEdit):
+            return cls(editor.accessibleName(), editor.cursorPosition())
+        if isinstance(editor, QPlainTextEdit):
+            return cls(editor.accessibleName(), editor.textCursor().position())
+        return None
+
+    def put_into(self, row: QWidget) -> None:
+        """Give the keyboard to the editor of that name in a row; where there is none, nothing changes."""
+        for editor in row.findChildren(QWidget):
+            if isinstance(editor, QLineEdit | QPlainTextEdit) and editor.accessibleName() == self.editor:
+                editor.setFocus(Qt.FocusReason.OtherFocusReason)
+                if isinstance(editor, QLineEdit):
+                    editor.setCursorPosition(self.at)
+                else:
+                    cursor = editor.textCursor()
+                    cursor.setPosition(min(self.at, editor.document().characterCount() - 1))
+                    editor.setTextCursor(cursor)
+
+
+class FormFoot(Themed, QWidget):
+    """Label and place of a field, and its description."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.title = label("", "label")
+        self.place = Elided("small", "text2")
+        self.place.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.words = label("", "small", "text2", wraps=True)
+        self.words.setMinimumHeight(WORDS_PX)
+        self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
+        vbox(hbox(self.title, (self.place, 1)), self.words, spacing=3, margins=(12, 8, 12, 8), parent=self)
+
+    def show_help(self, title: str, place: str, words: str) -> None:
+        self.title.setText(title)
+        self.place.show_text(place)
+        self.words.setText(words)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(self.theme.sunk))
+        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
 
 
 class FormCard(Card):

@@ -17,8 +17,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Elided, figures
 from study_app.number_text import typed_numbers
-from study_app.viewmodels.designer.form.form_rows import FormRow
-from study_app.viewmodels.designer.form.form_words import new_words
+from study_app.viewmodels.designer.form.form_rows import FormRow, new_words
 from study_app.viewmodels.designer.keys import tip, with_key
 from study_app.viewmodels.designer.requests import (
     AddElement,

@@ -9,8 +9,7 @@ from study_app.gui.designer.form.row_fields import Field
 from study_app.gui.designer.form.typed_fields import TypedLine, TypedText
 from study_app.gui.widgets.boxes import add_layout
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.designer.form.form_rows import FormRow
-from study_app.viewmodels.designer.form.form_words import is_right_to_left
+from study_app.viewmodels.designer.form.form_rows import FormRow, is_right_to_left
 from study_app.viewmodels.designer.requests import LeaveText, SetText
 
 

@@ -12,8 +12,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import number_of, typed_numbers
-from study_app.viewmodels.designer.form.form_rows import FormRow
-from study_app.viewmodels.designer.form.form_words import choice_words, new_words
+from study_app.viewmodels.designer.form.form_rows import FormRow, choice_words, new_words
 from study_app.viewmodels.designer.keys import with_key
 from study_app.viewmodels.designer.requests import AddNamed, RemoveKey, SetValue, SwitchKind
 

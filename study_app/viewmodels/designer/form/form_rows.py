@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from study_app.authoring.changes.initial_values import singular
 from study_app.authoring.changes.languages import is_copied
 from study_app.authoring.changes.series import number_rows
 from study_app.authoring.edited_study import Study
@@ -26,6 +27,8 @@ DEEPEST: Final = 3
 NO_QUESTIONS: Final = QuestionLines((), ())
 UNREADABLE: Final = "Correct the text in the tab File"
 LEAST, MOST = "at least ", "at most "
+BELOW: Final = 2
+"""Where the keys of an element begin in a path, after its section and its id."""
 
 WITH_LIQUIDS = ("liquids", "conditions", "blocks")
 """Sections whose elements the lab opens."""
@@ -376,3 +379,40 @@ def _fits(row: Row, value: Any) -> bool:
 def _sentence(message: str, hint: str) -> str:
     sentence = f"{message[:1].upper()}{message[1:]}"
     return f"{sentence} ({hint})" if hint else sentence
+
+
+def shape_of(form: Form) -> object:
+    """Return what makes other editors necessary, beside the rows: other questions, sections, keys to add."""
+    others = [line for line in form.questions.lines if line.path != form.path]
+    return (
+        others,
+        form.questions.languages,
+        [
+            (one.path[BELOW:], one.title, tuple(row.path[BELOW:] for row in one.absent), one.faults)
+            for one in form.sections
+        ],
+    )
+
+
+def added_row(form: Form, before: Form) -> Path | None:
+    """Return the path of the first row that the form did not have before; None where it had each."""
+    known = {row.row.path for row in before.rows}
+    return next((row.row.path for row in form.rows if row.row.path not in known), None)
+
+
+def is_right_to_left(code: str) -> bool:
+    """Return whether a language is written from right to left."""
+    return code in LANGUAGES and LANGUAGES[code].right_to_left
+
+
+def new_words(section: str) -> str:
+    """Return what the choice is called that adds an element to a section and names it."""
+    return f"New {label_of(singular(section)).lower()} …"
+
+
+def choice_words(choice: Choice, default: object) -> str:
+    """Return what a choice is called: its value in words, marked where it counts without being written."""
+    if choice.value is None:
+        return "Not set"
+    words = label_of(str(choice.value)) if not str(choice.value).isdigit() else str(choice.value)
+    return f"{words} (default)" if choice.value == default else words

@@ -7,7 +7,6 @@ from study_app.authoring.changes.languages import languages_of
 from study_app.authoring.edited_study import Study
 from study_app.authoring.fields import label_of
 from study_app.authoring.measures.balance import balance_of
-from study_app.authoring.measures.forces import forces
 from study_app.authoring.measures.participant_texts import copied_texts, own_texts, revealing, texts_by_language
 from study_app.authoring.measures.planned import Simulated
 from study_app.authoring.measures.valid_part import valid_part
@@ -15,6 +14,7 @@ from study_app.authoring.names import blocks_using
 from study_app.authoring.outline import title_of
 from study_app.authoring.study_facts import Facts
 from study_app.haptics.model.gate import calls_for
+from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
@@ -219,10 +219,10 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
     if not valid_part(study).forces:
         unknown = tuple(Line(_title(study, name, "liquids"), UNKNOWN, 0.0) for name in names)
         return LinesCard("Force of each liquid", "", unknown, (("neutral", "minus", NO_FORCES),))
-    limit_n, found = protocol.device.force_limit_n, forces(protocol)
+    limit_n = protocol.device.force_limit_n
     lines = []
     for name in names:
-        it = found[name]
+        it = steady(protocol.scene_of(name), HAND_MPS)
         verdict: Verdict = ("ok", "check", "not clipped")
         if it.limit is not None:  # in the colour of the limit
             verdict = ("warn" if it.limit == "norm" else "bad", "warning", f"clipped by the {LIMIT_NAMES[it.limit]}")

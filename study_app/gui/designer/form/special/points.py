@@ -11,7 +11,7 @@ from study_app.gui.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.gui.widgets.boxes import add_layout
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import figures, label
-from study_app.viewmodels.designer.form.form_rows import FormRow
+from study_app.viewmodels.designer.form.form_rows import FormRow, is_right_to_left
 from study_app.viewmodels.designer.requests import AddEntry, RemoveKey, Request, SetValue, Several
 
 
@@ -44,7 +44,7 @@ class PointsField(Field):
             line.setPlaceholderText(f"Missing in {language}")
             line.typed.connect(lambda text, code=code: self._take(at, code, text))
             line.came.connect(self.came)
-            if code == "ar":
+            if is_right_to_left(code):
                 line.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
             grid.addWidget(line, at + 1, column)
             lines.append(line)

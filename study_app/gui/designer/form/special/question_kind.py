@@ -9,8 +9,7 @@ from study_app.gui.designer.form.row_fields import ChoiceField
 from study_app.gui.designer.form.special.long_texts import QUESTIONS
 from study_app.gui.designer.form.special_editor import SpecialEditor
 from study_app.gui.designer.segments import Segments
-from study_app.viewmodels.designer.form.form_rows import FormRow
-from study_app.viewmodels.designer.form.form_words import choice_words
+from study_app.viewmodels.designer.form.form_rows import FormRow, choice_words
 from study_app.viewmodels.designer.special.questions import STATEMENT
 
 NARROWEST = 120
