@@ -177,5 +177,5 @@ def test_of_two_programs_that_do_not_see_each_others_lock_the_first_writes_no_li
         first.append(journal_events.Note(kind="note", text="of the first"))
     second.finish("completed")
     first.close()
-    assert [line.get("text") for line in second.lines][-2] == "of the second"
+    assert second.lines[-2].text == "of the second"
     assert verify(tmp_path / "study").errors == ()
