@@ -11,8 +11,8 @@ from study_app.analysis.data.motion import Performance, performance
 from study_app.analysis.data.questions import questions_found, scores_found
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
-from study_app.analysis.findings.block_tests import SEALED, Asked, asked, facts, untested
-from study_app.analysis.levels.summaries import levels_found
+from study_app.analysis.findings.finding import SEALED, Asked, asked, facts, untested
+from study_app.analysis.levels.evaluate import levels_found
 from study_app.analysis.levels.thresholds import site_thresholds
 from study_app.analysis.results import (
     BlockFound,

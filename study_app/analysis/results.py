@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias, TypeVar
 
-from study_app.analysis.data.blocks import Block, Decided, Item, Kind, Setting
+from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynamics, PublishedValue, Setting
 from study_app.analysis.data.motion import Performance
-from study_app.analysis.levels.results import LevelsFound, QuestionFound, ScoreFound
 from study_app.analysis.statistics.equivalence import UNSEEN, UNSEEN_EQUAL, Equivalence, fewest
 from study_app.analysis.statistics.outcome import Interval, Outcome
 from study_app.analysis.statistics.rank_tests import GroupsDiffer, Paired
@@ -174,6 +173,89 @@ class BlockFound:
         if self.kind != "delays" or not self.revealed:
             return ()
         return tuple(sorted({setting.delay_ms or 0.0 for setting in self.settings}))
+
+
+@dataclass(frozen=True, slots=True)
+class GroupAnswers:
+    """The numbers of the answers about one setting, or of all where ``code`` is None."""
+
+    code: str | None
+    name: str
+    numbers: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class QuestionFound:
+    """A question asked after the trials of a block, or in a form: ``where`` is its id, ``title`` what people read.
+
+    ``measure`` and ``figure`` are the ids of what computes and draws its numbers.
+    """
+
+    where: str
+    title: str
+    is_form: bool
+    item: str
+    text: str
+    short: str
+    kind: str
+    measure: str
+    figure: str | None
+    groups: tuple[GroupAnswers, ...]
+
+    @property
+    def n(self) -> int:
+        """How many answers there are."""
+        return sum(int(group.numbers["n"]) for group in self.groups)
+
+
+@dataclass(frozen=True, slots=True)
+class ScoreFound:
+    """A score of a questionnaire: number, mean, standard deviation and range over its answers, by setting."""
+
+    where: str
+    title: str
+    name: str
+    instrument: str | None
+    source: str | None
+    groups: tuple[GroupAnswers, ...]
+
+
+Summary: TypeAlias = Literal["share", "mean", "geometric mean", "settings"]
+
+
+@dataclass(frozen=True, slots=True)
+class LevelsFound:
+    """A block of levels.
+
+    ``summary`` says how the answers at a level are summarised, ``counts`` what a share is of ("correct"); ``vary`` is
+    the varied number, ``quantity`` its name in words, ``unit`` its unit, ``level_kind`` what a level is (weber,
+    difference, value), all None where conditions are compared; ``guess_rate`` is the share at chance, ``bounds`` are
+    the ends of a scale; ``own_units``: each participant chose the unit of the numbers named, which group intervals
+    leave out; ``statistics`` are the rows of each statistic in `analysis.levels` by its key; ``family`` is the
+    psychometric function of the thresholds; ``adaptive``: answers chose the levels; ``device`` are the device's own
+    dynamics, None where they were not measured. Without the key only ``times`` are known.
+    """
+
+    block: str
+    title: str
+    design: str
+    revealed: bool
+    times: tuple[GroupAnswers, ...]
+    summary: Summary
+    counts: str
+    vary: str | None = None
+    quantity: str | None = None
+    unit: str | None = None
+    level_kind: str | None = None
+    spacing: str = "linear"
+    guess_rate: float | None = None
+    bounds: tuple[float, float] | None = None
+    own_units: bool = False
+    statistics: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+    family: str | None = None
+    adaptive: bool = False
+    published: tuple[PublishedValue, ...] = ()
+    device: OwnDynamics | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from study_app.analysis.evaluate import evaluate
 from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.findings import all_findings
 from study_app.analysis.report import number_files, sentences
-from study_app.analysis.report.number_files import plain, r_script
+from study_app.analysis.report.number_files import plain
 from study_app.analysis.report.sections import answers, block, first_page
 from study_app.analysis.report.sentences import methods
 from study_app.analysis.results import Failures, Results
@@ -75,7 +75,5 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
         texts.append(picture.caption)
     for text in texts:
         assert (wrong := FORBIDDEN.search(text)) is None, text[max(0, wrong.start() - 80) : wrong.end() + 40]
-    script = r_script(made, results)
-    assert all(script.count(left) == script.count(right) for left, right in ("()", "{}"))
     assert number_files.tests_csv(results)
     return results

@@ -13,8 +13,8 @@ from study_app.analysis import results
 from study_app.analysis.data.blocks import Block, Decided, Item, Setting
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.block_tests import MANY, judged, of_tables
 from study_app.analysis.findings.delays import ContrastsWithControl, equivalent_up_to
+from study_app.analysis.findings.finding import MANY, judged, of_tables
 from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of

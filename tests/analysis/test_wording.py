@@ -12,7 +12,6 @@ from study_app.analysis.export.table_files import codebook_bytes
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold
 from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
 from study_app.analysis.findings.statement_tests import DelayTrend, SessionsDiffer, SettingsDiffer
-from study_app.analysis.report.number_files import r_script
 from study_app.analysis.report.sections import block
 from study_app.analysis.report.sentences import findings, methods
 from study_app.analysis.results import BlockFound, Results, all_of, said_of_presentations
@@ -82,17 +81,6 @@ def test_all_statements_are_told_as_a_reader_would() -> None:
     told = " ".join(findings(evaluate(made, planning=False)))
     assert "one test over both statements" in told
     assert "“Different” (higher for Liquid2, adjusted p" in told
-
-
-def test_the_script_compares_a_study_of_two_settings_and_counts() -> None:
-    two = liquids(2)
-    made = study(two, list(everybody(two, 10, moved)))
-    script = r_script(made, evaluate(made, planning=False))
-    assert script.count("\npair(") == 2
-    assert "numbers compared" in script
-    assert "if (compared == 0) quit(status = 1)" in script
-    empty = study(two, [])
-    assert "of 0 numbers compared" in r_script(empty, evaluate(empty, planning=False))
 
 
 FOUR_LEVELS = (0.0, 50.0, 100.0, 150.0)

@@ -133,13 +133,7 @@ def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
 
 
 def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
-    """Read the main blocks that ask something, in the order of the session.
-
-    Parameters
-    ----------
-    protocol : mapping
-        The protocol as a receipt holds it: without conditions, blocks with their codes.
-    """
+    """Read the main blocks that ask something, in the order of the session, from a protocol as a receipt holds it."""
     asked = [protocol["blocks"][step] for step in every_step_of(protocol) if step in protocol["blocks"]]
     return tuple(
         _block(protocol, block, spoken(protocol), key)

@@ -32,24 +32,11 @@ def aggregate(
     items: Sequence[str],
     excluded: Mapping[str, int] = MappingProxyType({}),
 ) -> pd.DataFrame:
-    """Summarise answers by setting and statement, in the order of ``codes`` and within it of ``items``.
+    """Summarise answers that count by setting and statement, in the order of ``codes`` and within it of ``items``.
 
-    Parameters
-    ----------
-    answers : DataFrame
-        One row per answer that counts: ``participant``, ``code``, ``item``, ``response`` (1 to 7 or missing) and
-        ``cannot_judge``.
-    presented : mapping of str to int
-        How often each setting was presented and its questionnaire due: what was neither answered nor judged
-        impossible is ``missing``.
-    excluded : mapping of str to int
-        How often each setting was presented in addition, in trials that are left out.
-
-    Returns
-    -------
-    DataFrame
-        ``COLUMNS``. ``n`` counts valid answers, ``participants`` the people who gave them; ``median``, ``q1``, ``q3``
-        and ``agree_percent`` (levels 5 to 7) are NaN without any.
+    ``answers`` have ``participant``, ``code``, ``item``, ``response`` (1 to 7 or missing) and ``cannot_judge``;
+    ``presented`` is how often each setting was presented and its questionnaire due, ``excluded`` how often besides, in
+    trials that are left out. Returns ``COLUMNS``: numbers of no answer are NaN.
     """
     groups = answers.groupby(["code", "item"], sort=False).indices
     filled = answers["response"].astype("Float64").to_numpy(na_value=np.nan)
@@ -106,17 +93,10 @@ def number_or_none(value: Any) -> float | None:
 def presentations(
     answers: pd.DataFrame, participants: Sequence[str], columns: Mapping[str, int], item: str
 ) -> tuple[Array, Array]:
-    """Return every single answer to a statement, and the session it was given in.
+    """Return every single answer to a statement (participants, settings, presentations), and its session alike.
 
-    Parameters
-    ----------
-    columns : mapping of str to int
-        The column of each code; codes of one column are presentations of one setting.
-
-    Returns
-    -------
-    (participants, settings, presentations) array, array of the same shape
-        In the order of sessions and trials, NaN where there is none.
+    ``columns`` maps codes to settings; codes of one column are presentations of one setting. In the order of sessions
+    and trials, NaN where there is none.
     """
     chosen = answers[(answers["item"] == item) & answers["response"].notna()]
     order = [name for name in ("session", "trial") if name in chosen]
@@ -145,11 +125,8 @@ def medians(values: Array) -> Array:
 
 
 def by_participant(answers: pd.DataFrame, participants: Sequence[str], columns: Mapping[str, int], item: str) -> Array:
-    """Return one value per participant and setting for a statement: the median over repeated presentations.
+    """Return one value per participant and setting (participants, settings) for a statement: see `presentations`.
 
-    Returns
-    -------
-    (participants, settings) array
-        NaN where a participant gave no valid answer. ``columns`` as in :func:`presentations`.
+    It is the median over repeated presentations, NaN where a participant gave no valid answer.
     """
     return medians(presentations(answers, participants, columns, item)[0])

@@ -70,15 +70,7 @@ def targets_of(task: Mapping[str, Any]) -> Targets:
 
 
 def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> tuple[Reach, ...]:
-    """Return the completed reaches of a trial.
-
-    Parameters
-    ----------
-    times_ns : (n,) array
-        From the task's first sample to its last.
-    positions_m : (n, 3) array
-        Places of the hand.
-    """
+    """Return the completed reaches of a trial from times (n,) and places of the hand (n, 3), first sample to last."""
     seconds = (times_ns - times_ns[0]) / 1e9 if len(times_ns) else np.zeros(0)
     found = []
     for number, (lit, entered, reached) in enumerate(_held(times_ns, positions_m, targets)):

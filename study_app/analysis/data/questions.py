@@ -10,8 +10,7 @@ import pandas as pd
 from study_app.analysis.data.blocks import AskedIn, AskedQuestion, AskedScore, setting_name
 from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.levels.results import GroupAnswers, QuestionFound, ScoreFound
-from study_app.analysis.results import number
+from study_app.analysis.results import GroupAnswers, QuestionFound, ScoreFound, number
 from study_app.protocol.questionnaires import instrument, instruments, score
 
 Numbers: TypeAlias = Mapping[str, Any]

@@ -41,13 +41,9 @@ Whole: TypeAlias = NDArray[np.int64]
 
 
 def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataFrame, Whole]:
-    """Read one table of many sessions; every column typed by the dictionary, ``n/a`` as missing.
+    """Read one table of many sessions, typed by the dictionary, ``n/a`` as missing; and how many rows each file has.
 
-    Returns
-    -------
-    DataFrame, (files,) array
-        The rows of all files in their order, and how many each holds. Columns that the version which wrote a file did
-        not have yet, or that are sealed, are missing.
+    Columns that the version which wrote a file did not have yet, or that are sealed, are missing.
     """
     values: dict[str, list[Any]] = {column.name: [] for column in columns}
     known: dict[str, dict[str, Any]] = {column.name: {} for column in columns}
@@ -290,14 +286,9 @@ def _place(lengths: Whole, index: int) -> tuple[int, int]:
 
 
 def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFrame:
-    """Return the table with ``excluded`` and ``exclusion_reason`` added.
+    """Return a table of sessions, or of trials, with ``excluded`` and ``exclusion_reason`` added.
 
-    Parameters
-    ----------
-    table : DataFrame
-        ``participant`` and ``session`` of every row; where the rows are of trials, ``trial`` too.
-    listed : sequence of Exclusion
-        What is left out: a session with all its trials, or one trial with all its attempts.
+    A session is left out with all its trials, a trial with all its attempts.
     """
     if not listed:
         return table.assign(excluded=False, exclusion_reason=pd.Series(pd.NA, index=table.index, dtype="string"))

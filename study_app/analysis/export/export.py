@@ -22,8 +22,8 @@ def export(
 ) -> tuple[Path, ...]:
     """Write the tables and the codebook of a study into the folder ``to``; return the files.
 
-    Tables: responses, trials, aggregate; of a study with levels also intervals and, once its key is open, tracks
-    and thresholds, the settings of levels that participants set, and the exponents of magnitude estimation.
+    Tables: responses, trials, aggregate; of a study with levels also intervals and, once its key is open, tracks and
+    those of the statistics in `analysis.levels`.
 
     Files that are not as they were recorded are used as they are: ``warn`` receives each, and the codebook names it.
 

@@ -207,7 +207,7 @@ def _json(content: Any) -> bytes:
 def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, bytes], missing: Sequence[str]) -> bytes:
     simulated = "**All participants are simulated.** " if study.simulated else ""
     blinded = "Settings are named." if study.revealed else "Settings are codes: the key is sealed."
-    script = f"; `Rscript analysis/{SCRIPT} data` computes its main numbers again" if SCRIPT in report else ""
+    script = f"; `Rscript analysis/{SCRIPT} data results` computes its main numbers again" if SCRIPT in report else ""
     lines = [
         f"# {study.title}",
         "",

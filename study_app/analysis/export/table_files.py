@@ -13,6 +13,7 @@ from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export import spss
 from study_app.analysis.export.tables import Cells, Delivered, QuestionCells, names_of_sealed
+from study_app.analysis.levels.statistic import statistics
 from study_app.store.blinded.unblinding import reveals_of
 from study_app.store.tables.columns import SEALED
 from study_app.store.tables.csv_files import COMPUTED, MISSING, Column, csv_bytes, header
@@ -21,9 +22,6 @@ CREDITS: Final = {"authors": "author", "license": "license", "citation": "citati
 """Keys of ``[study.credits]``, and the properties of schema.org that say the same."""
 
 Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
-OPENED: Final = ("tracks", "thresholds", "settings", "exponents")
-"""Tables of levels that SPSS files are made of."""
-
 NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
 
 
@@ -44,9 +42,10 @@ def table_files(
     if "parquet" in extras:
         files |= {file_name(study, table, "parquet"): parquet_bytes(table) for table in written}
     if "sav" in extras:
+        opened = {"tracks", *(one.table for one in statistics())}
         files[file_name(study, tables[0], "sav")] = spss.long_sav(study, tables[0])
         files[file_name(study, tables[-1], "sav")] = spss.wide_sav(study, tables[-1], cells)
-        files |= {file_name(study, one, "sav"): spss.plain_sav(study, one) for one in tables if one.name in OPENED}
+        files |= {file_name(study, one, "sav"): spss.plain_sav(study, one) for one in tables if one.name in opened}
     return files
 
 

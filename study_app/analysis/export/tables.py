@@ -5,9 +5,9 @@ Settings are codes until the key was opened, and the sealed columns are left out
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -16,19 +16,11 @@ from study_app.analysis.data.blocks import AskedQuestion, AskedScore, Block, Ite
 from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.data.questions import scored
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.levels.results import LevelsFound, SensitivityFound
-from study_app.analysis.levels.summaries import levels_found
-from study_app.analysis.levels.thresholds import OF_INTERVALS, tracks
-from study_app.store.tables.columns import (
-    INTERVALS,
-    LEVEL_TABLES,
-    OF_TRACKS,
-    PARTICIPANTS,
-    RESPONSES,
-    THRESHOLDS,
-    TRIALS_2,
-    tables_of,
-)
+from study_app.analysis.levels.evaluate import levels_found
+from study_app.analysis.levels.statistic import statistics
+from study_app.analysis.levels.tracks import OF_INTERVALS, tracks
+from study_app.store.tables.column_dictionary import table_markdown
+from study_app.store.tables.columns import INTERVALS, PARTICIPANTS, RESPONSES, TRIALS_2, tables_of
 from study_app.store.tables.csv_files import Column, Kind, header, optional, unsealed
 
 _STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
@@ -80,7 +72,57 @@ _LEVEL_COLUMNS: Final = {column.name: column for column in (*TRIALS_2, *INTERVAL
 _OF_PERSON: Final = tuple(_LEVEL_COLUMNS[name] for name in ("study", "participant", "simulated", "pilot", "group"))
 TYPES: Final[dict[Kind, str]] = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
 
+OF_TRACKS: Final[tuple[Column, ...]] = (
+    Column("analysed", "flag", "true where the row counts and does not present the modulus of a magnitude estimation."),
+    Column("track", "text", "What the code stands for: standard and number of the track (8/1), or the condition."),
+    Column("slot", "integer", "Position of the trial among those of its code in the session, from 1.", minimum=1),
+    _LEVEL_COLUMNS["catch"],
+    _LEVEL_COLUMNS["standard"],
+    replace(_LEVEL_COLUMNS["level"], name="level_asked"),
+    optional(
+        "level_delivered",
+        "number",
+        "The level at which the hand met the comparison: from the delivered values, and for a visual delay from the "
+        "mean errors of the frames; n/a where it was not measured.",
+    ),
+    optional(
+        "comparison",
+        "number",
+        "The comparison at this level, in the unit of the varied number; n/a where conditions are compared.",
+    ),
+    optional(
+        "arrangement",
+        "text",
+        "What the intervals presented, in order: S the standard, C the comparison; n/a if none was presented.",
+    ),
+    optional(
+        "comparison_interval",
+        "integer",
+        "The interval that alone presented the comparison, from 1; n/a where there is none.",
+        minimum=1,
+    ),
+    optional("response", "text", "The answer; n/a without one."),
+    optional("value", "number", "The answer as a number, where it is one."),
+    optional("right", "flag", "true if the answer was correct; n/a where no answer is."),
+    optional("response_s", "number", "Time from the question to the first choice of an answer.", "s", minimum=0),
+    optional(
+        "reversal", "flag", "true if the up–down track changed its direction here; n/a where the method has no steps."
+    ),
+    replace(_LEVEL_COLUMNS["setting"], description="The level that the participant set, from level_asked on."),
+)
+
 TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, *OF_TRACKS)
+
+
+def dictionary_markdown() -> str:
+    """Return the columns of the tables of levels as Markdown: a heading and a table for each."""
+    of_tracks = "one row per trial with a design, after unblinding; what it has in addition to the columns of trials"
+    sections = [("tracks", of_tracks, OF_TRACKS), *((one.table, one.row, one.columns) for one in statistics())]
+    return "\n".join(
+        table_markdown(name.capitalize(), f"study-…_description-{name}_data.csv", row, columns)
+        for name, row, columns in sections
+        if name
+    )
 
 
 def level_tables(study: Study) -> Iterator[Delivered]:
@@ -90,57 +132,19 @@ def level_tables(study: Study) -> Iterator[Delivered]:
     intervals = tables_of(study.protocol_format)["intervals"]
     intervals = intervals if study.revealed else unsealed(intervals)
     yield delivered("intervals", (*intervals, *JUDGED), study.intervals)
-    if study.revealed:
-        frame = tracks(study).rename(columns={"level": "level_asked"})
-        yield delivered("tracks", (*TRACKS, *_of_intervals(study)), frame)
-        found = levels_found(study, frame.rename(columns={"level_asked": "level"}))
-        groups = dict(zip(frame["participant"], frame["group"], strict=True))
-        rows: list[tuple[Any, dict[str, Any]]] = [
-            (row, _estimates(one, row))
-            for one in found
-            for row in one.sensitivities
-            if row.participant is not None and row.level is None
-        ]
-        yield _of_people(study, groups, "thresholds", rows)
-        if any(block.design.adjusts for block in study.levels):
-            rows = [(row, {"block": one.block}) for one in found for row in one.own_settings]
-            yield _of_people(study, groups, "settings", rows)
-        if any(block.design.reply == "number" for block in study.levels):
-            rows = [(row, {"block": one.block, "levels": row.n}) for one in found for row in one.own_power_exponents]
-            yield _of_people(study, groups, "exponents", rows)
-
-
-def _of_people(
-    study: Study, groups: Mapping[str, Any], name: str, found: Sequence[tuple[Any, Mapping[str, Any]]]
-) -> Delivered:
-    """Return a table of results, one a participant's: their attributes of the columns' names, and others."""
-    columns = (*_OF_PERSON, *LEVEL_TABLES[name][1])
+    if not study.revealed:
+        return
+    frame = tracks(study).rename(columns={"level": "level_asked"})
+    yield delivered("tracks", (*TRACKS, *_of_intervals(study)), frame)
+    found = levels_found(study, frame.rename(columns={"level_asked": "level"}))
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
-    rows = [
-        {column.name: getattr(row, column.name, None) for column in columns}
-        | {**about, "group": groups[row.participant], **others}
-        for row, others in found
-    ]
-    frame = pd.DataFrame(rows, columns=list(header(columns)))
-    return delivered(name, columns, frame.astype({column.name: TYPES[column.kind] for column in columns}))
-
-
-def _estimates(found: LevelsFound, one: SensitivityFound) -> dict[str, Any]:
-    """Return a participant's threshold at a standard, or none of a compared condition, and what else it has."""
-    exponents = {exponent.participant: exponent.exponent for exponent in found.exponents}
-    held: dict[str, Any] = {"low": None, "high": None}
-    for threshold in found.own_thresholds:
-        if (threshold.participant, threshold.standard, None) == (one.participant, one.standard, one.comparison):
-            known = {column.name: getattr(threshold, column.name, None) for column in THRESHOLDS}
-            held |= {name: value for name, value in known.items() if value is not None}
-            held |= {"flat_width_threshold": threshold.flat_width, "weber_exponent": exponents.get(one.participant)}
-    return held | {
-        "block": found.block,
-        "condition": one.comparison,
-        "d_prime_model": one.model,
-        "d_prime_other": one.other,
-        "share_first": next(iter(one.shares.values()), None),
-    }
+    groups = dict(zip(frame["participant"], frame["group"], strict=True))
+    for one in statistics():
+        if one.exported_in(study):
+            columns = (*_OF_PERSON, *one.columns)
+            rows = [{**row, **about, "group": groups[row["participant"]]} for of in found for row in one(of).exported()]
+            table = pd.DataFrame(rows, columns=list(header(columns)))
+            yield delivered(one.table, columns, table.astype({column.name: TYPES[column.kind] for column in columns}))
 
 
 def _of_intervals(study: Study) -> tuple[Column, ...]:

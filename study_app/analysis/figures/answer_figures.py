@@ -335,19 +335,9 @@ def _segment(sheet: Sheet, axes: Axes, left: float, y: int, level: int, count: i
 
 
 def liquids(study: Study, block: Block | None = None, *, fonts: Sequence[str] | None = None) -> Figure:
-    """Draw the counts of answers as diverging bars, a panel per setting.
+    """Draw the counts of answers as diverging bars, a panel per setting; by default of the first block of liquids.
 
-    Parameters
-    ----------
-    block : Block, optional
-        One of ``study.blocks``; by default the first that compares liquids.
-    fonts : sequence of str, optional
-        Font families, best first; by default those for screens.
-
-    Raises
-    ------
-    AnalysisError
-        No such block, or no session was completed.
+    Raises AnalysisError where there is no such block, or no session was completed.
     """
     block = block or _only(study, "liquids")
     return draw_agreement(study, block, _look(study, block, fonts)).figure
@@ -423,13 +413,9 @@ def draw_recognition(
     right: Sequence[int | None],
     look: Look,
 ) -> Sheet:
-    """Draw a row a setting and a column a name; the last two columns are undecided and unanswered.
+    """Draw a row a setting and a column a name: counts (settings, labels + 2); ``right`` are the right columns.
 
-    Parameters
-    ----------
-    table : (settings, labels + 2) counts
-    right : sequence
-        The column that is right for each setting; None where none is.
+    The last two columns are undecided and unanswered.
     """
     names = [*labels, "undecided", "unanswered"]
     kept = [place for place in range(len(names)) if place <= len(labels) or any(row[place] for row in table)]

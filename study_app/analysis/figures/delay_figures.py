@@ -44,14 +44,8 @@ def draw_answers(
     """Draw statements over delay, or, without ``delays_ms``, over the settings' codes.
 
     Over delay (true scale, ascending): a thin line per participant (of many: of some), quartile band, thick median.
-    Over codes, whose order says nothing: a dot per participant, quartile band, median ring, and no line.
-
-    Parameters
-    ----------
-    plots : sequence of (str, (participants, settings) array)
-        Of each statement its short text and the answers, NaN where there is none.
-    lowest_ms : sequence of float, optional
-        Of each statement the lowest delay at which a trend shows; None where none does.
+    Over codes, whose order says nothing: a dot per participant, quartile band, median ring, and no line. ``plots`` are
+    short texts and answers (participants, settings), ``lowest_ms`` the lowest delays at which a trend shows.
     """
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     columns = min(len(plots), PLOTS_A_ROW)

@@ -19,9 +19,27 @@ from study_app.analysis.figures.page_layout import (
     sample_words,
     study_marks,
 )
-from study_app.analysis.levels.results import LevelAnswers, LevelsFound, SettingFound, ThresholdFound
-from study_app.analysis.levels.thresholds import Flags, TrackCourse, courses, psychometric_bands, tracks
-from study_app.analysis.results import Failures, counted
+from study_app.analysis.levels.answers import (
+    Answers,
+    LevelAnswers,
+    SettingFound,
+    Settings,
+    mean_words,
+    people,
+    summary_words,
+)
+from study_app.analysis.levels.statistic import level_words, with_unit
+from study_app.analysis.levels.thresholds import (
+    Flags,
+    ThresholdFound,
+    Thresholds,
+    TrackCourse,
+    courses,
+    percent_compared,
+    psychometric_bands,
+)
+from study_app.analysis.levels.tracks import tracks
+from study_app.analysis.results import Failures, LevelsFound, counted
 from study_app.analysis.statistics.outcome import Array
 from study_app.psychophysics.families import Family, success
 
@@ -134,36 +152,34 @@ ASIDE: Final = 0.025
 BELOW: Final = 0.03
 """How far the interval of one standard's threshold is drawn below that of the one before, as a share correct."""
 COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
-LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
-UNITLESS: Final = "weber"
 
 
 def level_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
     """Draw the answers over levels of a block."""
     bands = _bands(study, found)
     files = files_of(partial(_draw_levels, study, found, bands), forms, f"{study.name}: {found.title}")
-    own = len(found.people) - MOST_PEOPLE
+    own = len(people(found)) - MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} in the table alone." if own > 0 else ""
     chance = "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
     caption = (
         f"{found.title}: {summary_words(found)} at each level. {_panels(found, bool(bands))}{chance}{left_out} "
-        f"{sample_words(study, len(found.people))}"
+        f"{sample_words(study, len(people(found)))}"
     )
     return Picture(found.block, name, caption, files)
 
 
 def _bands(study: Study, found: LevelsFound) -> Mapping[str, Array]:
     """Return the bands of the participants' functions, where there is one in each panel."""
-    if not found.own_thresholds or len(_standards(found)) > 1:
+    if not Thresholds.own(found) or len(_standards(found)) > 1:
         return {}
     block = next(block for block in study.levels if block.id == found.block)
-    return psychometric_bands(block, tracks(study), found.people[:MOST_PEOPLE], _limits(found, _places(found)))
+    return psychometric_bands(block, tracks(study), people(found)[:MOST_PEOPLE], _limits(found, _places(found)))
 
 
 def _panels(found: LevelsFound, banded: bool) -> str:
     band = ", with the 95 % band" if banded else ""
-    crosses = "; crosses: catch trials" if found.has_catch_trials else ""
-    if found.own_thresholds:
+    crosses = "; crosses: catch trials" if any(one.catch for one in Answers.of(found)) else ""
+    if Thresholds.own(found):
         return (
             f"Curves: psychometric functions at the posterior medians{band}; bars: 95 % intervals of the thresholds, "
             "those of several standards one below another; "
@@ -176,35 +192,9 @@ def _panels(found: LevelsFound, banded: bool) -> str:
     )
 
 
-def summary_words(found: LevelsFound) -> str:
-    """Return what a value at a level is: "share correct", "mean rating", "geometric mean of the numbers"."""
-    if found.summary == "share":
-        return "share correct" if found.counts == "correct" else f"share “{found.counts}”"
-    return "mean rating" if found.summary == "mean" else "geometric mean of the numbers"
-
-
-def mean_words(found: LevelsFound) -> str:
-    """Return what a value of all participants is."""
-    return "geometric mean" if found.summary == "geometric mean" else "mean"
-
-
-def level_words(found: LevelsFound) -> str:
-    """Return what a level is, with its unit: "Weber fraction of viscosity", "Viscosity [Pa·s]", "Condition"."""
-    if found.quantity is None:
-        return "Condition"
-    words = f"{LEVELS[found.level_kind]}{found.quantity}"
-    unit = "" if found.level_kind == UNITLESS or not found.unit else f" [{found.unit}]"
-    return words[:1].upper() + words[1:] + unit
-
-
-def with_unit(found: LevelsFound, value: float) -> str:
-    """Return a value of the varied number with its unit."""
-    return f"{value:g} {found.unit or ''}".rstrip()
-
-
 @style.own_settings()
 def _draw_levels(study: Study, found: LevelsFound, bands: Mapping[str, Array], fonts: Sequence[str]) -> Sheet:
-    people = found.people[:MOST_PEOPLE]
+    shown_people = people(found)[:MOST_PEOPLE]
     words = summary_words(found)
     above = words[:1].upper() + words[1:]
     standards = _standards(found)
@@ -213,19 +203,19 @@ def _draw_levels(study: Study, found: LevelsFound, bands: Mapping[str, Array], f
     ]
 
     def draw(axes: Axes, place: int, first: bool) -> None:
-        person = people[place - 1] if place else None
+        person = shown_people[place - 1] if place else None
         _levels_panel(axes, found, person, first=first)
         if person is not None and person in bands:
             u, lower, upper = bands[person]
             axes.fill_between(u, lower, upper, color=style.BAND, linewidth=0, zorder=1)
 
-    names = [(name, "") for name in ("All", *people)]
+    names = [(name, "") for name in ("All", *shown_people)]
     shown = keys if len(standards) > 1 else ()
     return panels(study, found.title, above, names, draw, level_words(found), fonts, keys=shown, foot_pt=FOOT_PT)
 
 
 def _standards(found: LevelsFound) -> list[float]:
-    return sorted({one.standard for one in found.answers if one.standard is not None})
+    return sorted({one.standard for one in Answers.of(found) if one.standard is not None})
 
 
 def _levels_panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -> None:
@@ -233,7 +223,7 @@ def _levels_panel(axes: Axes, found: LevelsFound, person: str | None, *, first: 
     _levels_frame(axes, found, places, first=first)
     groups: Sequence[float | None] = _standards(found) or [None]
     for number, (standard, colour) in enumerate(zip(groups, COLOURS, strict=False)):
-        for one in found.own_thresholds:
+        for one in Thresholds.own(found):
             if one.standard == standard and person in {None, one.participant}:
                 grey = person is None and len(groups) == 1
                 _curve(axes, found, one, style.PARTICIPANT if grey else colour)
@@ -241,15 +231,17 @@ def _levels_panel(axes: Axes, found: LevelsFound, person: str | None, *, first: 
                     _threshold_interval(axes, found, one, colour, number)
         if person is None and found.adaptive:
             continue
-        span = 0.0 if found.own_thresholds else max(places.values()) - min(places.values())
+        span = 0.0 if Thresholds.own(found) else max(places.values()) - min(places.values())
         aside = ASIDE * (number - (len(groups) - 1) / 2) * span
-        shown = [one for one in found.answers if one.standard == standard and not one.catch]
-        if person is None and len(groups) == 1 and not found.own_thresholds:
-            for somebody in found.people:
+        shown = [one for one in Answers.of(found) if one.standard == standard and not one.catch]
+        if person is None and len(groups) == 1 and not Thresholds.own(found):
+            for somebody in people(found):
                 _line(axes, shown, somebody, places, found)
         shifted = {level: place + aside for level, place in places.items()}
         _answer_points(axes, [one for one in shown if one.participant == person], shifted, found, colour)
-        caught = [one for one in found.answers if one.standard == standard and one.catch and one.participant == person]
+        caught = [
+            one for one in Answers.of(found) if one.standard == standard and one.catch and one.participant == person
+        ]
         heights = [_height(found, one.value) for one in caught]
         axes.plot([shifted[_where(one)] for one in caught], heights, "x", color=colour, markersize=4, zorder=4)
 
@@ -293,7 +285,7 @@ def _answer_points(
     axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsFound, colour: str
 ) -> None:
     xs, ys = [places[_where(one)] for one in points], [_height(found, one.value) for one in points]
-    if found.own_thresholds:
+    if Thresholds.own(found):
         sizes = [SIZE_PT2 * one.n for one in points]
         axes.scatter(xs, ys, s=sizes, facecolors="none", edgecolors=colour, linewidths=0.7, zorder=3)
         return
@@ -314,7 +306,7 @@ def _height(found: LevelsFound, value: float) -> float:
 
 def _places(found: LevelsFound) -> dict[Any, float]:
     """Return the place of each level on the horizontal axis: its logarithm where levels are spaced so."""
-    levels = list(dict.fromkeys(_where(one) for one in found.answers if one.participant is None))
+    levels = list(dict.fromkeys(_where(one) for one in Answers.of(found) if one.participant is None))
     if found.vary is None:
         return {level: float(place) for place, level in enumerate(levels)}
     if found.spacing == "linear":
@@ -365,7 +357,7 @@ def _shown_levels(found: LevelsFound, places: Mapping[Any, float]) -> Mapping[An
 def _ticks(found: LevelsFound) -> list[tuple[float, str]]:
     if found.summary == "share":
         return [(share, f"{100 * share:.0f} %") for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
-    ends = [end for one in found.answers for end in (one.value, one.low, one.high) if end is not None]
+    ends = [end for one in Answers.of(found) for end in (one.value, one.low, one.high) if end is not None]
     if found.summary == "mean":
         low, high = found.bounds or (min(ends), max(ends))
         return [(float(point), str(point)) for point in range(math.floor(low), math.ceil(high) + 1)]
@@ -389,7 +381,7 @@ def track_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
     block = next(block for block in study.levels if block.id == found.block)
     shown = list(courses(block, tracks(study), MOST_PANELS))
     files = files_of(partial(_draw_tracks, study, found, shown), forms, f"{study.name}: {found.title}, tracks")
-    rest = len(found.own_thresholds) - len(shown)
+    rest = len(Thresholds.own(found)) - len(shown)
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
     success = "correct" if found.counts == "correct" else f"“{found.counts}”"
     marks = " Colours: tracks." if any(one.tracks.max() > 1 for one in shown) else ""
@@ -397,7 +389,7 @@ def track_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
     marks += " × and +: catch trials, answered correctly and not." if any(one.catches.any() for one in shown) else ""
     caption = (
         f"{found.title}: the level of each trial. Filled: {success}; hollow: not.{marks} Band: 95 % interval of "
-        f"the threshold from the answers so far.{left_out} {sample_words(study, len(found.people))}"
+        f"the threshold from the answers so far.{left_out} {sample_words(study, len(people(found)))}"
     )
     return Picture(found.block, name, caption, files)
 
@@ -453,21 +445,21 @@ def _marks(
 def settings_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
     """Draw the settings of a block whose levels participants set, once the key is open."""
     files = files_of(partial(_draw_settings, study, found), forms, f"{study.name}: {found.title}, settings")
-    rest = len(found.own_settings) - MOST_PANELS
+    rest = len(Settings.own(found)) - MOST_PANELS
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
-    compared = any(one.constant_error is not None for one in found.own_settings)
+    compared = any(one.constant_error is not None for one in Settings.own(found))
     standard = " Dashed: standard." if compared else ""
     caption = (
         f"{found.title}: the levels that participants set, in their order. Filled: started high; hollow: started low. "
         f"Line and band: point of subjective equality with its 95 % interval (Student's t).{standard}{left_out} "
-        f"{sample_words(study, len(found.people))}"
+        f"{sample_words(study, len(people(found)))}"
     )
     return Picture(found.block, name, caption, files)
 
 
 @style.own_settings()
 def _draw_settings(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
-    shown = found.own_settings[:MOST_PANELS]
+    shown = Settings.own(found)[:MOST_PANELS]
     standards = len({one.standard for one in shown}) > 1
     names = [
         (
@@ -523,8 +515,8 @@ def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
     """
     if found.level_kind not in {"weber", "difference"}:
         return []
-    points, at_threshold = [], found.compared_percent is None
-    for one in found.thresholds:
+    points, at_threshold = [], percent_compared(found) is None
+    for one in Thresholds.of(found):
         shown = (one.threshold, one.low, one.high)
         level, *ends = shown if at_threshold else (one.compared, one.compared_low, one.compared_high)
         if one.participant != participant or one.standard is None or one.standard <= 0 or level is None or level <= 0:
@@ -537,7 +529,7 @@ def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
 
 def _at(found: LevelsFound) -> str:
     """Return at which percentage Weber fractions are shown."""
-    percent = found.compared_percent
+    percent = percent_compared(found)
     if percent is None and found.guess_rate is not None:
         percent = 50 * (1 + found.guess_rate)
     return "" if percent is None else f" at {percent:.3g} % {found.counts}"
@@ -551,7 +543,7 @@ def weber_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
     caption = (
         f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, over the standard. Thin: participants; "
         f"thick: random-effects mean with its 95 % interval.{published} "
-        f"{sample_words(study, len(found.people))}"
+        f"{sample_words(study, len(people(found)))}"
     )
     return Picture(found.block, name, caption, files)
 
@@ -565,7 +557,7 @@ def _draw_fractions(study: Study, found: LevelsFound, fonts: Sequence[str]) -> S
         WEBER_LEFT_PT, TOP_PT, sheet.width_pt - WEBER_LEFT_PT - RIGHT_PT, sheet.height_pt - TOP_PT - WEBER_FOOT_PT
     )
     group = weber_fractions(found, None)
-    own = [weber_fractions(found, person) for person in found.people]
+    own = [weber_fractions(found, person) for person in people(found)]
     published = published_fractions(found)
     _fractions_frame(axes, group, own, published)
     _published(axes, published, sheet)
@@ -635,10 +627,10 @@ def _fractions_frame(
 Draw: TypeAlias = Callable[[Study, LevelsFound, Sequence[str], str], Picture]
 
 FIGURES: Final[tuple[tuple[str, Callable[[LevelsFound], object], Draw], ...]] = (
-    ("levels", lambda found: found.answers, level_picture),
-    ("tracks", lambda found: found.adaptive and found.own_thresholds, track_picture),
+    ("levels", Answers.of, level_picture),
+    ("tracks", lambda found: found.adaptive and Thresholds.own(found), track_picture),
     ("weber", lambda found: len(weber_fractions(found, None)) >= 2, weber_picture),
-    ("settings", lambda found: found.own_settings, settings_picture),
+    ("settings", Settings.own, settings_picture),
 )
 """What a figure is called, of which blocks there is one, and what draws it."""
 

@@ -23,8 +23,7 @@ from study_app.analysis.figures.page_layout import (
     sample_words,
     study_marks,
 )
-from study_app.analysis.levels.results import QuestionFound
-from study_app.analysis.results import Failures, counted
+from study_app.analysis.results import Failures, QuestionFound, counted
 
 LEFT_PT: Final = 120.0
 RIGHT_PT: Final = 40.0

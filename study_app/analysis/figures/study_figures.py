@@ -16,7 +16,7 @@ from study_app.analysis.figures.page_layout import Drawing, Picture, attempted
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import LowestDelay
-from study_app.analysis.levels.summaries import levels_found
+from study_app.analysis.levels.evaluate import levels_found
 from study_app.analysis.results import Failures, Results
 from study_app.errors import AnalysisError
 from study_app.store.output_files import write_output

@@ -9,11 +9,22 @@ from study_app.analysis.data.blocks import Block, Direction
 from study_app.analysis.data.motion import OF_REACHES
 from study_app.analysis.figures import delay_figures
 from study_app.analysis.figures.page_layout import Drawing, Picture
-from study_app.analysis.findings.block_tests import HOLM, MANY, Asked
-from study_app.analysis.findings.finding import FOUND, NO_EVIDENCE, Absent, Answer, Finding, Row
+from study_app.analysis.findings.finding import (
+    FOUND,
+    HOLM,
+    MANY,
+    NO_EVIDENCE,
+    Absent,
+    Answer,
+    Asked,
+    Finding,
+    Row,
+    codes_of,
+    rows_alone,
+    test_row,
+)
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
 from study_app.analysis.report.html_page import heading, paragraph, table, table_of
-from study_app.analysis.report.test_rows import r_number, r_text, rows_alone, test_row
 from study_app.analysis.results import (
     BlockFound,
     NotTested,
@@ -259,15 +270,15 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
 
     def rows(self) -> Iterator[Row]:
         for against in self.value:
-            row = test_row(self.found, "a delay is equivalent", against.found) | {"item": against.item}
-            compared = f"{against.delay_ms:g} ms − {against.control_ms:g} ms"
-            row |= rows_alone(self.found, f"{against.item} at {against.delay_ms:g} ms")
-            yield row | {"comparison": compared, "verdict": against.verdict}
-            yield _differs(self.found, against) | {
+            about = {
                 "item": against.item,
-                "comparison": compared,
+                "comparison": f"{against.delay_ms:g} ms − {against.control_ms:g} ms",
                 "verdict": against.verdict,
+                "codes": codes_of(self.found, against.delay_ms, against.control_ms),
             }
+            row = test_row(self.found, "a delay is equivalent", against.found)
+            yield row | rows_alone(self.found, f"{against.item} at {against.delay_ms:g} ms") | about
+            yield _differs(self.found, against) | about
 
     def section(self) -> Iterator[str]:
         """Yield the comparisons of each delay with the shortest."""
@@ -322,19 +333,6 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
                 "most "
                 "alpha, and otherwise inconclusive."
             )
-
-    def calls(self, codes: str) -> Iterator[str]:
-        by_delay = {setting.delay_ms: setting.code for setting in self.found.settings}
-        for one in self.value:
-            interval = one.found.interval
-            if one.found.p is None or one.found.p_different is None or interval is None:
-                continue
-            first, second = r_text(by_delay[one.control_ms]), r_text(by_delay[one.delay_ms])
-            what = r_text(f"{one.item}, {one.delay_ms:g} ms")
-            numbers = (one.found.bound, one.found.p, interval.low, interval.high, interval.level, one.found.p_different)
-            values = ", ".join(r_number(value) for value in numbers)
-            answers = f"wide({r_text(self.found.id)}, {r_text(one.item)}, {codes})"
-            yield f"equivalent({what}, {answers}, {first}, {second}, {values})"
 
 
 @dataclass(frozen=True, slots=True)

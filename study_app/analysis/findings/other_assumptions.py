@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 
 from study_app.analysis.data.measures import Array
-from study_app.analysis.findings.block_tests import MANY, Asked, alone
-from study_app.analysis.findings.finding import Absent, Finding, Row
+from study_app.analysis.findings.finding import MANY, Absent, Asked, Finding, Row, alone, judged_row
 from study_app.analysis.report.html_page import heading, paragraph, table_of
-from study_app.analysis.report.test_rows import judged_row
 from study_app.analysis.results import BlockFound, NotTested, Tested, interval, number, p_value, short, statistic
 from study_app.analysis.statistics.mixed_model import Ordinal, ordinal
 from study_app.analysis.statistics.outcome import FEW

@@ -10,11 +10,20 @@ import numpy as np
 from study_app.analysis.data.blocks import Decided
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import Drawing, Picture
-from study_app.analysis.findings.block_tests import Asked, verdict
-from study_app.analysis.findings.finding import FOUND, NO_EVIDENCE, Absent, Answer, Finding, Row
+from study_app.analysis.findings.finding import (
+    FOUND,
+    NO_EVIDENCE,
+    Absent,
+    Answer,
+    Asked,
+    Finding,
+    Row,
+    rows_alone,
+    test_row,
+    verdict,
+)
 from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer, smallest_of_pairs
 from study_app.analysis.report.html_page import heading, paragraph, table_of
-from study_app.analysis.report.test_rows import r_number, r_text, r_vector, rows_alone, test_row
 from study_app.analysis.results import (
     BlockFound,
     NotTested,
@@ -166,13 +175,6 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
                 "ratings are undecided and count as no hit. Hits were tested against exchanging the liquids within "
                 "participants (exact, one-sided)."
             )
-
-    def calls(self, codes: str) -> Iterator[str]:
-        named = self.value
-        if named is not None and named.found.statistic is not None:
-            right = ", ".join("NA_character_" if label is None else r_text(label) for label in named.right)
-            block, labels = r_text(self.found.id), r_vector(named.labels)
-            yield f"hits({block}, {block}, {labels}, {codes}, c({right}), {r_number(named.found.statistic)})"
 
 
 def recognised(named: RecognitionResult) -> tuple[int, ...]:

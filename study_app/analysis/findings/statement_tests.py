@@ -1,6 +1,6 @@
 """Tests of statements: whether settings differ, in which pairs, with the delay, between sessions and between sites.
 
-The tables, the rows of tests.csv, the sentences and the calls in R of all of them are made here.
+The tables, the rows of tests.csv and the sentences of all of them are made here.
 """
 
 import math
@@ -15,10 +15,22 @@ from scipy.stats import rankdata
 from study_app import number_text
 from study_app.analysis.data.blocks import KINDS
 from study_app.analysis.data.measures import medians
-from study_app.analysis.findings.block_tests import FDR, HOLM, SEALED, Asked, each_statement, in_family, judged
-from study_app.analysis.findings.finding import Absent, Finding, Row
+from study_app.analysis.findings.finding import (
+    FDR,
+    HOLM,
+    SEALED,
+    Absent,
+    Asked,
+    Finding,
+    Row,
+    each_statement,
+    in_family,
+    judged,
+    judged_row,
+    rows_alone,
+    test_row,
+)
 from study_app.analysis.report.html_page import heading, paragraph, table_of
-from study_app.analysis.report.test_rows import judged_row, r_number, r_text, r_vector, rows_alone, test_row
 from study_app.analysis.results import (
     BlockFound,
     NotTested,
@@ -40,7 +52,6 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.statistics.outcome import Outcome, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import (
-    Friedman,
     GroupsDiffer,
     Paired,
     friedman,
@@ -48,7 +59,7 @@ from study_app.analysis.statistics.rank_tests import (
     groups_differ,
     paired,
 )
-from study_app.analysis.statistics.trend import Page, page
+from study_app.analysis.statistics.trend import page
 
 ONE_DELAY: Final = "the block has one delay: there is nothing to compare it with"
 
@@ -132,29 +143,6 @@ def families(tests: Sequence[Tested]) -> str:
     )
 
 
-def r_call(what: str, table: str, outcome: Outcome, *between: str) -> Iterator[str]:
-    """Yield the call in R that computes a test again; ``between`` are arguments that its kind has besides."""
-    if outcome.statistic is None or outcome.p is None:
-        return
-    match outcome:
-        case Friedman():
-            if outcome.n < 2:
-                return  # R's friedman.test refuses a single participant
-            kind, p = "friedman", outcome.p_chi2
-        case GroupsDiffer():
-            kind, p = "sites", outcome.p_chi2
-        case Page():
-            kind, p, between = "page", outcome.p, ("TRUE" if outcome.direction == "decreasing" else "FALSE",)
-        case _:
-            kind, p = "pair", outcome.p
-    numbers = (r_number(outcome.statistic), "NA" if p is None else r_number(p))
-    yield f"{kind}({', '.join((r_text(what), table, *between, *numbers))})"
-
-
-def _wide(found: BlockFound, item: str, codes: str) -> str:
-    return f"wide({r_text(found.id)}, {r_text(item)}, {codes})"
-
-
 def compared(answers: Asked) -> tuple[tuple[Tested, ...], Absent]:
     """Test in every statement whether the settings are answered alike."""
     if answers.k < 2:
@@ -192,10 +180,6 @@ class StatementTests(Finding[tuple[Tested, ...]]):
         if self.showing:
             yield from tests_in_words(self.found, self.value, self._said(self.showing), self._said(self.nothing))
 
-    def calls(self, codes: str) -> Iterator[str]:
-        for one in self.value:
-            yield from r_call(one.item, _wide(self.found, one.item, codes), one.outcome)
-
     def _said(self, words: str) -> str:
         return words.format(noun=settings_noun(self.found))
 
@@ -230,17 +214,6 @@ class SettingsDiffer(StatementTests):
                 f"Each statement was tested by {test_name(one.outcome)} ({one.outcome.method}), with "
                 f"{one.outcome.effect_name} as the effect, {families(tests)}."
             )
-
-    def calls(self, codes: str) -> Iterator[str]:
-        if len(self.found.settings) != 2:
-            return super().calls(codes)
-        first, second = (setting.code for setting in self.found.settings)
-        return (call for one in self.value for call in _pair_calls(self.found, codes, first, second, one))
-
-
-def _pair_calls(found: BlockFound, codes: str, first: str, second: str, one: Tested) -> Iterator[str]:
-    what = f"{one.item}, {first} and {second}"
-    yield from r_call(what, _wide(found, one.item, codes), one.outcome, r_text(first), r_text(second))
 
 
 def _first_tested(tests: Sequence[Tested]) -> Tested:
@@ -324,13 +297,6 @@ class SessionsDiffer(StatementTests):
         if all(one.outcome.n == 0 for one in tested):
             return (), (NotTested(cls.what, f"no one answered the same setting in all of sessions {numbers}"),)
         return tested, ()
-
-    def calls(self, codes: str) -> Iterator[str]:
-        numbers = r_vector(map(str, self.found.sessions))
-        for one in self.value:
-            rows = f"by_session({r_text(self.found.id)}, {r_text(one.item)}, {numbers}, {codes})"
-            two = () if isinstance(one.outcome, Friedman) else ("1", "2")
-            yield from r_call(f"{one.item}, sessions", rows, one.outcome, *two)
 
 
 @dataclass(frozen=True, slots=True)
@@ -429,11 +395,6 @@ class SitesDiffer(Finding[SiteTests]):
                 f"Sites were compared by {listed(names)}, with participants exchanged between sites, p adjusted by "
                 f"{FDR}; all other tests are within participants, with the participants of all sites together."
             )
-
-    def calls(self, codes: str) -> Iterator[str]:
-        for kind in ("level", "profile"):
-            for one in getattr(self.value, kind):
-                yield from r_call(one.item, _wide(self.found, one.item, codes), one.outcome, r_text(kind))
 
 
 def over_all(answers: Asked, draws: int | None = None) -> Outcome | None:
@@ -560,7 +521,8 @@ class Pairs(Finding[tuple[Pair, ...]]):
     def rows(self) -> Iterator[Row]:
         for pair in self.value:
             compared = f"{name(self.found, pair.first)} − {name(self.found, pair.second)}"
-            yield judged_row(self.found, "two settings differ", pair.tested) | {"comparison": compared}
+            row = judged_row(self.found, "two settings differ", pair.tested)
+            yield row | {"comparison": compared, "codes": f"{pair.first} {pair.second}"}
 
     def section(self) -> Iterator[str]:
         if not (pairs := self.value):
@@ -598,10 +560,6 @@ class Pairs(Finding[tuple[Pair, ...]]):
                 "left out) with the matched rank-biserial correlation, Holm-adjusted over all pairs of all these "
                 "statements."
             )
-
-    def calls(self, codes: str) -> Iterator[str]:
-        for pair in self.value:
-            yield from _pair_calls(self.found, codes, pair.first, pair.second, pair.tested)
 
 
 def _differing(pair: Pair) -> int:

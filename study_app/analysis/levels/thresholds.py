@@ -1,19 +1,16 @@
-"""Tracks of a block of levels, thresholds of participants, groups and sites, and their exponents.
+"""Thresholds of participants, groups and sites, and exponents.
 
 Fits take all counted answers of a participant at the levels delivered to the hand: trials of one requested level lie
 at the mean of their delivered levels.
 
-An exponent of n is Stevens' power law, answer ∝ levelⁿ (Stevens 1957, Psychological Review 64, 153).
-
-An exponent of 1 is Weber's law, JND ∝ standard; 0 is a constant JND.
+An exponent of n is Stevens' power law, answer ∝ levelⁿ (Stevens 1957, Psychological Review 64, 153), or that of the
+JND over standards: 1 is Weber's law, JND ∝ standard; 0 is a constant JND.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -22,157 +19,84 @@ from numpy.typing import ArrayLike, NDArray
 from study_app.analysis.data.blocks import LevelBlock, compared_percent
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.levels.results import ExponentFound, LevelsFound, SensitivityFound, SettingFound, ThresholdFound
-from study_app.analysis.results import SiteThresholds
-from study_app.analysis.statistics.outcome import Array, student_interval
+from study_app.analysis.levels.answers import Answers
+from study_app.analysis.levels.statistic import (
+    BLOCK,
+    INTERVAL,
+    INTERVAL_2,
+    MOTORS,
+    OF_WHOM,
+    LevelStatistic,
+    Shown,
+    digits,
+    interval_words,
+    level_words,
+    mean_over,
+    unit,
+    with_unit,
+)
+from study_app.analysis.levels.tracks import TRACK, answers_of, setting_of
+from study_app.analysis.results import LevelsFound, SiteThresholds, counted, listed, number
+from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.rank_tests import groups_differ
-from study_app.analysis.statistics.thresholds import drift, group_mean, p_of_fit
-from study_app.protocol.trials.methods import Answer, TrackSetting
-from study_app.protocol.trials.presentation import arrangement_of
-from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus, analysis_grid
+from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, drift, drifts, group_mean, p_of_fit
+from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
 from study_app.psychophysics.grid import Grid, fit
+from study_app.store.tables.csv_files import Column
 
-R = TypeVar("R", ExponentFound, SensitivityFound, SettingFound)
-
-TRACK: Final = ["participant", "session", "block", "code"]
-"""What one track is in the rows of `tracks`."""
-PRESENTATION: Final = ["participant", "session", "trial", "attempt"]
-OF_INTERVALS: Final = ("force_mean_n", "mean_speed_mps")
-"""What a trial's row repeats of each of its intervals."""
-_DELIVERED: Final = tuple(f"{what}_{letter}" for what in ("value", "delay_error_ms") for letter in "CS")
-"""Means over the intervals of a trial that presented the comparison, and over those that presented the standard."""
-_TYPES: Final = {
-    "track": "string",
-    "comparison": "Float64",
-    "comparison_interval": "Int64",
-    "right": "boolean",
-    "success": "boolean",
-    "analysed": "boolean",
-    "level_delivered": "Float64",
-}
-"""What follows from a trial's arrangement, level and answer."""
-_READ: Final = ("block", "code", "index", "counted", "arrangement", "standard", "level", "response", *_DELIVERED)
+FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
+WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
+BEYOND: Final = {None: "", "above": "above ", "below": "below "}
+SHIFT: Final = 0.1
+"""A prior that shifts a threshold by a larger share of it is named."""
+FEW_ANSWERS: Final = 40
+"""The fewest answers for which the coverage of the intervals was tested."""
+MOST_NAMED: Final = 6
 
 
-def answers_timed(study: Study) -> pd.DataFrame:
-    """Return all answers after trials of levels, with ``response_s``: from the question to the first choice [s]."""
-    rows = study.answered
-    if not study.levels:
-        return rows.iloc[:0].assign(response_s=pd.Series(dtype="Float64"))
-    rows = rows[rows["block"].isin([block.id for block in study.levels]).fillna(False)]
-    return rows.assign(response_s=(rows["first_choice_s"] - rows["onset_s"]).astype("Float64").round(6))
+@dataclass(frozen=True, slots=True)
+class ThresholdFound:
+    """A participant's threshold at one standard or, where ``participant`` is None, the group's.
 
-
-def tracks(study: Study) -> pd.DataFrame:
-    """Return the last attempt at each trial of levels, with what it presented; the key must be open.
-
-    ``right`` says whether the answer was correct, ``success`` what it counts as for a psychometric function;
-    ``analysed`` is false where the trial does not count or presents the modulus of a magnitude estimation; ``reversal``
-    says where an up–down track changed its direction.
+    ``threshold`` with the ends of its 95 % interval and ``flat_width`` (the threshold under a flat prior on the width)
+    are levels. ``width`` reaches from 5 to 95 % of the function's rise, in decades on log spacing.
+    ``beyond`` says that the threshold lies above or below the levels presented; ``variance`` is the threshold's
+    posterior variance in u. ``fit_p`` is that of the deviance, ``drift`` the correlation of trial number and deviance
+    residual. ``reversal_mean`` is the classical estimate of the up–down tracks, at ``target_percent`` successes.
+    ``compared`` is the level at the percentage of successes of the published value, see `compared_percent`. Of the
+    group only ``n`` (participants), threshold and ``compared`` are known, each with its interval.
     """
-    by_id = {block.id: block for block in study.levels}
-    rows = study.trials[study.trials["block"].isin(list(by_id))]
-    rows = rows.sort_values("attempt").drop_duplicates(PRESENTATION[:-1], keep="last").sort_index()
-    answers = answers_timed(study)[[*PRESENTATION, "response", "value", "response_s"]]
-    found = rows.merge(_presented(study.intervals), on=PRESENTATION, how="left")
-    found = found.merge(answers, on=PRESENTATION, how="left")
-    found["slot"] = found.groupby(TRACK).cumcount() + 1
-    track_rows = [_track_row(by_id[row["block"]], row) for row in found[list(_READ)].to_dict("records")]
-    found = found.drop(columns=list(_DELIVERED))
-    found = found.join(pd.DataFrame(track_rows, index=found.index, columns=list(_TYPES)).astype(_TYPES))
-    return found.assign(reversal=_reversals(found, by_id))
 
+    participant: str | None
+    standard: float | None
+    n: int
+    threshold: float
+    low: float | None
+    high: float | None
+    width: float | None = None
+    lapse: float | None = None
+    guess: float | None = None
+    flat_width: float | None = None
+    beyond: str | None = None
+    variance: float | None = None
+    fit_p: float | None = None
+    drift: float | None = None
+    reversal_mean: float | None = None
+    target_percent: float | None = None
+    compared: float | None = None
+    compared_low: float | None = None
+    compared_high: float | None = None
 
-def setting_of(block: LevelBlock, track: str) -> TrackSetting | None:
-    """Return what the levels of a track ("8/1") were chosen for; None where conditions are compared."""
-    number = track.rpartition("/")[2]
-    return None if block.stimulus is None else TrackSetting(block.stimulus, block.design, int(number))
+    @property
+    def fits(self) -> bool:
+        """Whether simulated answers deviate from the function as much as those given; true where this is not known."""
+        return self.fit_p is None or self.fit_p >= WORST
 
-
-def answers_of(rows: pd.DataFrame) -> list[Answer]:
-    """Return the answers of one track as its method heard them: those that were not counted, too."""
-    heard = _heard(rows)
-    return list(zip(heard["level"].astype(float), heard["success"].astype(bool), strict=True))
-
-
-def _heard(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows whose answers moved their track, in order: neither catch trials nor the standard alone."""
-    compared = rows["success"].notna() & rows["level"].notna() & rows["arrangement"].str.contains("C").fillna(False)
-    return rows[compared & ~rows["catch"].fillna(False).astype(bool)].sort_values("trial")
-
-
-def _reversals(found: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Series[Any]:
-    """Return whether the direction of its track changed at each trial; missing where the method has no steps."""
-    reversal = pd.Series(pd.NA, index=found.index, dtype="boolean")
-    for _, rows in found.groupby(TRACK, sort=False):
-        block = blocks[rows["block"].iloc[0]]
-        setting = setting_of(block, rows["track"].iloc[0])
-        if setting is None or block.method is None or block.method.target_percent is None:
-            continue
-        at, places = block.method.reversals(setting, answers_of(rows)), _heard(rows).index
-        reversal[places] = False
-        reversal[places[list(at)]] = True
-    return reversal
-
-
-def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:
-    track = next(one.condition for one in block.settings if one.code == row["code"])
-    found: dict[str, Any] = {**dict.fromkeys(_TYPES, pd.NA), "track": track}
-    found["analysed"] = bool(row["counted"]) and not block.presents_modulus(int(row["index"]))
-    letters = row["arrangement"]
-    if pd.isna(letters) or len(letters) < block.design.intervals:  # the trial ended before its last interval
-        return found
-    if letters.count("C") == 1 and block.design.intervals > 1:
-        found["comparison_interval"] = letters.index("C") + 1
-    if block.stimulus is not None and not pd.isna(row["level"]):
-        standard = None if pd.isna(row["standard"]) else float(row["standard"])
-        found["comparison"] = block.stimulus.comparison(standard, float(row["level"]))
-        found["level_delivered"] = _level_delivered(block.stimulus, standard, found["comparison"], row)
-    if not pd.isna(row["response"]):
-        arrangement, answer = arrangement_of(block.design, letters), str(row["response"])
-        correct, success = block.design.is_correct(arrangement, answer), block.design.success(arrangement, answer)
-        if block.has_correct_answer and correct is not None:
-            found["right"] = correct
-        found["success"] = pd.NA if success is None else success
-    return found
-
-
-def _level_delivered(stimulus: Stimulus, standard: float | None, comparison: float, row: Mapping[Any, Any]) -> Any:
-    """Return the level at which the comparison was delivered; missing where it was not measured, or not presented.
-
-    Of a delay it is the requested one and how much more late the comparison's frames were than the standard's.
-    """
-    value, of_standard, error_ms, of_standard_ms = (row[name] for name in _DELIVERED)
-    if stimulus.vary == DELAY:
-        if pd.isna(error_ms):
-            return pd.NA
-        late_ms = float(error_ms) - (0.0 if pd.isna(of_standard_ms) else float(of_standard_ms))
-        return stimulus.level_between(standard, comparison + late_ms)
-    if pd.isna(value):
-        return pd.NA
-    if stimulus.vary == FORCE_DELAY and standard is not None and not pd.isna(of_standard):
-        return stimulus.level_between(standard, standard + float(value) - float(of_standard))
-    return stimulus.level_between(standard if pd.isna(of_standard) else float(of_standard), float(value))
-
-
-def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
-    """Return a row per presentation: standard, level, arrangement, and of each interval force and speed."""
-    ordered = intervals.sort_values([*PRESENTATION, "interval"])
-    letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")
-    found = ordered.groupby(PRESENTATION, sort=False)[["standard", "level", "catch", "setting"]].first()
-    presented: dict[Any, str] = {}
-    for which, letter in zip(zip(*(ordered[name] for name in PRESENTATION), strict=True), letters, strict=True):
-        presented[which] = presented.get(which, "") + letter
-    found["arrangement"] = pd.Series(presented, dtype="string").reindex(found.index)
-    for name, what in (("value_delivered", "value"), ("delay_error_mean_ms", "delay_error_ms")):
-        means = ordered.assign(letter=letters).groupby([*PRESENTATION, "letter"])[name].mean().unstack("letter")
-        for letter in "CS":
-            found[f"{what}_{letter}"] = means.get(letter, pd.NA)
-    for name in OF_INTERVALS:
-        wide = ordered.pivot(index=PRESENTATION, columns="interval", values=name)
-        found = found.join(wide.rename(columns={number: f"{name}_{number}" for number in wide.columns}))
-    return found.reset_index()
+    @property
+    def drifts(self) -> bool:
+        """Whether answers became better or worse over the trials, beyond 2/√n."""
+        return drifts(self.drift, self.n)
 
 
 @dataclass(frozen=True, slots=True)
@@ -349,9 +273,7 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
     grid = analysis_grid(stimulus, block.design, assumed)
     rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["success"].notna()]
     rows = rows.sort_values(["participant", "session", "trial"])
-    for number, (_, own) in enumerate(rows.groupby(["participant", "standard"], dropna=False)):
-        if number == most:
-            return
+    for _, own in list(rows.groupby(["participant", "standard"], dropna=False))[:most]:
         standard = own["standard"].iloc[0]
         counts = counts_of(stimulus, own)
         successes, ends = own["success"].to_numpy(dtype=bool), []
@@ -377,8 +299,8 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
 def site_thresholds(study: Study, levels: Sequence[LevelsFound], seed: int) -> Iterator[SiteThresholds]:
     """Yield the comparison of sites at each standard of each block; nothing where the study is not merged or sealed."""
     for found in levels if study.sites else ():
-        for standard in dict.fromkeys(one.standard for one in found.own_thresholds):
-            own = [one for one in found.own_thresholds if one.standard == standard]
+        for standard in dict.fromkeys(one.standard for one in Thresholds.own(found)):
+            own = [one for one in Thresholds.own(found) if one.standard == standard]
             thresholds = tuple(one.threshold for one in own)
             of_sites = tuple(study.site_of(str(one.participant)) for one in own)
             sites = tuple(dict.fromkeys(of_sites))
@@ -396,6 +318,209 @@ def site_thresholds(study: Study, levels: Sequence[LevelsFound], seed: int) -> I
                 of_sites,
                 groups_differ(np.array(thresholds)[:, None], of_sites, seed=seed),
             )
+
+
+def percent_compared(found: LevelsFound) -> float | None:
+    """Return the percentage of successes at which thresholds are compared with published ones; None: at no other."""
+    return compared_percent(found.published) if any(one.compared is not None for one in Thresholds.of(found)) else None
+
+
+def with_device(found: LevelsFound, one: ThresholdFound) -> float | None:
+    """Return a Weber fraction of damping with the device's own in the standard, ΔB/(B + b); None where unknown."""
+    if found.device is None or one.standard is None or (found.vary, found.level_kind) != ("damping_nspm", "weber"):
+        return None
+    return one.threshold * one.standard / (one.standard + found.device.damping_nspm)
+
+
+def _named_people(own: Sequence[ThresholdFound], some: Sequence[ThresholdFound]) -> str:
+    """Return whose thresholds they are: at each standard where there are several, at most `MOST_NAMED` by name."""
+    if len(some) > MOST_NAMED:
+        return f"{len(some)} of {len(own)} thresholds"
+    several = len({one.standard for one in own}) > 1
+    return listed([f"{one.participant} at {one.standard:g}" if several else str(one.participant) for one in some])
+
+
+class Thresholds(LevelStatistic[ThresholdFound]):
+    """The group's threshold of each standard, followed by those of its participants."""
+
+    key = "thresholds"
+    place = 2
+    title = "Thresholds"
+    figures = ("tracks", "weber")
+
+    compute = staticmethod(lambda block, opened, _study, _found: thresholds(block, opened))
+
+    def shown(self) -> Sequence[Shown]:
+        found, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
+
+        def fit(one: ThresholdFound) -> str:
+            return "–" if one.fit_p is None else f"{one.fit_p:.3f}{'' if one.fits else ': the function does not fit'}"
+
+        def drift(one: ThresholdFound) -> str:
+            return "–" if one.drift is None else f"{one.drift:+.2f}{'!' if one.drifts else ''}".replace("-", "−")
+
+        return (
+            self.standard(),
+            *OF_WHOM,
+            (
+                "threshold" + (" (Weber fraction)" if found.level_kind == "weber" else unit(found)),
+                lambda one: f"{BEYOND[one.beyond]}{one.threshold:.3g}",
+            ),
+            INTERVAL,
+            None if compared is None else (f"at {compared:g} %", lambda one: digits(one.compared)),
+            ("with device damping", lambda one: digits(with_device(found, one)))
+            if any(with_device(found, one) is not None for one in self.rows)
+            else None,
+            (f"width [{WIDTH_UNITS[found.spacing]}]", lambda one: digits(one.width, 2)),
+            ("flat width prior", lambda one: digits(one.flat_width)),
+            None
+            if percent is None
+            else (f"mean of reversals ({percent:.1f} %)", lambda one: digits(one.reversal_mean)),
+            ("fit (p)", fit),
+            ("drift", drift),
+        )
+
+    def _target_percent(self) -> float | None:
+        return next((one.target_percent for one in self.own(self.found)), None)
+
+    def explained(self) -> str:
+        found, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
+        at = "" if found.guess_rate is None else f" ({50 * (1 + found.guess_rate):.3g} % {found.counts})"
+        catch = ", those to catch trials included" if any(one.catch for one in Answers.of(found)) else ""
+        reversals = (
+            ""
+            if percent is None
+            else " The mean of reversals is the classical estimate of an up–down track, at "
+            f"{percent:.1f} % {found.counts}."
+        )
+        level = (
+            "" if compared is None else f" “At {compared:g} %” is the level at which the published value was measured."
+        )
+        function = FAMILIES[found.family or ""]
+        return (
+            f"A threshold is the level ({level_words(found)}) at which the {function} function is half-way between "
+            f"guesses and lapses{at}: posterior median with an equal-tailed 95 % interval, from all counted answers, "
+            f"at the levels delivered to the hand. The width, from 5 to 95 % of the rise, has a log-normal prior; "
+            f"the next column is the threshold under a flat one. “Above” and “below” mark thresholds beyond the "
+            f"levels presented. The group is the random-effects mean (Paule–Mandel), with the interval of Hartung and "
+            f"Knapp from three participants on."
+            f"{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of "
+            f"trial number and deviance residual, with “!” beyond 2/√n. n counts answers{catch}."
+        )
+
+    def compares(self, measure: str) -> bool:
+        return measure != "exponent"
+
+    def sentences(self) -> Iterator[str]:
+        found = self.found
+        for one in self.rows:
+            if one.participant is None:
+                where = "" if one.standard is None else f", standard {with_unit(found, one.standard)}"
+                percent = "" if found.guess_rate is None else f" at {50 * (1 + found.guess_rate):.3g} % {found.counts}"
+                if one.compared is not None:
+                    percent += f", {one.compared:.3g} at {percent_compared(found):g} %"
+                yield (
+                    f"{found.title}{where}: threshold {one.threshold:.3g}{percent} ({level_words(found)}; "
+                    f"{interval_words(one, digits)}; {counted(one.n, 'participant')})."
+                )
+
+    def limits(self) -> Iterator[str]:
+        own, title = self.own(self.found), self.found.title
+        if not own:
+            return
+
+        def shifted(one: ThresholdFound) -> bool:
+            return one.flat_width is not None and abs(one.flat_width - one.threshold) > SHIFT * abs(one.threshold)
+
+        kinds: tuple[tuple[Callable[[ThresholdFound], bool], str], ...] = (
+            (shifted, f"the prior of the width shifts a threshold by more than {100 * SHIFT:.0f} %: too few answers"),
+            (
+                lambda one: one.beyond == "above",
+                "a threshold lies above the highest level presented; how far is not known",
+            ),
+            (
+                lambda one: one.beyond == "below",
+                "a threshold lies below the lowest level presented; how far is not known",
+            ),
+            (lambda one: not one.fits, "the function does not fit the answers, so that a threshold may be biased"),
+            (
+                lambda one: one.drifts,
+                "answers became better or worse over the trials, which one threshold does not show",
+            ),
+            (lambda one: one.n < FEW_ANSWERS, f"fewer than {FEW_ANSWERS} answers, so that intervals are wide"),
+        )
+        for applies, words in kinds:
+            if some := [one for one in own if applies(one)]:
+                yield f"{title}: {words} ({_named_people(own, some)})."
+        if (people := len({one.participant for one in own})) < FEWEST:
+            yield (
+                f"{title}: {counted(people, 'participant')}; below {FEWEST} the group has no interval, since "
+                "differences between people are not known."
+            )
+        if self.found.level_kind == "weber":
+            yield self._limit_of_device()
+        yield f"{title}: {MOTORS}"
+
+    def _limit_of_device(self) -> str:
+        """Return what the device's own dynamics leave open."""
+        found, own = self.found, self.found.device
+        if own is None:
+            return (
+                f"{found.title}: the device's own damping, friction and mass are unknown, since they were not "
+                "measured; Weber fractions are of what the motors delivered, and smaller ones of the sum with the "
+                "device's own."
+            )
+        where = "" if own.sessions == own.of else f" (measured for {own.sessions} of {own.of} sessions)"
+        words = (
+            f"{found.title}: the device's own damping of {own.damping_nspm:.2g} N·s/m, friction of "
+            f"{own.friction_n:.2g} N and mass of {own.mass_kg:.2g} kg{where} add to what the motors delivered; Weber "
+            "fractions are of the latter"
+        )
+        shares = [
+            f"{share:.3g} in place of {one.threshold:.3g} at {one.standard:g} {found.unit}"
+            for one in self.rows
+            if one.participant is None and (share := with_device(found, one)) is not None
+        ]
+        if not shares:
+            return f"{words}."
+        return f"{words}. With the device's damping in the standard, those of the group are {listed(shares)}."
+
+    def methods(self, block: LevelBlock) -> Iterator[str]:
+        if not self.rows or block.assumed is None or block.stimulus is None:
+            return
+        median, factor = block.assumed.width_prior
+        family, log = FAMILIES[block.assumed.family], block.stimulus.spacing == "log"
+        yield (
+            f"A {family} function of the {'logarithm of the ' if log else ''}level was fitted, with a "
+            f"flat prior on the threshold, a log-normal one on the width (median {median:.3g} "
+            f"{'decades' if log else 'units of the level'}, factor {factor:.3g}) and lapse rates up to "
+            f"{100 * max(ANALYSIS_LAPSES):.0f} %."
+        )
+
+    @classmethod
+    def common_methods(cls, blocks: Sequence[LevelsFound]) -> Iterator[str]:
+        if any(map(cls.of, blocks)):
+            yield (
+                "Thresholds are posterior medians over a grid with equal-tailed 95 % intervals, from all counted "
+                "answers at the levels delivered to the hand. The deviance was compared with that of "
+                f"{SETS} simulated sets of answers, and drift is the correlation of trial number and deviance residual "
+                "(Wichmann & Hill 2001). Group means are random-effects means with the between-person variance of "
+                f"Paule and Mandel (1982) and, from {FEWEST} participants on, the interval of Hartung and Knapp (2001)."
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class ExponentFound:
+    """A participant's exponent: of a power law, from ``n`` levels, or Weber's, of the JND over ``n`` standards.
+
+    Where ``participant`` is None, it is the mean over ``n`` participants, with its 95 % interval by Student's t.
+    """
+
+    participant: str | None
+    n: int
+    exponent: float
+    low: float | None = None
+    high: float | None = None
 
 
 def estimate_slope(levels: ArrayLike, answers: ArrayLike) -> float:
@@ -432,26 +557,6 @@ def estimated_exponents(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Exp
     yield from own
 
 
-def mean_over(
-    own: Sequence[R],
-    middle: str,
-    *others: str,
-    coordinate: Callable[[float], float] = float,
-    level_of: Callable[[float], float] = float,
-) -> R:
-    """Return the group of these participants: means over those in whom a number is known.
-
-    That of ``middle`` is a mean in the coordinate u with Student's 95 % interval.
-    """
-    known = {name: [value for one in own if (value := getattr(one, name)) is not None] for name in (middle, *others)}
-    means: dict[str, Any] = {name: float(np.mean(values)) if values else None for name, values in known.items()}
-    u = np.array([coordinate(value) for value in known.pop(middle)])
-    ends = student_interval(u) if len(u) else (None, None)
-    low, high = (None if end is None else level_of(end) for end in ends)
-    means[middle] = level_of(float(u.mean())) if len(u) else None
-    return replace(own[0], participant=None, n=len(own), low=low, high=high, **means)
-
-
 def jnd_slope(standards: ArrayLike, jnds: ArrayLike) -> float:
     """Return the least-squares slope of ln JND on ln standard.
 
@@ -467,10 +572,7 @@ def jnd_slope(standards: ArrayLike, jnds: ArrayLike) -> float:
 def weber_exponents(thresholds: Sequence[ThresholdFound], level_kind: str) -> Iterator[ExponentFound]:
     """Yield the exponent of the group, followed by those of the participants with thresholds at two standards or more.
 
-    Parameters
-    ----------
-    level_kind : str
-        What a level is. A JND is weber × standard, or the difference itself; a value has none.
+    A JND is weber × standard, or the difference itself; a value has none.
     """
     if level_kind == "value":
         return
@@ -486,3 +588,97 @@ def weber_exponents(thresholds: Sequence[ThresholdFound], level_kind: str) -> It
     if own:
         yield mean_over(own, "exponent")
     yield from own
+
+
+class Exponents(LevelStatistic[ExponentFound]):
+    """Exponents of the power law, or Weber's: that of the group, followed by those of its participants."""
+
+    key = "exponents"
+    place = 3
+    table = "exponents"
+    row = "one row per participant of a block of magnitude estimation, after unblinding"
+    columns = (
+        BLOCK,
+        Column("levels", "integer", "Levels with answers that count.", minimum=2),
+        Column(
+            "exponent",
+            "number",
+            "Exponent of the power law: the slope of the mean ln answer at each level on ln level, at delivered "
+            "levels.",
+        ),
+    )
+
+    compute = staticmethod(
+        lambda block, opened, _study, found: (
+            *estimated_exponents(block, opened),
+            *weber_exponents(Thresholds.of(found), found.level_kind or "value"),
+        )
+    )
+
+    @classmethod
+    def exported_in(cls, study: Study) -> bool:
+        return any(block.design.reply == "number" for block in study.levels)
+
+    def exported(self) -> Iterator[Mapping[str, Any]]:
+        for row in super().exported() if self._is_power_law else ():
+            (one,) = (one for one in self.rows if one.participant == row["participant"])
+            yield {**row, "levels": one.n}
+
+    @property
+    def _is_power_law(self) -> bool:
+        return self.found.summary == "geometric mean"
+
+    @property
+    def name(self) -> str:
+        """What the exponents are."""
+        return "exponent of the power law" if self._is_power_law else "Weber exponent"
+
+    def heading(self) -> str:
+        return self.name[0].upper() + self.name[1:]
+
+    def shown(self) -> Sequence[Shown]:
+        over = "standards" if Thresholds.of(self.found) else "levels"
+        participant, (_, n) = OF_WHOM
+        return participant, (over, n), ("exponent", lambda one: number(one.exponent)), INTERVAL_2
+
+    def explained(self) -> str:
+        if Thresholds.of(self.found):
+            return (
+                "The exponent is the least-squares slope of ln JND on ln standard over the standards of a participant; "
+                "the just-noticeable difference (JND) is the threshold in the unit of the standard. 1 is Weber’s law "
+                "(the JND is proportional to the standard), 0 a constant JND. That of the group is the mean over "
+                "participants with Student’s interval."
+            )
+        return (
+            "The exponent n of answer ∝ levelⁿ (Stevens 1957) is the least-squares slope of a participant’s mean ln "
+            "answer at each level on ln level, at the levels delivered to the hand; it does not depend on the unit "
+            "that a participant chose. That of the group is the mean over participants with Student’s interval."
+        )
+
+    def compares(self, measure: str) -> bool:
+        return measure == "exponent"
+
+    def sentences(self) -> Iterator[str]:
+        over = f" over {self.found.quantity}"
+        meaning = "; 1 is Weber’s law, 0 a constant JND" if Thresholds.of(self.found) else over
+        for one in self.rows:
+            if one.participant is None:
+                yield (
+                    f"{self.found.title}: {self.name} {number(one.exponent)} ({interval_words(one, number)}; "
+                    f"{counted(one.n, 'participant')}){meaning}."
+                )
+
+    @classmethod
+    def common_methods(cls, blocks: Sequence[LevelsFound]) -> Iterator[str]:
+        held = [found for found in blocks if cls.of(found)]
+        if any(found.summary == "geometric mean" for found in held):
+            yield (
+                "The exponent of magnitude estimation (Stevens 1957) is the slope of the mean ln answer at each level "
+                "on ln level, by least squares for each participant; the group’s is the mean with Student’s 95 % "
+                "interval."
+            )
+        if any(map(Thresholds.of, held)):
+            yield (
+                "The Weber exponent is the slope of ln JND on ln standard, by least squares for each participant; the "
+                "group’s is the mean with Student’s 95 % interval."
+            )

@@ -2,27 +2,24 @@
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, fields, is_dataclass
 from functools import partial
-from importlib import metadata
+from importlib import metadata, resources
 from platform import python_version
 from typing import Any, Final
 
 from study_app import __version__
-from study_app.analysis.data.blocks import LevelBlock, Setting
+from study_app.analysis.data.blocks import Setting
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.table_files import credit_lines, study_head
 from study_app.analysis.findings import all_findings
-from study_app.analysis.levels.results import ExponentFound, LevelsFound, SettingFound, ThresholdFound
+from study_app.analysis.findings.finding import TESTS
+from study_app.analysis.levels.evaluate import level_entries
 from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
 from study_app.analysis.planning.preregistration import deviations
-from study_app.analysis.report.html_page import render
-from study_app.analysis.report.test_rows import TESTS, r_number, r_text, r_vector
-from study_app.analysis.results import BlockFound, Failure, Failures, Results, name
-from study_app.analysis.statistics.trend import EXACT_UP_TO
+from study_app.analysis.results import BlockFound, Failure, Failures, LevelsFound, Results, name
 from study_app.errors import AnalysisError
-from study_app.protocol.trials.methods import UpDown
 from study_app.store.blinded.unblinding import reveals_of
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
@@ -31,7 +28,6 @@ from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
 OF_FORMAT_2: Final = {
     Results: frozenset({"questions", "scores", "levels", "site_thresholds"}),
-    LevelsFound: frozenset({"withheld"}),
     Setting: frozenset({"link", "view"}),
 }
 """Results that reports of earlier versions do not have; omitted where there are none."""
@@ -41,6 +37,9 @@ def plain(value: Any) -> Any:
     """Return a result as JSON's objects, arrays, texts, numbers, true, false and null."""
     if isinstance(value, BlockFound):
         return {name: plain(entry) for name, entry in _entries(value)}
+    if isinstance(value, LevelsFound):
+        entries = {field.name: getattr(value, field.name) for field in fields(value) if field.name != "statistics"}
+        return plain(entries | level_entries(value))
     if is_dataclass(value) and not isinstance(value, type):
         held = {field.name: getattr(value, field.name) for field in fields(value)}
         omitted = OF_FORMAT_2.get(type(value), frozenset())
@@ -177,146 +176,7 @@ def _path_in_study(study: Study, path: Any) -> str:
     return str(path.relative_to(study.folder).as_posix())
 
 
-class _Code(str):
-    """A part of a call that is R already."""
-
-    __slots__ = ()
-
-
-def _in_r(value: Any) -> str:
-    match value:
-        case None:
-            return "NA"
-        case bool():
-            return "TRUE" if value else "FALSE"
-        case _Code():
-            return value
-        case str():
-            return r_text(value)
-        case tuple() | list():
-            return f"c({', '.join(map(_in_r, value))})"
-        case _:
-            return r_number(value)
-
-
-def _call(function: str, *values: Any, reported: Sequence[Any] = ()) -> tuple[_Code, int]:
-    """Return a call, and how many numbers it compares: those of ``reported`` that are known, its last arguments."""
-    compared = sum(len(value) if isinstance(value, tuple) else value is not None for value in reported)
-    return _Code(f"{function}({', '.join(map(_in_r, (*values, *reported)))})"), compared
-
-
-def level_lines(study: Study, levels: Sequence[LevelsFound]) -> tuple[list[str], int]:
-    """Return the lines of the script, and how many numbers they compare; none while the key is sealed."""
-    blocks = {block.id: block for block in study.levels}
-    calls = [call for found in levels if found.revealed for call in _level_calls(blocks[found.block], found)]
-    if not calls:
-        return [], 0
-    functions = render("level_functions.R", table=f"study-{study.name}_description-tracks_data.csv")
-    return [f"\n{functions}\n\n", *(line for line, _ in calls)], sum(numbers for _, numbers in calls)
-
-
-def _level_calls(block: LevelBlock, found: LevelsFound) -> Iterator[tuple[str, int]]:
-    """Yield each call and how many numbers it compares."""
-    log, stimulus = bool(found.spacing == "log"), block.stimulus
-    about: tuple[Any, ...]
-
-    def rows(table: str, one: Any) -> _Code:
-        return _call("at_standard", _Code(table), found.block, one.participant, one.standard)[0]
-
-    for sensed in found.sensitivities:
-        if sensed.participant is not None and sensed.level is None and sensed.d_prime is not None:
-            judged = rows("judged", sensed)
-            if (condition := sensed.comparison) is not None:
-                judged, _ = _call("of_condition", _Code("judged"), found.block, sensed.participant, condition)
-            about = _what(found, sensed, condition), judged, found.design, sensed.model or ""
-            yield _call("sensitivity", *about, reported=(sensed.d_prime, sensed.criterion))
-    for one in found.settings:
-        if stimulus is None:
-            continue
-        reported = (one.pse, _ends(one))
-        if one.participant is None:
-            own = [stimulus.coordinate(each.pse) for each in found.own_settings if each.standard == one.standard]
-            yield _call("mean_of_settings", _what(found, one), own, log, reported=reported)
-        else:
-            about = _what(found, one), rows("judged", one), log, sum(stimulus.domain) / 2
-            yield _call("settings", *about, reported=(*reported, one.jnd, one.constant_error, one.hysteresis))
-    for mean in (one for one in found.thresholds if one.participant is None):
-        of_standard = [one for one in found.own_thresholds if one.standard == mean.standard]
-        for each in of_standard:
-            if isinstance(block.method, UpDown) and stimulus is not None and each.reversal_mean is not None:
-                chosen = (*stimulus.levels, _Code(block.method.average), log)
-                about = _what(found, each), rows("tracks", each)
-                yield _call("reversals", *about, *chosen, reported=(each.reversal_mean,))
-        thresholds = [one.threshold for one in of_standard]
-        variances = [one.variance or 0.0 for one in of_standard]
-        yield _call(
-            "hartung_knapp", _what(found, mean), thresholds, variances, log, reported=(mean.threshold, _ends(mean))
-        )
-    for group in (one for one in found.exponents if one.participant is None):
-        slopes = [_slope(found, one) for one in found.exponents if one.participant is not None]
-        lines = _Code("c(\n" + ",\n".join(f"  {line}" for line in slopes) + ")")
-        about = f"{found.block}, group", found.exponent_name, lines
-        call, compared = _call("exponents", *about, reported=(group.exponent, _ends(group)))
-        yield call, len(slopes) + compared
-
-
-def _slope(found: LevelsFound, one: ExponentFound) -> str:
-    """Return the call of a participant's exponent, an argument of the group's."""
-    what = f"{found.block}, {one.participant}"
-    if not found.thresholds:
-        rows, _ = _call("at_standard", _Code("judged"), found.block, one.participant, None)
-        return _call("power_law", what, rows, one.exponent)[0]
-    own = [each for each in found.own_thresholds if each.participant == one.participant]
-    own = [each for each in own if (each.standard or 0.0) > 0 and each.threshold > 0]
-    standards = _in_r([each.standard for each in own])
-    jnds = _in_r([each.threshold for each in own]) + (f" * {standards}" if found.level_kind == "weber" else "")
-    return _call("exponent", what, _Code(standards), _Code(jnds), one.exponent)[0]
-
-
-def _what(found: LevelsFound, one: Any, condition: str | None = None) -> str:
-    where = f" at {one.standard:g}" if one.standard is not None else ""
-    return f"{found.block}, {one.participant or 'group'}{where if condition is None else f' with {condition}'}"
-
-
-def _ends(one: ExponentFound | SettingFound | ThresholdFound) -> tuple[float, ...]:
-    return () if one.low is None or one.high is None else (one.low, one.high)
-
-
-def r_script(study: Study, results: Results) -> str:
-    """Return the script."""
-    calls = [line for found in results.blocks if found.n for line in _block_calls(found, results)]
-    of_levels, compared = level_lines(study, results.levels)
-    of_sites = list(_site_calls(results))
-    script = render(
-        "report.R",
-        credits=list(credit_lines(study)),
-        exact=EXACT_UP_TO,
-        table=f"study-{study.name}_description-responses_data.csv",
-        texts=study.protocol_format > 1,
-        calls="\n".join([*calls, *of_levels, *of_sites]),
-        numbers=_count_of_numbers(results) + compared + 2 * len(of_sites),
-    )
-    return f"{script}\n"
-
-
-def _count_of_numbers(results: Results) -> int:
-    """Return how many statistics, p and ends of intervals the report's tests have."""
-    return sum(row[name] is not None for row in tests(results) for name in ("statistic", "p", "low", "high"))
-
-
-def _site_calls(results: Results) -> Iterator[str]:
-    """Yield the calls that compare thresholds between sites."""
-    for one in results.site_thresholds:
-        if one.outcome.statistic is not None and one.outcome.p_chi2 is not None:
-            what = one.block if one.standard is None else f"{one.block} at {one.standard:g}"
-            numbers = (one.outcome.statistic, one.outcome.p_chi2)
-            yield _call("threshold_sites", what, one.thresholds, one.of_sites, *numbers)[0]
-
-
-def _block_calls(found: BlockFound, results: Results) -> Iterator[str]:
-    codes = r_vector([setting.code for setting in found.settings])
-    if found.replicated_ms:
-        by_delay = {setting.delay_ms: setting.code for setting in found.settings}
-        codes += f", {r_vector([by_delay[setting.delay_ms] for setting in found.settings])}"
-    for finding in all_findings():
-        yield from finding(found, results).calls(codes)
+def r_script(study: Study) -> str:
+    """Return the script, which reads the exported tables and tests.csv."""
+    script = resources.files("study_app.analysis.report").joinpath("templates", "report.R").read_text("utf-8")
+    return "".join(f"# {line}\n" for line in credit_lines(study)) + script

@@ -20,9 +20,8 @@ from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import NO_EVIDENCE, Answer, Finding
 from study_app.analysis.findings.statement_tests import OverAll
-from study_app.analysis.levels.results import QuestionFound, ScoreFound
+from study_app.analysis.levels.evaluate import level_section
 from study_app.analysis.planning.power_curves import interval as share_interval
-from study_app.analysis.report import level_sections
 from study_app.analysis.report.html_page import attempted, bullets, drawn, heading, paragraph, render, table, table_of
 from study_app.analysis.report.sentences import none_found, of_levels
 from study_app.analysis.results import (
@@ -30,7 +29,9 @@ from study_app.analysis.results import (
     BlockFound,
     Delivered,
     Failures,
+    QuestionFound,
     Results,
+    ScoreFound,
     SiteThresholds,
     counted,
     lead,
@@ -221,7 +222,7 @@ def question_section(where: str, study: Study, results: Results, drawn_: Sequenc
         yield table(("Answers", *rows[0][1]), [[name, *cells.values()] for name, cells in rows])
         yield from drawn({one.name: one for one in drawn_}, f"question-{where}-{found.item}")
     for one in levels:
-        yield from level_sections.level_section(one, drawn_, study.estimator)
+        yield from level_section(one, drawn_, study.estimator)
 
 
 def _scores(scores: Sequence[ScoreFound]) -> Iterator[str]:

@@ -112,7 +112,7 @@ def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, b
     }
     files: dict[str, bytes] = {}
     for name, make in (
-        ("report.R", lambda: r_script(study, results).encode()),
+        ("report.R", lambda: r_script(study).encode()),
         ("methods.txt", f"{texts['methods']}\n".encode),
         ("tests.csv", lambda: number_files.tests_csv(results)),
         ("motion.csv", lambda: number_files.motion_csv(results)),

@@ -100,17 +100,9 @@ _quadrature: Final = lru_cache(np.polynomial.hermite.hermgauss)
 
 
 def log_likelihood(values: Array, answers: Answers, nodes: int = NODES) -> tuple[float, Array]:
-    """Return the log-likelihood and its gradient.
+    """Return the log-likelihood and its gradient at thresholds θ ascending, β, and, with participants, σ > 0.
 
-    Parameters
-    ----------
-    values : (parameters,) array
-        Thresholds θ ascending, β, and, with participants, σ > 0.
-    answers : Answers
-        What was answered.
-    nodes : int
-        Quadrature nodes a participant; 1 is Laplace's approximation (its gradient is then that of the true integral
-        only roughly).
+    One node is Laplace's approximation (its gradient is then that of the true integral only roughly).
     """
     cuts = answers.cuts
     cut, effects = values[:cuts], values[cuts : cuts + answers.design.shape[1]]

@@ -81,13 +81,7 @@ class Outcome:
 
 
 def checked(values: ArrayLike, axes: str) -> Array:
-    """Return ``values`` as floats, NaN where an answer is missing; ``axes`` names them ("participants, settings").
-
-    Raises
-    ------
-    AnalysisError
-        The number of axes differs, or a value is infinite.
-    """
+    """Return ``values`` as floats, NaN where an answer is missing; ``axes`` names them ("participants, settings")."""
     array = np.asarray(values, dtype=np.float64)
     wanted = axes.count(",") + 1
     if array.ndim != wanted:
@@ -98,13 +92,7 @@ def checked(values: ArrayLike, axes: str) -> Array:
 
 
 def complete(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]:
-    """Return the participants (rows) that answered under all settings (columns), and how many did not.
-
-    Raises
-    ------
-    AnalysisError
-        There are fewer than ``at_least`` settings; ``why`` ends the message.
-    """
+    """Return the participants (rows) that answered under all settings (columns), and how many did not."""
     array = checked(values, "participants, settings")
     if array.shape[1] < at_least:
         raise AnalysisError(f"{array.shape[1]} settings: at least {at_least} are needed{why}")
@@ -127,16 +115,8 @@ def clopper_pearson(count: int, n: int) -> Interval:
 def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike: str) -> tuple[Interval | None, str]:
     """Return the 95 % percentile interval of a statistic over ``n`` participants drawn anew, or why there is none.
 
-    Parameters
-    ----------
-    n : int
-        How many participants there are.
-    seed : int, optional
-        Of the draws; None: no interval.
-    sampled : callable
-        Returns the statistic (draws,) of participants given by their places (draws, n), NaN where there is none.
-    alike : str
-        Why there is no interval where all draws give the same.
+    Without ``seed`` there is no interval. ``sampled`` returns the statistic (draws,) of participants given by their
+    places (draws, n), NaN where there is none; ``alike`` says why there is no interval where all draws give the same.
     """
     if seed is None:
         return None, "no interval: none was asked for"

@@ -527,19 +527,11 @@ class GroupsDiffer(Outcome):
 def groups_differ(
     values: ArrayLike, groups: Sequence[str], *, test: str = "Kruskal-Wallis", draws: int = DRAWS, seed: int = 1
 ) -> GroupsDiffer:
-    """Test whether groups of participants have the same values.
+    """Test whether groups of participants have the same values (participants, k).
 
-    Parameters
-    ----------
-    values : (participants, k) array
-        One value of each, which is ranked here; or several, used as they are. NaN where one is missing: such
-        participants are dropped.
-    groups : sequence of str
-        The group of each participant.
-    test : str
-        What the test is called.
-    draws, seed : int
-        For a drawn p, where going through all allocations would take too long.
+    One value of each is ranked here, several are used as they are. NaN where one is missing: such participants are
+    dropped. ``groups`` has the group of each; ``draws`` and ``seed`` are of a drawn p, where going through all
+    allocations would take too long.
     """
     array = checked(values, "participants, values")
     if len(groups) != len(array):

@@ -79,17 +79,10 @@ class Recognition(Outcome):
 
 
 def named(ratings: ArrayLike) -> Whole:
-    """Return which label each participant named for each setting.
+    """Return the place of the label that each participant named for each setting (participants, settings).
 
-    Parameters
-    ----------
-    ratings : (participants, settings, labels) array
-        Agreement with "this liquid behaves like <label>"; NaN where it is missing.
-
-    Returns
-    -------
-    (participants, settings) array
-        The label's place, ``UNDECIDED`` where several are highest, ``UNANSWERED`` where a rating is missing.
+    ``ratings`` (participants, settings, labels) are agreement with "this liquid behaves like <label>". ``UNDECIDED``
+    where several are highest, ``UNANSWERED`` where a rating is missing.
     """
     array = checked(ratings, "participants, settings, labels")
     missing = np.isnan(array).any(axis=2)
@@ -101,16 +94,8 @@ def named(ratings: ArrayLike) -> Whole:
 def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, seed: int | None = 1) -> Recognition:
     """Test whether settings were named for what they were, more often than by chance.
 
-    Parameters
-    ----------
-    names : (participants, settings) array
-        As ``named`` gives them.
-    truth : sequence
-        The right label's place for each setting; None where there is no label for it.
-    labels : int
-        How many labels there were to choose from.
-    seed : int, optional
-        For the bootstrap interval of kappa, from ten participants; None: no interval.
+    ``names`` (participants, settings) are of `named`, ``truth`` the place of the right one of so many ``labels`` for
+    each setting, None where there is none; ``seed`` is of the bootstrap interval of kappa, from ten participants.
     """
     given = _names(names, truth, labels)
     used = (given != UNANSWERED).any(axis=1)

@@ -249,18 +249,10 @@ def _open(lower: float | None, upper: float | None) -> str:
 
 
 def p_of_rise(yes: Array, asked: Array, levels: Array, seed: int, alpha: float) -> float:
-    """Return p that the share of yes answers rises with the level.
+    """Return p that the share of ``yes`` of ``asked`` answers (participants, levels) rises with the level, ascending.
 
-    Parameters
-    ----------
-    yes, asked : (participants, levels) arrays
-        Counts; one row where answers are independent.
-    levels : (levels,) array
-        Ascending.
-    seed : int
-        Of the rearrangements.
-    alpha : float
-        So many rearrangements are drawn that their number does not decide whether p reaches it.
+    One row where answers are independent. So many rearrangements are drawn that their number does not decide whether p
+    reaches ``alpha``.
     """
     slope, no = _curves(tuple(levels.tolist()))
     flat = no @ asked.sum(axis=0)
@@ -302,12 +294,7 @@ WORST: Final = 0.05
 def deviances(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> Array:
     """Return twice the log-likelihood ratio of the saturated model to the function, of each level.
 
-    Parameters
-    ----------
-    successes, n : array
-        Successes and answers at each level, shape (…, k).
-    expected : (k,) array
-        The function's shares, strictly between 0 and 1.
+    ``successes`` of ``n`` answers have shape (…, k), the function's shares (k,) lie strictly between 0 and 1.
     """
     y, m, psi = np.asarray(successes, float), np.asarray(n, float), np.asarray(expected, float)
     found = 2.0 * (xlogy(y, y / (m * psi)) + xlogy(m - y, (m - y) / (m * (1.0 - psi))))
@@ -315,13 +302,7 @@ def deviances(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> Array:
 
 
 def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
-    """Return the share of simulated sets of answers whose deviance is no smaller: (1 + #{D* ≥ D})/1000.
-
-    Parameters
-    ----------
-    successes, n, expected : (k,) array
-        As of `deviances`; the sets are binomial, with a fixed seed.
-    """
+    """Return the share of simulated sets of answers (k,) whose deviance is no smaller: (1 + #{D* ≥ D})/1000."""
     draw = np.random.default_rng(SEED)
     drawn = draw.binomial(np.asarray(n, np.int64), np.asarray(expected, float), (SETS, np.size(expected)))
     simulated = deviances(drawn, n, expected).sum(axis=-1)
@@ -332,12 +313,7 @@ def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
 def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:
     """Return the correlation of trial number and deviance residual; None where either does not vary.
 
-    Parameters
-    ----------
-    successes : (n,) array of bool
-        The answers in the order of the trials.
-    expected : (n,) array
-        The function's share at the level of each.
+    ``successes`` (n,) are in the order of the trials, ``expected`` the function's share at the level of each.
     """
     y, psi = np.asarray(successes, float), np.asarray(expected, float)
     residuals = np.sign(y - psi) * np.sqrt(deviances(y, np.ones_like(y), psi))
@@ -415,13 +391,7 @@ class GroupMean:
 
 
 def group_mean(estimates: Sequence[float], variances: Sequence[float]) -> GroupMean:
-    """Return the random-effects mean of estimates, shape (n,), with their variances, each above zero.
-
-    Raises
-    ------
-    ValueError
-        There is no estimate.
-    """
+    """Return the random-effects mean of estimates, shape (n,), with their variances, each above zero."""
     y, v = np.asarray(estimates, float), np.asarray(variances, float)
     n = len(y)
     if n == 0:

@@ -119,19 +119,8 @@ def step_down(
     """Drop the longest delay as long as a trend is shown over those that are left.
 
     The order of the tests is fixed and the first that fails ends them, so ``alpha`` holds for all of them together
-    (Tamhane, Hochberg & Dunnett 1996, Biometrics 52, 21–37). Participants who miss any answer are dropped from
-    all steps.
-
-    Parameters
-    ----------
-    values : (participants, delays) array
-        In the order of ``delays_ms``.
-    delays_ms : sequence of float
-        Ascending; the first is the control.
-    direction : "increasing" | "decreasing"
-        Where answers go as the delay grows.
-    alpha : float
-        Level of every step.
+    (Tamhane, Hochberg & Dunnett 1996, Biometrics 52, 21–37). ``values`` (participants, delays) are in the order of
+    ``delays_ms``, which ascend from the control. Participants who miss any answer are dropped from all steps.
     """
     array = checked(values, "participants, delays")
     if len(delays_ms) != array.shape[1] or any(a >= b for a, b in pairwise(delays_ms)):

@@ -21,9 +21,8 @@ from scipy.stats import binomtest
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import Array
 from study_app.analysis.evaluate import found_in
-from study_app.analysis.findings.block_tests import Asked, of_tables
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, common_ms
-from study_app.analysis.findings.finding import FOUND
+from study_app.analysis.findings.finding import FOUND, Asked, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, OverAll, Pairs, SettingsDiffer, over_all
 from study_app.analysis.planning.power_curves import interval

@@ -13,8 +13,7 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis.data.blocks import LevelBlock
-from study_app.analysis.levels.results import ThresholdFound
-from study_app.analysis.levels.thresholds import jnd_slope, thresholds
+from study_app.analysis.levels.thresholds import ThresholdFound, jnd_slope, thresholds
 from study_app.analysis.planning.power_curves import interval as wilson_interval
 from study_app.evidence.table import Evidence, Table
 from study_app.protocol.blocks import Block

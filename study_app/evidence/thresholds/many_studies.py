@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.analysis.data.study_tables import Study, load_study
-from study_app.analysis.levels.thresholds import estimated_exponents, thresholds, tracks
+from study_app.analysis.levels.thresholds import estimated_exponents, thresholds
+from study_app.analysis.levels.tracks import tracks
 from study_app.evidence.table import run
 from study_app.evidence.thresholds.estimated_exponents import (
     KnownExponent,

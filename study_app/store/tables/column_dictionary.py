@@ -8,16 +8,7 @@ from collections.abc import Sequence
 
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.recordings import FRAMES, SAMPLES
-from study_app.store.tables.columns import (
-    EXCLUSIONS,
-    INTERVALS,
-    LEVEL_TABLES,
-    PARTICIPANTS,
-    RESPONSES,
-    RESPONSES_2,
-    TRIALS,
-    TRIALS_2,
-)
+from study_app.store.tables.columns import EXCLUSIONS, INTERVALS, PARTICIPANTS, RESPONSES, RESPONSES_2, TRIALS, TRIALS_2
 from study_app.store.tables.csv_files import Column
 
 SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
@@ -42,10 +33,6 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
         "what differs in trials if the protocol has format 2; participants have the group, too",
         tuple(column for column in TRIALS_2 if column not in TRIALS),
     ),
-    *(
-        (name.capitalize(), f"study-…_description-{name}_data.csv", row, columns)
-        for name, (row, columns) in LEVEL_TABLES.items()
-    ),
     ("Exclusions", "exclusions.csv", "one row per excluded session or trial", EXCLUSIONS),
     ("Samples", "recordings/trial-….parquet", "one row per tick of the servo", SAMPLES),
     ("Frames", "recordings/trial-…_frames.parquet", "one row per frame shown", FRAMES),
@@ -55,10 +42,11 @@ SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
 
 def dictionary_markdown() -> str:
     """Return every file's columns, and the journal's events, as Markdown: a heading and a table for each."""
-    return "\n".join((*(_table(*section) for section in SECTIONS), _journal()))
+    return "\n".join((*(table_markdown(*section) for section in SECTIONS), _journal()))
 
 
-def _table(title: str, file: str, row: str, columns: Sequence[Column]) -> str:
+def table_markdown(title: str, file: str, row: str, columns: Sequence[Column]) -> str:
+    """Return a heading, what a row is, and a table of the columns."""
     rows = [
         f"| `{column.name}` | {column.permitted}{f' [{column.unit}]' if column.unit else ''} | "
         f"{column.variable['description']}{' **Sealed until unblinding.**' if column.sealed else ''} |"

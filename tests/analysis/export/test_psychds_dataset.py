@@ -79,7 +79,9 @@ def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path,
     assert (folder / "results" / "report.html").is_file()
     assert not [path for path in (folder / "results").iterdir() if path.name.endswith("_data.csv")]
     if rscript := shutil.which("Rscript"):
-        ran = subprocess.run([rscript, "analysis/report.R", "data"], cwd=folder, check=False, capture_output=True)
+        ran = subprocess.run(
+            [rscript, "analysis/report.R", "data", "results"], cwd=folder, check=False, capture_output=True
+        )
         assert ran.returncode == 0, ran.stdout
         assert b"every number that R computes is the report's" in ran.stdout
 

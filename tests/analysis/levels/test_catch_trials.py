@@ -11,9 +11,11 @@ import pytest
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.page_layout import Picture
-from study_app.analysis.levels.results import LevelsFound
-from study_app.analysis.levels.summaries import levels_found
-from study_app.analysis.levels.thresholds import TRACK, answers_of, tracks
+from study_app.analysis.levels.answers import Answers, of_group
+from study_app.analysis.levels.evaluate import levels_found
+from study_app.analysis.levels.thresholds import Thresholds
+from study_app.analysis.levels.tracks import TRACK, answers_of, tracks
+from study_app.analysis.results import LevelsFound
 
 pytestmark = pytest.mark.slow
 
@@ -60,11 +62,11 @@ def test_answers_to_catch_trials_are_apart_from_those_at_their_level(
     staircase: LevelsFound, opened: pd.DataFrame
 ) -> None:
     own = opened[(opened["block"] == "staircase") & (opened["participant"] == "P001") & (opened["standard"] == 4)]
-    shown = [one for one in staircase.answers if one.participant == "P001" and one.standard == 4]
+    shown = [one for one in Answers.of(staircase) if one.participant == "P001" and one.standard == 4]
     assert sum(one.n for one in shown if one.catch) == own["catch"].astype(bool).sum()
     assert sum(one.n for one in shown) == len(own)
     assert {one.level for one in shown if one.catch} == {0.6}
-    assert not any(one.catch for one in staircase.of_group)
+    assert not any(one.catch for one in of_group(staircase))
 
 
 def test_figures_mark_catch_trials_by_crosses(study: Study, staircase: LevelsFound, opened: pd.DataFrame) -> None:
@@ -75,7 +77,7 @@ def test_figures_mark_catch_trials_by_crosses(study: Study, staircase: LevelsFou
     assert "× and +: catch trials, answered correctly and not." in tracks_drawn.caption
     assert _crosses(tracks_drawn) == caught.sum()
     assert "crosses: catch trials" in levels_drawn.caption
-    assert _crosses(levels_drawn) == len({(one.participant, one.standard) for one in staircase.own_thresholds})
+    assert _crosses(levels_drawn) == len({(one.participant, one.standard) for one in Thresholds.own(staircase)})
 
 
 def _crosses(picture: Picture) -> int:

@@ -8,8 +8,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study_app.analysis.levels.results import ThresholdFound
-from study_app.analysis.levels.thresholds import estimated_exponents, weber_exponents
+from study_app.analysis.levels.thresholds import ThresholdFound, estimated_exponents, weber_exponents
 from tests.analysis.levels.level_studies import block
 
 LEVELS = (0.5, 2.0, 8.0)

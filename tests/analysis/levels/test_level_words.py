@@ -5,8 +5,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from study_app.analysis.levels.results import CatchAnswers, LevelConduct
-from study_app.analysis.levels.summaries import catch_answers, level_conduct
+from study_app.analysis.levels.conduct import catch_answers, level_conduct
 from tests.analysis.levels.level_studies import block
 
 TRIALS = [  # participant, session, trial, standard, level, level_delivered, analysed, catch, right
@@ -41,22 +40,21 @@ def intervals() -> pd.DataFrame:
 
 def test_conduct_is_that_of_the_trials_that_are_analysed(opened: pd.DataFrame, intervals: pd.DataFrame) -> None:
     (found,) = level_conduct(block(), opened, intervals)
-    assert found == LevelConduct(
-        standard=8.0,
-        trials=4,
-        repeated=2,
-        reasons={"level_error_percent": 1, "pace_error_percent": 2},
-        measured=3,
-        error_mean=pytest.approx((0.01 - 0.02) / 3),
-        error_largest=pytest.approx(0.02),
-        pace_mps=pytest.approx(0.09),
-        apparent_mass_kg=pytest.approx(-0.02),
-    )
+    assert found == {
+        "standard": 8.0,
+        "trials": 4,
+        "repeated": 2,
+        "reasons": {"level_error_percent": 1, "pace_error_percent": 2},
+        "measured": 3,
+        "error_mean": pytest.approx((0.01 - 0.02) / 3),
+        "error_largest": pytest.approx(0.02),
+        "pace_mps": pytest.approx(0.09),
+        "apparent_mass_kg": pytest.approx(-0.02),
+    }
 
 
 def test_catch_trials_are_counted_where_they_exclude_a_session_too(opened: pd.DataFrame) -> None:
     assert list(catch_answers(block(), opened)) == []
     kept, excluded = catch_answers(replace(block(), wrong_most=0.5), opened)
-    assert kept == CatchAnswers("P001", 1, 2, 1, 0.5)
-    assert excluded == CatchAnswers("P002", 1, 1, 1, 0.5)
-    assert (kept.excludes, excluded.excludes) == (False, True)
+    assert kept == {"participant": "P001", "session": 1, "n": 2, "wrong": 1, "most": 0.5}
+    assert excluded == {"participant": "P002", "session": 1, "n": 1, "wrong": 1, "most": 0.5}

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.blocks import LevelBlock, Setting
-from study_app.analysis.levels.summaries import levels_found
+from study_app.analysis.levels.evaluate import levels_found
 from study_app.protocol.trials.designs import Rated
 from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import Stimulus

@@ -11,23 +11,11 @@ import pytest
 from study_app import figure_style
 from study_app.analysis.data.blocks import LevelBlock, OwnDynamics, PublishedValue
 from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.levels.results import (
-    CatchAnswers,
-    ExponentFound,
-    GroupAnswers,
-    LevelAnswers,
-    LevelConduct,
-    LevelsFound,
-    LevelTimes,
-    SensitivityFound,
-    SettingFound,
-    ThresholdFound,
-    WithheldForce,
-)
-from study_app.analysis.report import level_sections
-from study_app.analysis.report.number_files import level_lines
-from study_app.analysis.report.sentences import level_findings, level_limits, level_methods
-from study_app.analysis.results import Failures
+from study_app.analysis.levels.answers import Answers, LevelAnswers, SettingFound
+from study_app.analysis.levels.evaluate import level_findings, level_limits, level_methods, level_section
+from study_app.analysis.levels.sensitivities import SensitivityFound
+from study_app.analysis.levels.thresholds import ExponentFound, ThresholdFound, Thresholds
+from study_app.analysis.results import Failures, GroupAnswers, LevelsFound
 from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.methods import Constant, QuestPlus, UpDown
 from study_app.protocol.trials.stimuli import Stimulus
@@ -109,10 +97,13 @@ def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
             some(float(rng.normal())), some("differencing"), some(around(1.0)),
         )  # fmt: skip
 
-    def run(standard: float | None) -> LevelConduct:
+    def run(standard: float | None) -> dict[str, Any]:
         reasons = {"pace_error_percent": 2, "slip": 1} if rng.random() < 0.5 else {}
         numbers = int(rng.integers(1, 99)), int(rng.integers(0, 9)), reasons, int(rng.integers(0, 3))
-        return LevelConduct(standard, *numbers, some(-0.01), some(0.03), some(0.1), some(0.02))
+        names = ("standard", "trials", "repeated", "reasons", "measured", "error_mean", "error_largest", "pace_mps")
+        names += ("apparent_mass_kg",)
+        values = standard, *numbers, some(-0.01), some(0.03), some(0.1), some(0.02)
+        return dict(zip(names, values, strict=True))
 
     def exponent(person: str | None) -> ExponentFound:
         low, high = some((0.4, 1.2)) or (None, None)
@@ -138,33 +129,41 @@ def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
         "vary": vary, "quantity": quantity, "unit": unit, "level_kind": kind, "spacing": rng.choice(["log", "linear"]),
         "guess_rate": some(0.5) if share else None, "bounds": (1.0, 7.0) if summary == "mean" else None,
         "own_units": summary == "geometric mean" and bool(rng.random() < 0.5),
+    }  # fmt: skip
+    rows: dict[str, Any] = {
         "thresholds": tuple(threshold(*one) for one in where) if estimated else (),
         "exponents": tuple(map(exponent, whom)) if estimated or summary == "geometric mean" else (),
         "sensitivities": tuple(sensed(*one) for one in where) if share and rng.random() < 0.7 else (),
         "level_times": tuple(
-            LevelTimes(standard, level, level * 1.2, int(rng.integers(0, 9)), some(around(1.0)), 3, some(around(2.0)))
+            {"standard": standard, "low": level, "high": level * 1.2, "right_n": int(rng.integers(0, 9)),
+             "right_s": some(around(1.0)), "wrong_n": 3, "wrong_s": some(around(2.0))}
             for standard in standards for level in levels
         ),
         "withheld": tuple(
-            WithheldForce(standard, level, level, 4, float(most) / 3, float(most))
+            {"standard": standard, "low": level, "high": level, "n": 4, "mean_percent": float(most) / 3,
+             "most_percent": float(most)}
             for standard in standards for level, most in zip(levels, rng.choice([0, 2, 9.0], len(levels)), strict=True)
         ) if vary == "delay_ms" else (),
         "conduct": tuple(map(run, standards)) if rng.random() < 0.8 else (),
-        "catches": tuple(CatchAnswers(one, 1, 8, int(rng.integers(0, 9)), 0.5) for one in people) if catches else (),
+        "catches": tuple(
+            {"participant": one, "session": 1, "n": 8, "wrong": int(rng.integers(0, 9)), "most": 0.5} for one in people
+        ) if catches else (),
+    }  # fmt: skip
+    more |= {
         "family": some(str(rng.choice(["weibull", "normal", "logistic"])), 0.99) if estimated else None,
         "adaptive": bool(estimated and rng.random() < 0.3),
         "published": (published,) if percent or rng.random() < 0.4 else (),
         "device": some(OwnDynamics(2.0, 0.1, 0.25, 3, int(rng.integers(3, 5))), 0.6),
     }  # fmt: skip
     if summary == "settings":
-        more["settings"] = tuple(set_by(*one) for one in where)
+        rows["settings"] = tuple(set_by(*one) for one in where)
     else:
-        more["answers"] = tuple(
+        rows["answers"] = tuple(
             answered(person, standard, level, catch)
             for standard in standards for level in levels for catch in ((False, True) if catches else (False,))
             for person in whom if person is None or rng.random() < 0.9
         )  # fmt: skip
-    return _block(design, vary, ends, standards, number), replace(found, **more)
+    return _block(design, vary, ends, standards, number), replace(found, **more, statistics=rows)
 
 
 def _block(design: str, vary: str, ends: Any, standards: list[Any], number: int) -> LevelBlock:
@@ -180,17 +179,17 @@ def lines_of(number: int) -> Iterator[str]:
     around = study(delays([0, 50]), list(everybody(delays([0, 50]), 3, lambda *_: 4)))
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(figure_style, "file_bytes", stub_png)
-        drawable = not found.own_thresholds or (len({one.standard for one in found.answers}) > 1 and not found.adaptive)
+        drawable = not Thresholds.own(found) or (
+            len({one.standard for one in Answers.of(found)}) > 1 and not found.adaptive
+        )
         pictures = list(level_pictures(around, [found], ("png",), failures)) if drawable else []
     assert not failures.found, str(failures.found)
     for picture in pictures:
         yield from (picture.name, picture.caption, *figure_of(picture.files["png"]))
-    yield from page_lines("".join(level_sections.level_section(found, pictures, ("kalman", None)[number % 2])))
+    yield from page_lines("".join(level_section(found, pictures, ("kalman", None)[number % 2])))
     yield from level_findings(found)
     yield from level_limits(found)
     yield from level_methods([made], [found])
-    script, compared = level_lines(replace(around, levels=(made,)), [found])
-    yield from (*script[1:], f"numbers compared: {compared}")
 
 
 @pytest.mark.parametrize("part", [0, pytest.param(4, marks=pytest.mark.slow)])

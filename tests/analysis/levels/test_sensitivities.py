@@ -8,8 +8,7 @@ import pytest
 from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
-from study_app.analysis.levels.results import SensitivityFound
-from study_app.analysis.levels.summaries import sensitivities
+from study_app.analysis.levels.sensitivities import SensitivityFound, sensitivities
 from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import Stimulus

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.blocks import LevelBlock
-from study_app.analysis.levels.summaries import settings
+from study_app.analysis.levels.answers import settings
 from study_app.analysis.report.write_report import report
 from study_app.protocol.trials.designs import Adjusted
 from study_app.protocol.trials.methods import default_method
@@ -94,8 +94,8 @@ def test_r_computes_the_same_settings(reported: Path) -> None:
     *_, counts, verdict = done.stdout.splitlines()
     assert verdict == "every number that R computes is the report's"
     found, of = re.findall(r"\d+", counts)
-    assert found == of == "21"  # three people: PSE, two ends, JND, error, hysteresis; the group's PSE and ends
-    assert "matching, P002 at 6 hysteresis" in done.stdout
+    assert found == of == "18"  # three people: PSE, two ends, JND, error, hysteresis
+    assert "matching, P002 at 6.0: hysteresis" in done.stdout
 
 
 def test_before_unblinding_there_are_steps_and_no_level(sealed: Path, tmp_path: Path) -> None:

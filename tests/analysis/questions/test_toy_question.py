@@ -14,8 +14,8 @@ from study_app.analysis.data.questions import Measure, counts_of_missing
 from study_app.analysis.figures import question_figures
 from study_app.analysis.figures.page_layout import Look, Sheet
 from study_app.analysis.figures.question_figures import QuestionFigure, rows
-from study_app.analysis.levels.results import QuestionFound
 from study_app.analysis.report.write_report import report
+from study_app.analysis.results import QuestionFound
 from study_app.gui.participant import questions as fields
 from study_app.gui.participant.forms.question_field import QuestionField
 from study_app.gui.participant.window import ParticipantWindow

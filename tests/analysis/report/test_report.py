@@ -107,26 +107,29 @@ def test_r_computes_the_same_numbers(of_twelve: Path) -> None:
     computed = {found[1]: float(found[3]) for line in lines if (found := told.match(line))}
     liquids, delays = numbers(of_twelve)["results"]["blocks"]
     for one in liquids["omnibus"]:
-        assert computed[f"{one['item']} Friedman chi2"] == pytest.approx(one["outcome"]["statistic"], rel=1e-5)
-    for pair in liquids["pairs"]:
-        outcome, codes = pair["tested"]["outcome"], f"{pair['first']} and {pair['second']}"
-        assert computed[f"{pair['tested']['item']}, {codes} exact p"] == pytest.approx(outcome["p"], rel=1e-5)
+        what = f"liquids {one['item']}, settings differ: Friedman chi2"
+        assert computed[what] == pytest.approx(one["outcome"]["statistic"], rel=1e-5)
     for one in delays["trends"]:
-        assert computed[f"{one['item']} Page's L"] == pytest.approx(one["outcome"]["statistic"], rel=1e-5)
-        assert computed[f"{one['item']} exact p"] == pytest.approx(one["outcome"]["p"], rel=1e-5)
+        what = f"delays {one['item']}, answers follow the delay:"
+        assert computed[f"{what} Page's L"] == pytest.approx(one["outcome"]["statistic"], rel=1e-5)
+        assert computed[f"{what} exact p"] == pytest.approx(one["outcome"]["p"], rel=1e-5)
     for one in delays["against"]:
-        what = f"{one['item']}, {one['delay_ms']:g} ms"
-        assert computed[f"{what} equivalence p"] == pytest.approx(one["found"]["p"], rel=1e-5)
-        assert computed[f"{what} difference p by t"] == pytest.approx(one["found"]["p_different"], rel=1e-5)
-    assert computed["liquids right names"] == liquids["named"]["found"]["statistic"]
+        what = f"delays {one['item']} ({one['delay_ms']:g} ms − 0 ms)"
+        assert computed[f"{what}, a delay is equivalent: equivalence p"] == pytest.approx(one["found"]["p"], rel=1e-5)
+        p = max(one["found"]["p_different"], one["found"]["p_different_ranks"])
+        assert computed[f"{what}, a delay differs: difference p"] == pytest.approx(p, rel=1e-5)
+    pairs = [name for name in computed if name.endswith("two settings differ: p")]
+    assert len(pairs) == len(liquids["pairs"]) > 0
 
 
 def test_r_finds_a_number_that_was_changed(of_twelve: Path, tmp_path: Path) -> None:
-    for name in ("report.R", "study-rek2024_description-responses_data.csv"):
+    for name in ("report.R", "tests.csv", "study-rek2024_description-responses_data.csv"):
         shutil.copy(of_twelve / name, tmp_path)
     one = numbers(of_twelve)["results"]["blocks"][1]["trends"][0]["outcome"]
-    script = (tmp_path / "report.R").read_text(encoding="utf-8")
-    (tmp_path / "report.R").write_text(script.replace(repr(one["statistic"]), repr(one["statistic"] + 1)))
+    tests = (tmp_path / "tests.csv").read_text(encoding="utf-8")
+    changed = tests.replace(f",L,{one['statistic']!r},", f",L,{one['statistic'] + 1!r},", 1)
+    assert changed != tests
+    (tmp_path / "tests.csv").write_text(changed, encoding="utf-8")
     done = run_in_r(tmp_path)
     assert done.returncode == 1
     assert done.stdout.count("DIFFERS") == 1
@@ -148,4 +151,4 @@ def test_r_compares_sessions(sessions: int, rek: Results, tmp_path: Path) -> Non
     tested = [one for block in blocks for one in block["by_session"] if one["outcome"]["statistic"] is not None]
     assert len(tested) == 14
     assert {one["outcome"]["n"] for one in tested} == {6}
-    assert done.stdout.count(", sessions " + ("Wilcoxon V" if sessions == 2 else "Friedman chi2")) == len(tested)
+    assert done.stdout.count("sessions differ: " + ("Wilcoxon V" if sessions == 2 else "Friedman chi2")) == len(tested)

@@ -18,8 +18,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 TESTS = {
     "data.study_tables.Study.aggregate": ("liquids", "measures of settings"),
-    "findings.block_tests.presented": ("delays", "counts of answers"),
-    "findings.block_tests.session_numbers": ("delays", "numbers of sessions"),
+    "findings.finding.presented": ("delays", "counts of answers"),
+    "findings.finding.session_numbers": ("delays", "numbers of sessions"),
     "findings.statement_tests.friedman": ("liquids", "test of settings"),
     "findings.statement_tests.global_permutation": ("liquids", "test over all statements"),
     "findings.recognition.recognition": ("liquids", "test of recognition"),

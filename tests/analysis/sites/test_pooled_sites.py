@@ -12,10 +12,10 @@ from study_app.analysis.data.study_tables import Study, load_study, pooled
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.export import export
 from study_app.analysis.findings.statement_tests import SitesDiffer
-from study_app.analysis.levels.results import LevelsFound, ThresholdFound
-from study_app.analysis.levels.thresholds import site_thresholds
+from study_app.analysis.levels.thresholds import ThresholdFound, site_thresholds
 from study_app.analysis.planning.preregistration import FILE, Commitment, deviations, written
 from study_app.analysis.report.write_report import report
+from study_app.analysis.results import LevelsFound
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind, unblind_folder
@@ -146,12 +146,12 @@ def test_the_report_compares_sites_and_r_agrees(opened: Path, tmp_path: Path) ->
         assert len(block["by_site"]["level"]) == len(block["by_site"]["profile"]) == len(block["items"])
     done = run_in_r(tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.count("sites, level H") == sum(
+    assert done.stdout.count("sites differ: H") == sum(
         one["outcome"]["statistic"] is not None
         for block in held["results"]["blocks"]
         for one in block["by_site"]["level"]
     )
-    assert "sites, profile H" in done.stdout
+    assert "interaction of setting and site: H" in done.stdout
 
 
 def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(opened: Path, tmp_path: Path) -> None:
@@ -218,15 +218,17 @@ def test_thresholds_are_compared_between_sites_at_each_standard() -> None:
         (),
         "share",
         "correct",
-        thresholds=tuple(
-            ThresholdFound(person, standard, 20, threshold, None, None)
-            for standard, higher in ((1.0, 0.0), (2.0, 5.0))
-            for person, threshold in (
-                (None, 3.0),
-                *((f"A-P{number}", 1.0 + number / 10) for number in range(5)),
-                *((f"B-P{number}", 1.05 + higher + number / 10) for number in range(5)),
+        statistics={
+            "thresholds": tuple(
+                ThresholdFound(person, standard, 20, threshold, None, None)
+                for standard, higher in ((1.0, 0.0), (2.0, 5.0))
+                for person, threshold in (
+                    (None, 3.0),
+                    *((f"A-P{number}", 1.0 + number / 10) for number in range(5)),
+                    *((f"B-P{number}", 1.05 + higher + number / 10) for number in range(5)),
+                )
             )
-        ),
+        },
     )
     both = pooled_of(study(delays([0]), []), study(delays([0]), []))
     first, second = site_thresholds(both, [found], 1)
@@ -261,9 +263,6 @@ def test_a_merged_study_of_levels_is_reported_sealed_and_opened(tmp_path: Path) 
     assert "Median by site" in read(tmp_path / "opened")
     held = numbers(tmp_path / "opened")["results"]
     assert [one["standard"] for one in held["site_thresholds"] if one["block"] == "staircase"] == [4.0, 8.0]
-    done = run_in_r(tmp_path / "opened")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "staircase at 8 thresholds by site, H" in done.stdout
 
 
 def site_folders(root: Path) -> list[Path]:

@@ -3,8 +3,8 @@
 import pytest
 
 from study_app.analysis.evaluate import found_in
-from study_app.analysis.findings.block_tests import of_tables
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
+from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer

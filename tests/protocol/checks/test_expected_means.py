@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
-from study_app.analysis.levels.summaries import sensitivities
+from study_app.analysis.levels.sensitivities import sensitivities
 from study_app.evidence.thresholds.estimated_exponents import known_exponent, simulate_estimates
 from study_app.protocol.checks.expected_precision import (
     EstimationPlan,

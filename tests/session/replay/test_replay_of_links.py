@@ -7,9 +7,9 @@ import pytest
 
 from study_app.analysis.data.blocks import setting_name
 from study_app.analysis.data.study_tables import load_study
-from study_app.analysis.levels.summaries import levels_found
+from study_app.analysis.levels.conduct import Withheld
+from study_app.analysis.levels.evaluate import levels_found
 from study_app.analysis.levels.thresholds import tracks
-from study_app.analysis.report.level_sections import withheld
 from study_app.protocol.load import parse
 from study_app.protocol.trials.presentation import presented_by
 from study_app.session import replay as replay_module
@@ -118,11 +118,11 @@ def test_the_analysis_finds_delivered_delays_and_what_safety_withheld(rehearsed:
     assert sorted(rows["level"]) == [20, 80]
     assert (rows["level_delivered"] - rows["level"]).abs().max() < 1.5
     pairs, named = levels_found(study)
-    assert [(one.low, one.n) for one in pairs.withheld] == [(20, 1), (80, 1)]
-    assert all(0 <= one.mean_percent <= one.most_percent < 5 for one in pairs.withheld)
-    assert "Force withheld by safety" in "".join(withheld(pairs))
-    assert named.withheld == ()
-    assert "".join(withheld(named)) == ""
+    assert [(one["low"], one["n"]) for one in Withheld.of(pairs)] == [(20, 1), (80, 1)]
+    assert all(0 <= one["mean_percent"] <= one["most_percent"] < 5 for one in Withheld.of(pairs))
+    assert "Force withheld by safety" in "".join(Withheld(pairs).section())
+    assert Withheld.of(named) == ()
+    assert "".join(Withheld(named).section()) == ""
     (block,) = (one for one in study.levels if one.id == "named")
     names = {one.condition: setting_name(one, block.settings) for one in block.settings}
     assert names == {"water": "Water, force 15 ms late, 20 % of forces lost"}

@@ -1,24 +1,25 @@
-{% for line in credits %}
-# {{ line }}
-{% endfor %}
-# Computes the main numbers of report.html again, in base R (4.0 or newer, no packages), from the tables next to this
-# file or in the folder that is named, and says where they differ:  Rscript report.R [FOLDER]   (exit code 1 if any
-# does, or if there is nothing to compare)
-# The exact p of trends and of pairs come from all rearrangements, up to {{ exact }} participants; beyond that, and for
-# Friedman's test, the approximate p are compared.
+# Computes the main numbers of the report again, in base R (4.0 or newer, no packages), and says where they differ:
+#   Rscript report.R [TABLES [TESTS]]   the folders of the exported tables and of tests.csv; default: this one
+# Exit code 1 if any number differs, or if there is nothing to compare. Exact p of trends and of pairs come from all
+# rearrangements; of Friedman's test only an approximate p is compared, and no p that was drawn at random.
 
-folder <- c(commandArgs(trailingOnly = TRUE), ".")[1]
-answers <- read.csv(file.path(folder, "{{ table }}"), colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
+folders <- c(commandArgs(trailingOnly = TRUE), ".", ".")
+folders <- if (length(folders) == 3) folders[c(1, 1)] else folders[1:2]
+csv <- function(file) read.csv(file, colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
+exported <- function(name) {
+  file <- list.files(folders[1], paste0("_description-", name, "_data\\.csv$"), full.names = TRUE)
+  if (length(file) == 1) csv(file) else NULL
+}
+number <- function(texts) suppressWarnings(as.numeric(texts))  # answers to other questions may be texts
+answers <- exported("responses")
 answers <- answers[answers$counted == "true", ]
-{% if texts %}
-answers$response <- suppressWarnings(as.numeric(answers$response))  # answers to other questions may be texts
-{% else %}
-answers$response <- as.numeric(answers$response)
-{% endif %}
-differing <- 0
-compared <- 0
+answers$response <- number(answers$response)
+tests <- csv(file.path(folders[2], "tests.csv"))
+differing <- compared <- 0
 
 same <- function(what, reported, computed) {
+  reported <- number(reported)
+  if (is.na(reported)) return(invisible())
   ok <- isTRUE(all.equal(reported, computed, tolerance = 1e-6, check.attributes = FALSE))
   compared <<- compared + 1
   if (!ok) differing <<- differing + 1
@@ -39,95 +40,159 @@ orders <- function(k) if (k == 1) matrix(1) else {
   do.call(rbind, lapply(seq_len(k), function(place) cbind(place, ifelse(less >= place, less + 1, less))))
 }
 
-# One row a participant, one column a setting; a participant's repeated answers count by their median.
-# Codes with one name in columns are presentations of one setting.
-wide <- function(block, item, codes, columns = codes) {
-  rows <- answers[answers$block == block & answers$item == item, ]
-  tapply(rows$response, list(rows$participant, factor(rows$code, codes, columns)), median, na.rm = TRUE)
+# One row a participant, one column a setting ("L1 L2", or "D1+D4 D2" where two codes present one delay); a
+# participant's repeated answers count by their median. Of sessions: one column a session, medians over the settings
+# that a participant answered in all of them.
+wide <- function(block, item, codes, by_session = FALSE) {
+  codes <- strsplit(codes, " ")[[1]]
+  columns <- rep(codes, lengths(strsplit(codes, "+", fixed = TRUE)))
+  names(columns) <- unlist(strsplit(codes, "+", fixed = TRUE))
+  rows <- answers[answers$block == block & answers$item == item & !is.na(answers$response), ]
+  settings <- factor(columns[rows$code], codes)
+  if (!by_session) return(tapply(rows$response, list(rows$participant, settings), median))
+  sessions <- factor(rows$session, unique(sort(answers$session[answers$block == block])))
+  cells <- tapply(rows$response, list(rows$participant, settings, sessions), median)
+  common <- apply(!is.na(cells), c(1, 2), all)
+  t(sapply(seq_len(nrow(cells)), function(person)
+    apply(matrix(cells[person, common[person, ], ], ncol = nlevels(sessions)), 2, median)))
 }
 whole <- function(table) table[complete.cases(table), , drop = FALSE]
 
-friedman <- function(what, table, chi2, p) {
+friedman <- function(what, table, row) {
   found <- suppressWarnings(friedman.test(whole(table)))
-  same(paste(what, "Friedman chi2"), chi2, unname(found$statistic))
-  same(paste(what, "p by chi2"), p, found$p.value)
+  same(paste(what, "Friedman chi2"), row$statistic, unname(found$statistic))
+  if (startsWith(row$method, "chi-square")) same(paste(what, "p by chi2"), row$p, found$p.value)
 }
-page <- function(what, table, falling, L, p) {
-  x <- whole(table); if (falling) x <- -x
+page <- function(what, table, row) {
+  x <- whole(table); if (grepl("decreasing", row$method)) x <- -x
   ranks <- t(apply(x, 1, rank)); n <- nrow(x); k <- ncol(x)
   found <- sum(ranks %*% seq_len(k))
-  same(paste(what, "Page's L"), L, found)
-  if (n > {{ exact }}) {
-    spread <- sum((ranks - (k + 1) / 2)^2) / (k - 1) * k * (k^2 - 1) / 12
-    same(paste(what, "p"), p, pnorm((found - n * k * (k + 1)^2 / 4) / sqrt(spread), lower.tail = FALSE))
-  } else if (k <= 8) {
-    every <- orders(k); chances <- 1
-    for (person in seq_len(n)) {
-      counts <- table(matrix(2 * ranks[person, ][every], nrow(every)) %*% seq_len(k))
-      chances <- add(chances, as.numeric(names(counts)), counts / nrow(every))
-    }
-    same(paste(what, "exact p"), p, at_least(chances, 2 * found))
+  same(paste(what, "Page's L"), row$statistic, found)
+  if (!startsWith(row$method, "exact") || k > 8) return(invisible())
+  every <- orders(k); chances <- 1
+  for (person in seq_len(n)) {
+    counts <- table(matrix(2 * ranks[person, ][every], nrow(every)) %*% seq_len(k))
+    chances <- add(chances, as.numeric(names(counts)), counts / nrow(every))
   }
+  same(paste(what, "exact p"), row$p, at_least(chances, 2 * found))
 }
-pair <- function(what, table, first, second, V, p) {
-  found <- suppressWarnings(wilcox.test(table[, first], table[, second], paired = TRUE, exact = FALSE, correct = FALSE))
-  same(paste(what, "Wilcoxon V"), V, unname(found$statistic))
-  d <- table[, first] - table[, second]; d <- d[!is.na(d) & d != 0]; chances <- 1
-  if (length(d) > {{ exact }}) return(same(paste(what, "p"), p, found$p.value))
-  for (rank in 2 * rank(abs(d))) chances <- add(chances, c(0, rank))
-  same(paste(what, "exact p"), p, min(1, 2 * at_least(chances, 2 * max(V, sum(rank(abs(d))) - V))))
+signed_ranks_p <- function(d) {
+  d <- d[d != 0]; chances <- 1
+  if (length(d) > 200) return(suppressWarnings(wilcox.test(d, exact = FALSE, correct = FALSE)$p.value))
+  ranks <- rank(abs(d))
+  for (rank in 2 * ranks) chances <- add(chances, c(0, rank))
+  min(1, 2 * at_least(chances, 2 * max(sum(ranks[d > 0]), sum(ranks[d < 0]))))
 }
-equivalent <- function(what, table, first, second, bound, p, low, high, level, different) {
-  d <- table[, second] - table[, first]; d <- d[!is.na(d)]
-  lower <- t.test(d, mu = -bound, alternative = "greater")$p.value
-  upper <- t.test(d, mu = bound, alternative = "less")$p.value
-  same(paste(what, "equivalence p"), p, max(lower, upper))
-  limits <- t.test(d, conf.level = level)$conf.int
-  same(paste(what, "interval, low"), low, limits[1])
-  same(paste(what, "interval, high"), high, limits[2])
-  same(paste(what, "difference p by t"), different, t.test(d)$p.value)
+pair <- function(what, d, row) {
+  same(paste(what, "Wilcoxon V"), row$statistic, sum(rank(abs(d[d != 0]))[d[d != 0] > 0]))
+  same(paste(what, "p"), row$p, signed_ranks_p(d))
 }
-# The same, one column a session: medians over the settings that a participant answered in all of these.
-by_session <- function(block, item, sessions, codes, columns = codes) {
-  rows <- answers[answers$block == block & answers$item == item & !is.na(answers$response), ]
-  cells <- tapply(rows$response, list(rows$participant, factor(rows$code, codes, columns),
-                                      factor(rows$session, sessions)), median)
-  common <- apply(!is.na(cells), c(1, 2), all)
-  t(sapply(seq_len(nrow(cells)), function(person)
-    apply(matrix(cells[person, common[person, ], ], ncol = length(sessions)), 2, median)))
+equivalent <- function(what, d, row) {
+  bound <- number(sub(".*bound ±([0-9.e-]+) .*", "\\1", row$method))
+  if (is.na(bound) || !startsWith(row$method, "t(")) return(invisible())
+  p <- c(t.test(d, mu = -bound, alternative = "greater")$p.value, t.test(d, mu = bound, alternative = "less")$p.value)
+  same(paste(what, "equivalence p"), row$p, max(p))
+  limits <- t.test(d, conf.level = number(row$level))$conf.int
+  same(paste(what, "interval, low"), row$low, limits[1])
+  same(paste(what, "interval, high"), row$high, limits[2])
 }
-# Sites of a merged study: "level" compares medians over settings, "profile" ranks of settings, or differences of two.
-sites <- function(what, table, kind, H, p) {
+different <- function(what, d, row) {
+  if (is.na(row$statistic)) return(invisible())  # all differences are equal
+  found <- t.test(d)
+  same(paste(what, "t"), row$statistic, unname(found$statistic))
+  ranks <- if (grepl("signed ranks", row$method)) signed_ranks_p(d) else 0
+  same(paste(what, "difference p"), row$p, max(found$p.value, ranks))
+}
+# Sites of a merged study: medians over settings, differences of two settings, or ranks of more.
+sites <- function(what, table, row) {
   x <- whole(table); site <- factor(answers$site[match(rownames(x), answers$participant)])
-  y <- if (kind == "level") cbind(apply(x, 1, median)) else if (ncol(x) == 2) cbind(x[, 2] - x[, 1]) else
-    t(apply(x, 1, rank))
-  if (ncol(y) == 1) {
-    found <- kruskal.test(y[, 1], site)
-    same(paste(what, "sites,", kind, "H"), H, unname(found$statistic))
-    return(same(paste(what, "sites,", kind, "p by chi2"), p, found$p.value))
-  }
+  y <- switch(row$test, "Kruskal-Wallis" = cbind(apply(x, 1, median)),
+              "Kruskal-Wallis of differences" = cbind(x[, 2] - x[, 1]), t(apply(x, 1, rank)))
+  if (ncol(y) == 1) return(same(paste(what, "H"), row$statistic, unname(kruskal.test(y[, 1], site)$statistic)))
   y <- sweep(y, 2, colMeans(y)); n <- as.vector(table(site))
-  same(paste(what, "sites,", kind, "H"), H, (nrow(y) - 1) * sum(rowsum(y, site)^2 / n) / sum(y^2))
+  same(paste(what, "H"), row$statistic, (nrow(y) - 1) * sum(rowsum(y, site)^2 / n) / sum(y^2))
 }
-threshold_sites <- function(what, thresholds, site, H, p) {
-  found <- kruskal.test(thresholds, factor(site))
-  same(paste(what, "thresholds by site, H"), H, unname(found$statistic))
-  same(paste(what, "thresholds by site, p by chi2"), p, found$p.value)
+for (place in seq_len(nrow(tests))) {
+  row <- tests[place, ]
+  if (is.na(row$item) || is.na(row$statistic) && is.na(row$p) || grepl("stepping down", row$question)) next
+  what <- paste0(row$block, " ", row$item, if (!is.na(row$comparison)) paste0(" (", row$comparison, ")"), ", ",
+                 row$question, ":")
+  x <- wide(row$block, row$item, row$codes, row$question == "sessions differ")
+  d <- if (ncol(x) == 2) x[, 1] - x[, 2]; d <- d[!is.na(d)]
+  switch(row$test,
+    "Friedman" = if (nrow(whole(x)) > 1) friedman(what, x, row),
+    "Page's trend" = page(what, x, row),
+    "Wilcoxon signed ranks" = pair(what, d, row),
+    "equivalence, two one-sided t tests" = equivalent(what, d, row),
+    "difference, paired" = different(what, d, row),
+    "Kruskal-Wallis" = , "Kruskal-Wallis of differences" = , "permutation test of rank profiles" = sites(what, x, row))
 }
-hits <- function(what, block, items, codes, right, hits) {
-  ratings <- lapply(items, function(item) wide(block, item, codes))
-  people <- Reduce(union, lapply(ratings, rownames)); found <- 0
-  for (person in people) for (place in seq_along(codes)) {
-    rated <- sapply(ratings, function(table) if (person %in% rownames(table)) table[person, place] else NA)
-    if (!anyNA(rated) && sum(rated == max(rated)) == 1)
-      found <- found + identical(items[which.max(rated)], right[place])
+numbers <- sum(!is.na(tests[c("statistic", "p", "low", "high")]))
+
+# Blocks of levels: d' and criterion, exponents, and settings of the method of adjustment.
+judged <- exported("tracks")
+judged <- judged[judged$analysed == "true" & !is.na(judged$response), ]
+of <- function(row) {  # the trials that a row of an exported table is about
+  rows <- judged[judged$block == row$block & judged$participant == row$participant, ]
+  if (!is.null(row$condition) && !is.na(row$condition)) return(rows[rows$track == row$condition, ])
+  if (is.null(row$standard)) rows else if (is.na(row$standard)) rows[is.na(rows$standard), ] else
+    rows[rows$standard %in% row$standard, ]
+}
+about <- function(row) paste0(row$block, ", ", row$participant, if (!is.null(row$standard) && !is.na(row$standard))
+  paste(" at", row$standard), if (!is.null(row$condition) && !is.na(row$condition)) paste(" with", row$condition), ":")
+sensitivity <- function(row) {
+  rows <- of(row); given <- judged$response[judged$block == row$block]
+  design <- if (any(given == "yes")) "yes" else if (any(given == "different")) "different" else
+    if (any(given == "first") && all(nchar(rows$arrangement) == 2)) "first" else return(invisible())
+  rate <- function(arrangements) {
+    own <- rows[rows$arrangement %in% arrangements, ]
+    (sum(own$response == design) + 0.5) / (nrow(own) + 1)
   }
-  same(paste(what, "right names"), hits, found)
+  high <- rate(switch(design, yes = "C", first = "CS", c("SC", "CS")))
+  low <- rate(switch(design, yes = "S", first = "SC", c("SS", "CC")))
+  criterion <- -(qnorm(high) + qnorm(low)) / 2
+  d <- (qnorm(high) - qnorm(low)) / (if (design == "first") sqrt(2) else 1)
+  if (design == "different" && row$d_prime_model %in% "differencing") {
+    criterion <- -sqrt(2) * qnorm(low / 2)
+    share <- function(d) pnorm((d - criterion) / sqrt(2)) + pnorm((-d - criterion) / sqrt(2)) - high
+    d <- if (share(0) >= 0) 0 else uniroot(share, c(0, 20), tol = 1e-12)$root
+  } else if (design == "different") {
+    p <- pnorm(d / 2)
+    d <- if (p <= 0.5) 0 else 2 * qnorm(0.5 + 0.5 * sqrt(2 * p - 1))
+  }
+  same(paste(about(row), "d'"), row$d_prime, d)
+  same(paste(about(row), "criterion"), row$criterion, criterion)
 }
+power_law <- function(row) {
+  rows <- of(row); asked <- number(rows$level_asked); answer <- log(number(rows$response))
+  delivered <- ave(number(rows$level_delivered), asked, FUN = function(x) mean(x, na.rm = TRUE))
+  kept <- which(is.finite(answer) & asked > 0)
+  level <- log(ifelse(is.na(delivered), asked, delivered))[kept]
+  means <- tapply(answer[kept], level, mean)
+  same(paste(about(row), "exponent"), row$exponent, unname(coef(lm(means ~ sort(unique(level))))[2]))
+}
+settings <- function(row) {
+  rows <- of(row); rows <- rows[!is.na(rows$setting), ]
+  at <- number(rows$setting); start <- number(rows$level_asked)
+  log <- all(at > 0) && isTRUE(all.equal(number(row$pse), 10^mean(log10(at))))  # else levels are spaced evenly
+  u <- if (log) log10(at) else at; level <- function(u) if (log) 10^u else u
+  high <- (if (log) log10(start) else start) > mean(range(if (log) log10(start) else start))
+  half <- qt(0.975, length(u) - 1) * sd(u) / sqrt(length(u))
+  standard <- number(row$standard)
+  computed <- c(pse = level(mean(u)), low = level(mean(u) - half), high = level(mean(u) + half), jnd = sd(u),
+                constant_error = mean(u) - if (log) log10(standard) else standard,
+                hysteresis = mean(u[high]) - mean(u[!high]))
+  for (name in names(computed)) same(paste(about(row), name), row[[name]], computed[[name]])
+}
+each <- function(table, compare) for (place in seq_len(NROW(table))) compare(table[place, ])
+thresholds <- exported("thresholds"); exponents <- exported("exponents"); adjusted <- exported("settings")
+each(thresholds[!is.na(thresholds$d_prime), ], sensitivity)
+each(exponents, power_law)
+each(adjusted, settings)
+numbers <- numbers + sum(!is.na(thresholds[c("d_prime", "criterion")])) + NROW(exponents) +
+  sum(!is.na(adjusted[c("pse", "low", "high", "jnd", "constant_error", "hysteresis")]))
 
-{{ calls }}
-
-cat(compared, "of {{ numbers }} numbers compared\n")
+cat(compared, "of", numbers, "numbers compared\n")
 if (compared == 0) quit(status = 1)
 if (differing == 0) cat("every number that R computes is the report's\n") else {
   cat("numbers that differ:", differing, "\n")

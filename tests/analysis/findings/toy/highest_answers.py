@@ -7,10 +7,8 @@ import numpy as np
 from scipy.stats import binomtest
 
 from study_app.analysis.figures.page_layout import Drawing, Look, Picture, Sheet
-from study_app.analysis.findings.block_tests import Asked, alone
-from study_app.analysis.findings.finding import Absent, Answer, Finding
+from study_app.analysis.findings.finding import Absent, Answer, Asked, Finding, alone, judged_row
 from study_app.analysis.findings.statement_tests import table_of_tests
-from study_app.analysis.report.test_rows import judged_row, r_text
 from study_app.analysis.results import BlockFound, NotTested, Tested, lead, listed, short
 from study_app.analysis.statistics.outcome import Outcome, clopper_pearson
 
@@ -72,9 +70,6 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
 
     def methods(self) -> Iterator[str]:
         yield f"The highest answers of {self.found.title} were counted."
-
-    def calls(self, codes: str) -> Iterator[str]:
-        yield f"# highest answers of {r_text(self.found.id)}"
 
     def answer(self) -> Answer:
         most = max(self.value, key=lambda one: one.outcome.effect or 0.0)

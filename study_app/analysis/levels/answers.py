@@ -1,0 +1,421 @@
+"""The answers at each level or to each condition, and the levels that participants set: of all and of each."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.measures import number_or_none
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.levels.statistic import (
+    BLOCK,
+    INTERVAL,
+    KINDS,
+    MOTORS,
+    OF_WHOM,
+    STANDARD,
+    LevelStatistic,
+    Shown,
+    analysed,
+    between,
+    digits,
+    level_words,
+    mean_over,
+    plain,
+    signed,
+    standards_of,
+    unit,
+    with_unit,
+)
+from study_app.analysis.report.html_page import drawn, paragraph, table, table_of
+from study_app.analysis.results import LevelsFound, Summary, listed
+from study_app.analysis.statistics.outcome import Array, clopper_pearson, student_interval
+from study_app.analysis.statistics.thresholds import setting_statistics
+from study_app.protocol.trials.designs import Reply
+from study_app.protocol.trials.stimuli import Stimulus
+from study_app.store.tables.csv_files import Column, optional
+
+MOST_NAMED = 6
+
+
+@dataclass(frozen=True, slots=True)
+class SettingFound:
+    """A participant's settings at one standard or, where ``participant`` is None, the means of all participants.
+
+    ``pse`` with the ends of its 95 % interval is a level; ``jnd``, ``constant_error`` (PSE − standard) and
+    ``hysteresis`` (started high − started low) are in u: decades on log spacing, else in the unit of the levels.
+    ``levels`` are a participant's settings, in order, and ``started_high`` says from which end; of the group ``n`` is
+    the number of participants.
+    """
+
+    participant: str | None
+    standard: float | None
+    n: int
+    pse: float
+    low: float | None
+    high: float | None
+    jnd: float | None
+    constant_error: float | None
+    hysteresis: float | None
+    levels: tuple[float, ...] = ()
+    started_high: tuple[bool, ...] = ()
+
+
+def settings(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SettingFound]:
+    """Yield the group's settings at each standard, followed by those of its participants; none of other designs."""
+    stimulus = block.stimulus
+    if stimulus is None or not block.design.adjusts:
+        return
+    rows = analysed(block, opened)
+    for standard, at_standard in rows[rows["setting"].notna()].groupby("standard", dropna=False, sort=True):
+        people = at_standard.groupby("participant", sort=True)
+        own = [_setting(block, stimulus, str(person), number_or_none(standard), some) for person, some in people]
+        others = ("jnd", "constant_error", "hysteresis")
+        group = mean_over(own, "pse", *others, coordinate=stimulus.coordinate, level_of=stimulus.level_of)
+        yield replace(group, levels=(), started_high=())
+        yield from own
+
+
+def _setting(
+    block: LevelBlock, stimulus: Stimulus, person: str, standard: float | None, rows: pd.DataFrame
+) -> SettingFound:
+    in_u = np.vectorize(stimulus.coordinate, otypes=[float])
+    u, starts = (in_u(rows[name].to_numpy(dtype=float)) for name in ("setting", "level"))
+    started_high = starts > sum(stimulus.domain) / 2
+    found = setting_statistics(u, started_high)
+    compared = standard is not None and block.design.intervals > 1
+    low, high = (None if end is None else stimulus.level_of(end) for end in (found.low, found.high))
+    return SettingFound(
+        participant=person,
+        standard=standard,
+        n=found.n,
+        pse=stimulus.level_of(found.pse),
+        low=low,
+        high=high,
+        jnd=found.jnd,
+        constant_error=found.pse - stimulus.coordinate(standard) if compared and standard is not None else None,
+        hysteresis=found.hysteresis,
+        levels=tuple(rows["setting"].to_numpy(dtype=float).tolist()),
+        started_high=tuple(started_high.tolist()),
+    )
+
+
+class Settings(LevelStatistic[SettingFound]):
+    """The group's settings at each standard, followed by those of its participants."""
+
+    key = "settings"
+    place = 3.5
+    title = "Settings"
+    figures = ("settings",)
+    table = "settings"
+    row = "one row per participant and standard of a block whose levels participants set, after unblinding"
+    columns = (
+        BLOCK,
+        STANDARD,
+        Column("n", "integer", "Settings that count.", minimum=0),
+        Column("pse", "number", "Point of subjective equality, a level: the mean of the settings in u."),
+        optional("low", "number", "Lower end of the 95 % interval of the PSE (Student's t)."),
+        optional("high", "number", "Upper end of the 95 % interval of the PSE (Student's t)."),
+        optional(
+            "jnd",
+            "number",
+            "Just-noticeable difference: the standard deviation of the settings, in u (decades where levels are spaced "
+            "by their logarithm, else in the unit of the levels).",
+            minimum=0,
+        ),
+        optional("constant_error", "number", "PSE minus standard, in u; n/a where no standard was presented."),
+        optional(
+            "hysteresis", "number", "Mean of the settings that started high minus mean of those that started low, in u."
+        ),
+    )
+
+    compute = staticmethod(lambda block, opened, _study, _found: settings(block, opened))
+
+    @classmethod
+    def exported_in(cls, study: Study) -> bool:
+        return any(block.design.adjusts for block in study.levels)
+
+    @property
+    def _are_compared(self) -> bool:
+        return any(one.constant_error is not None for one in self.rows)
+
+    def shown(self) -> Sequence[Shown]:
+        in_u = "decades" if self.found.spacing == "log" else self.found.unit or "units of the level"
+        return (
+            self.standard(),
+            *OF_WHOM,
+            (f"PSE{unit(self.found)}", lambda one: digits(one.pse)),
+            INTERVAL,
+            (f"JND [{in_u}]", lambda one: digits(one.jnd)),
+            (f"constant error [{in_u}]", lambda one: signed(one.constant_error)) if self._are_compared else None,
+            (f"hysteresis [{in_u}]", lambda one: signed(one.hysteresis)),
+        )
+
+    def explained(self) -> str:
+        in_u = "logarithm of the level" if self.found.spacing == "log" else "level"
+        error = " constant error: PSE − standard;" if self._are_compared else ""
+        return (
+            f"Settings as levels ({level_words(self.found)}). PSE, the point of subjective equality: mean of the "
+            f"{in_u}, with Student’s 95 % interval; JND, the just-noticeable difference: standard deviation;{error} "
+            "hysteresis: settings that started high − settings that started low. The group has the means over "
+            "participants, and the interval of its PSE is that over participants."
+        )
+
+    def compares(self, measure: str) -> bool:
+        return True
+
+    def limits(self) -> Iterator[str]:
+        title = self.found.title
+        if not (own := self.own(self.found)):
+            return
+        yield (
+            f"{title}: settings depend on how a participant decides that two are equal: their scatter is not a "
+            "threshold free of a criterion."
+        )
+        if few := [str(one.participant) for one in own if one.hysteresis is None]:
+            words = "settings started near one end alone, so that hysteresis is not known"
+            yield f"{title}: {words} ({listed(few[:MOST_NAMED])})."
+        yield f"{title}: {MOTORS}"
+
+    def methods(self, block: LevelBlock) -> Iterator[str]:
+        if not self.rows or block.stimulus is None:
+            return
+        against = standards_of(self.found, self.rows)
+        to = against.replace(" of ", " to the standard ", 1) if block.design.intervals > 1 else ""
+        kind, (low, high) = KINDS[block.stimulus.level_kind], block.stimulus.levels
+        yield (
+            f"In “{self.found.title}” participants set {self.found.quantity}{to} by {block.design.paper_name}, within "
+            f"{kind} from {low:g} to {high:g}, starting alternately near either end."
+        )
+
+    @classmethod
+    def common_methods(cls, blocks: Sequence[LevelsFound]) -> Iterator[str]:
+        if any(map(cls.of, blocks)):
+            yield (
+                "The point of subjective equality is the mean of a participant’s settings, the just-noticeable "
+                "difference their standard deviation, the constant error the difference of mean and standard, and the "
+                "hysteresis that of settings that started high and low, all of the logarithm of the level where levels "
+                "are spaced so (Gescheider 1997). Group values are means over participants with Student’s 95 % "
+                "interval."
+            )
+
+
+SUMMARIES: Final[dict[Reply, Summary]] = {
+    "choice": "share",
+    "rating": "mean",
+    "number": "geometric mean",
+    "setting": "settings",
+}
+"""How the answers at a level are summarised, by the reply that the design asks for."""
+
+
+@dataclass(frozen=True, slots=True)
+class LevelAnswers:
+    """The answers at one level, of one participant or, where ``participant`` is None, of all.
+
+    Those to catch trials are apart, with ``catch``.
+    A block that compares conditions has ``comparison`` in place of ``standard`` and ``level``. ``n`` answers of
+    ``participants`` are summarised in ``value``, ``count`` of them are what a share counts. ``low`` and ``high`` are
+    the ends of the 95 % interval: of a participant's share by Clopper and Pearson, otherwise by Student's t, over the
+    answers of one participant, or over the participants' values.
+    """
+
+    participant: str | None
+    standard: float | None
+    level: float | None
+    comparison: float | str | None
+    n: int
+    participants: int
+    count: int | None
+    value: float
+    low: float | None
+    high: float | None
+    catch: bool = False
+
+
+def chooses_units(block: LevelBlock) -> bool:
+    """Return whether each participant chooses the unit of the numbers named: there is no modulus."""
+    return block.design.reply == "number" and block.design.first is None
+
+
+def _level_answers(
+    block: LevelBlock, opened: pd.DataFrame, bounds: tuple[float, float] | None
+) -> Iterator[LevelAnswers]:
+    """Yield the answers at each level, and apart those to catch trials: of all participants, then of each."""
+    if block.design.adjusts:
+        return
+    rows = analysed(block, opened)
+    if block.stimulus is None:
+        places = {setting.condition: place for place, setting in enumerate(block.settings)}
+        rows = rows.assign(comparison=rows["track"], place=rows["track"].map(places), catch=False)
+        by = ["place"]
+    else:
+        rows = rows.assign(catch=rows["catch"].fillna(False).astype(bool))
+        by = ["standard", "level", "catch"]
+    units = _own_units(block, rows)
+    for _, at_level in rows.groupby(by, dropna=False, sort=True):
+        yield from _at_level(block, at_level, bounds, units)
+
+
+def _own_units(block: LevelBlock, rows: pd.DataFrame) -> Mapping[str, float]:
+    """Return ln of the unit that each participant chose for numbers, over the mean unit; nothing with a modulus.
+
+    It is the mean over levels of the participant's mean ln answer.
+    """
+    if not chooses_units(block):
+        return {}
+    answered = rows.assign(log=np.log(rows["value"].to_numpy(dtype=float)))
+    own = answered.groupby(["participant", "level"])["log"].mean().groupby("participant").mean()
+    return dict(own - own.mean())
+
+
+def _at_level(
+    block: LevelBlock, rows: pd.DataFrame, bounds: tuple[float, float] | None, units: Mapping[str, float]
+) -> Iterator[LevelAnswers]:
+    summary = SUMMARIES[block.design.reply]
+    share = summary == "share"
+    numbers = rows["success" if share else "value"].to_numpy(dtype=float)
+    numbers = np.log(numbers) if summary == "geometric mean" else numbers
+    first = rows.iloc[0]
+    make = partial(
+        LevelAnswers,
+        standard=number_or_none(first["standard"]),
+        level=number_or_none(first["level"]),
+        comparison=first["comparison"] if isinstance(first["comparison"], str) else number_or_none(first["comparison"]),
+        catch=bool(first["catch"]),
+    )
+    summarised = partial(_summarised, summary, (0.0, 1.0) if share else bounds)
+    people = rows["participant"].to_numpy()
+    own = {person: numbers[people == person] for person in sorted(set(people))}
+    value, low, high = summarised(np.array([one.mean() - units.get(person, 0.0) for person, one in own.items()]))
+    count = int(numbers.sum()) if share else None
+    yield make(None, n=len(numbers), participants=len(own), count=count, value=value, low=low, high=high)
+    for person, one in own.items():
+        value, low, high = summarised(one)
+        if share:
+            count = int(one.sum())
+            exact = clopper_pearson(count, len(one))
+            low, high = exact.low, exact.high
+        yield make(person, n=len(one), participants=1, count=count, value=value, low=low, high=high)
+
+
+def _summarised(
+    summary: Summary, bounds: tuple[float, float] | None, values: Array
+) -> tuple[float, float | None, float | None]:
+    """Return the mean of shares, points or logarithms and its 95 % interval within bounds, as numbers of their kind."""
+    low, high = student_interval(values)
+    if summary == "geometric mean":
+        low, high = (None if end is None else math.exp(end) for end in (low, high))
+        return math.exp(values.mean()), low, high
+    if bounds is not None and low is not None and high is not None:
+        low, high = max(low, bounds[0]), min(high, bounds[1])
+    return float(values.mean()), low, high
+
+
+def of_group(found: LevelsFound) -> tuple[LevelAnswers, ...]:
+    """Return the answers of all participants together, in order of standard and level; without catch trials."""
+    return tuple(one for one in Answers.of(found) if one.participant is None and not one.catch)
+
+
+def people(found: LevelsFound) -> tuple[str, ...]:
+    """Return the participants who answered."""
+    answered = {str(one.participant) for one in Answers.own(found)}
+    return tuple(sorted(answered | {str(one.participant) for one in Settings.own(found)}))
+
+
+def summary_words(found: LevelsFound) -> str:
+    """Return what a value at a level is: "share correct", "mean rating", "geometric mean of the numbers"."""
+    if found.summary == "share":
+        return "share correct" if found.counts == "correct" else f"share “{found.counts}”"
+    return "mean rating" if found.summary == "mean" else "geometric mean of the numbers"
+
+
+def mean_words(found: LevelsFound) -> str:
+    """Return what a value of all participants is."""
+    return "geometric mean" if found.summary == "geometric mean" else "mean"
+
+
+class Answers(LevelStatistic[LevelAnswers]):
+    """The answers at each level; the section has a table of all participants, and one of each for every standard."""
+
+    key = "answers"
+    place = 1
+
+    compute = staticmethod(lambda block, opened, _study, found: _level_answers(block, opened, found.bounds))
+
+    def section(self) -> Iterator[str]:
+        found = self.found
+        if not found.adaptive:
+            yield self._of_group()
+            units = (
+                " The interval leaves out that each participant chose a unit: ln answers less the participant's mean."
+            )
+            yield paragraph(
+                f"{mean_words(found).capitalize()} over the participants, with the 95 % interval by Student's t where "
+                "at least two participants differ. Below: each participant, with the number of answers."
+                + (units if found.own_units else ""),
+                "soft",
+            )
+        yield from drawn(self.pictures, f"levels-{found.block}")
+        if not found.adaptive:
+            for standard in sorted({one.standard for one in self.rows}, key=lambda one: one or 0.0):
+                yield self._of_people(standard)
+
+    def _value(self, value: float) -> str:
+        return f"{100 * value:.0f} %" if self.found.summary == "share" else f"{value:.3g}"
+
+    def _of_group(self) -> str:
+        found, rows = self.found, of_group(self.found)
+        standards = any(one.standard is not None for one in rows)
+        alone = found.level_kind == "value" and not standards
+        return table_of(
+            rows,
+            (f"Standard{unit(found)}", lambda one: plain(one.standard)) if standards else None,
+            None if found.level_kind in {None, "value"} else (level_words(found), lambda one: plain(one.level)),
+            (level_words(found) if alone else f"Comparison{unit(found)}", lambda one: plain(one.comparison)),
+            ("participants", lambda one: str(one.participants)),
+            ("n", lambda one: str(one.n)),
+            (summary_words(found), lambda one: self._value(one.value)),
+            ("95 % interval", lambda one: between(one.low, one.high, self._value)),
+            words=1 if found.vary is None else 0,
+        )
+
+    def _of_people(self, standard: float | None) -> str:
+        """Return a row per participant, a column per level."""
+        shown = [one for one in of_group(self.found) if one.standard == standard]
+        own = {
+            (one.participant, one.level, one.comparison): one
+            for one in self.rows
+            if one.standard == standard and not one.catch
+        }
+
+        def cell(person: str, level: LevelAnswers) -> str:
+            one = own.get((person, level.level, level.comparison))
+            if one is None:
+                return "–"
+            return f"{self._value(one.value)} ({one.n})" if one.count is None else f"{one.count}/{one.n}"
+
+        names = [plain(one.comparison if one.level is None else one.level) for one in shown]
+        return table(
+            ("Participant" if standard is None else f"Standard {with_unit(self.found, standard)}", *names),
+            [[person, *(cell(person, one) for one in shown)] for person in people(self.found)],
+        )
+
+    def methods(self, block: LevelBlock) -> Iterator[str]:
+        if not self.rows:
+            return
+        stimulus, title, design = block.stimulus, self.found.title, block.design.paper_name
+        if stimulus is None:
+            yield f"In “{title}” conditions were compared by {design}."
+            return
+        kind, (low, high) = KINDS[stimulus.level_kind], stimulus.levels
+        chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"
+        yield (
+            f"In “{title}” {self.found.quantity} was judged by {design}, at {kind}"
+            f"{standards_of(self.found, self.rows)} from {low:g} to {high:g}{chosen}."
+        )

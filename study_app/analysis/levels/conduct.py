@@ -1,0 +1,226 @@
+"""How the trials of a block of levels were run: times to answer, delivery, catch trials, and force withheld."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import takewhile
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.measures import number_or_none
+from study_app.analysis.levels.statistic import LevelStatistic, Shown, analysed, between, digits, level_words, unit
+from study_app.analysis.results import counted, listed, number
+from study_app.protocol.checks.delayed_force import WITHHELD_PERCENT
+from study_app.protocol.trials.stimuli import OF_LINK
+
+TRIAL: Final = ["participant", "session", "trial"]
+Row: TypeAlias = dict[str, Any]
+MOST_LEVELS: Final = 8
+"""Rows of times to answer at a standard; of more levels, neighbours share a row."""
+
+
+def _levels(row: Row) -> str:
+    low, high = row["low"], row["high"]
+    return digits(low) if low == high else between(low, high)
+
+
+def _by_levels(rows: pd.DataFrame) -> Iterator[tuple[float | None, float, float, pd.DataFrame]]:
+    """Yield standard, lowest and highest level, and their rows: many levels in `MOST_LEVELS` ranges of neighbours."""
+    for standard, at_standard in rows[rows["level"].notna()].groupby("standard", dropna=False, sort=True):
+        level = at_standard["level"].astype(float)
+        levels = np.unique(level.to_numpy())
+        for some in np.array_split(levels, min(len(levels), MOST_LEVELS)):
+            here = at_standard[level.between(some[0], some[-1])]
+            yield number_or_none(standard), float(some[0]), float(some[-1]), here
+
+
+def _level_times(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Row]:
+    """Yield the median times [s] of correct and of other answers of all participants by level."""
+    rows = analysed(block, opened, "right")
+    for standard, low, high, here in _by_levels(rows[rows["response_s"].notna()]):
+        seconds, right = here["response_s"].to_numpy(dtype=float), here["right"].to_numpy(dtype=bool)
+        row = {"standard": standard, "low": low, "high": high}
+        for name, some in (("right", seconds[right]), ("wrong", seconds[~right])):
+            row |= {f"{name}_n": len(some), f"{name}_s": float(np.median(some)) if len(some) else None}
+        yield row
+
+
+def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[Row]:
+    """Yield the share of the force [%] that safety withheld in comparisons whose link is varied, by level."""
+    if block.stimulus is None or block.stimulus.vary not in OF_LINK:
+        return
+    rows = intervals[(intervals["block"] == block.id) & (intervals["presented"] == "comparison")]
+    for standard, low, high, here in _by_levels(rows[rows["withheld_share"].notna()]):
+        percent = 100 * here["withheld_share"].to_numpy(dtype=float)
+        row = {"standard": standard, "low": low, "high": high, "n": len(percent)}
+        yield {**row, "mean_percent": float(percent.mean()), "most_percent": float(percent.max())}
+
+
+def level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFrame) -> Iterator[Row]:
+    """Yield how the analysed trials at each standard were presented; ``intervals`` are those of all their attempts.
+
+    ``reasons`` counts the intervals that broke each limit; errors are delivered less requested levels.
+    """
+    if block.stimulus is None:
+        return
+    own = opened[(opened["block"] == block.id) & opened["analysed"]]
+    presented = intervals[intervals["block"] == block.id].merge(own[TRIAL], on=TRIAL)
+    for standard, rows in own.groupby("standard", dropna=False, sort=True):
+        here = presented.merge(rows[TRIAL], on=TRIAL)
+        attempts = here.drop_duplicates([*TRIAL, "attempt"])
+        last = here[here["counted"]]
+        errors = (rows["level_delivered"] - rows["level"])[rows["level"] != 0].dropna().astype(float)
+        reasons = Counter(word for words in here["invalid_reasons"].dropna() for word in set(str(words).split()))
+        yield {
+            "standard": number_or_none(standard),
+            "trials": len(rows),
+            "repeated": len(attempts) - attempts[TRIAL].drop_duplicates().shape[0],
+            "reasons": dict(sorted(reasons.items())),
+            "measured": len(errors),
+            "error_mean": number_or_none(errors.mean()),
+            "error_largest": number_or_none(errors.abs().max()),
+            "pace_mps": number_or_none(last["pace_mps"].mean()),
+            "apparent_mass_kg": number_or_none(last["apparent_mass_kg"].mean()),
+        }
+
+
+def catch_answers(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Row]:
+    """Yield how many catch trials of each session were answered incorrectly; a share above ``most`` excludes it."""
+    if block.wrong_most is None:
+        return
+    caught = opened[(opened["block"] == block.id) & opened["catch"].fillna(False) & opened["right"].notna()]
+    for _, rows in caught.groupby(["participant", "session"], sort=True):
+        wrong = int((~rows["right"].astype(bool)).sum())
+        person, session = str(rows["participant"].iloc[0]), int(rows["session"].iloc[0])
+        yield {"participant": person, "session": session, "n": len(rows), "wrong": wrong, "most": block.wrong_most}
+
+
+class TimesByLevel(LevelStatistic[Row]):
+    """The times of correct and of other answers by level."""
+
+    key = "level_times"
+    place = 5
+    title = "Time to answer by level"
+
+    compute = staticmethod(lambda block, opened, _study, _found: _level_times(block, opened))
+
+    def shown(self) -> Sequence[Shown]:
+        return (
+            self.standard(),
+            (level_words(self.found), _levels),
+            ("n correct", lambda one: str(one["right_n"])),
+            ("median, correct [s]", lambda one: number(one["right_s"])),
+            ("n incorrect", lambda one: str(one["wrong_n"])),
+            ("median, incorrect [s]", lambda one: number(one["wrong_s"])),
+        )
+
+
+class Delivery(LevelStatistic[Row]):
+    """How the trials at each standard were delivered."""
+
+    key = "conduct"
+    place = 6
+    title = "Delivery of levels"
+
+    compute = staticmethod(lambda block, opened, study, _found: level_conduct(block, opened, study.intervals))
+
+    def standard(self) -> Shown:
+        if all(one["standard"] is None for one in self.rows):
+            return None
+        return f"Standard{unit(self.found)}", lambda one: digits(one["standard"], 4)
+
+    def shown(self) -> Sequence[Shown]:
+        decimals, of = (4, "") if self.found.level_kind == "weber" else (3, unit(self.found))
+        return (
+            self.standard(),
+            ("trials", lambda one: str(one["trials"])),
+            ("repeated attempts", lambda one: str(one["repeated"])),
+            ("measured", lambda one: str(one["measured"])),
+            (f"level error{of}, mean", lambda one: number(one["error_mean"], decimals)),
+            ("largest", lambda one: number(one["error_largest"], decimals)),
+            ("hand speed, RMS [m/s]", lambda one: number(one["pace_mps"], 3)),
+            ("apparent mass [kg]", lambda one: number(one["apparent_mass_kg"], 3)),
+        )
+
+    def explained(self) -> str:
+        reasons = sum((Counter(one["reasons"]) for one in self.rows), Counter[str]())
+        named = [
+            f"{name.rpartition('_')[0].replace('_', ' ') or name} in {counted(count, 'interval')}"
+            for name, count in reasons.most_common()
+        ]
+        with_estimator = f", with the velocity estimator {self.estimator}" if self.estimator else ""
+        kept = f"Limits that intervals did not keep: {listed(named)}." if reasons else "Every interval kept its limits."
+        mass = f" Apparent mass: least-squares fit of F = −b v − m a to the force sent{with_estimator}."
+        mass = mass if any(one["apparent_mass_kg"] is not None for one in self.rows) else ""
+        return (
+            "Level error: delivered less requested level, from the recorded samples (delays: from the frames); fits "
+            f"take delivered levels.{mass} {kept}"
+        )
+
+
+def _rule(row: Row) -> str:
+    excludes = row["wrong"] / row["n"] > row["most"]
+    return f"{'excluded: above' if excludes else 'kept: at most'} {100 * row['most']:g} %"
+
+
+class CatchTrials(LevelStatistic[Row]):
+    """The answers to catch trials of each session, also where they exclude it."""
+
+    key = "catches"
+    place = 7
+    title = "Catch trials"
+
+    compute = staticmethod(lambda block, opened, _study, _found: catch_answers(block, opened))
+
+    def shown(self) -> Sequence[Shown]:
+        return (
+            ("Participant", lambda one: one["participant"]),
+            ("session", lambda one: str(one["session"])),
+            ("n", lambda one: str(one["n"])),
+            ("incorrect", lambda one: str(one["wrong"])),
+            ("share", lambda one: f"{100 * one['wrong'] / one['n']:.0f} %"),
+            ("rule", _rule),
+        )
+
+    def explained(self) -> str:
+        return "Catch trials present the largest level; they enter the fit of the threshold."
+
+
+class Withheld(LevelStatistic[Row]):
+    """What safety withheld of the force in comparisons whose link is varied, by level."""
+
+    key = "withheld"
+    place = 8
+    since = 2
+    title = "Force withheld by safety"
+
+    compute = staticmethod(lambda block, _opened, study, _found: _withheld(block, study.intervals))
+
+    def shown(self) -> Sequence[Shown]:
+        return (
+            self.standard(),
+            (f"Level{unit(self.found)}", _levels),
+            ("intervals", lambda one: str(one["n"])),
+            ("mean", lambda one: f"{one['mean_percent']:.1f} %"),
+            ("most", lambda one: f"{one['most_percent']:.1f} %"),
+        )
+
+    def explained(self) -> str:
+        return (
+            f"{' '.join(self._up_to())} Share of the requested force that limits, passivity controller and device "
+            "withheld in the comparisons, those of trials that were presented again included: a late force pushes the "
+            "hand, and the passivity controller limits the energy that it returns. What is withheld is not the force "
+            "that the study is about."
+        )
+
+    def _up_to(self) -> Iterator[str]:
+        """Yield for each standard up to which level hardly anything was withheld in any comparison."""
+        of = f" {self.found.unit}" if self.found.unit else ""
+        for standard in dict.fromkeys(one["standard"] for one in self.rows):
+            rows = [one for one in self.rows if one["standard"] == standard]
+            kept = list(takewhile(lambda one: one["most_percent"] <= WITHHELD_PERCENT, rows))
+            at = "" if standard is None else f" at the standard of {standard:.4g}{of}"
+            until = f"up to {kept[-1]['high']:.3g}{of}" if kept else "at no level presented"
+            yield f"At most {WITHHELD_PERCENT:g} % was withheld in every comparison {until}{at}."

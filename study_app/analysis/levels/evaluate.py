@@ -1,0 +1,146 @@
+"""All that is found in blocks of levels, and what reports say of it: a loop over the statistics of this folder."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+import pandas as pd
+
+from study_app.analysis.data.blocks import LevelBlock, PublishedValue, setting_name
+from study_app.analysis.data.measures import quartiles_or_none
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.figures.page_layout import Picture
+from study_app.analysis.levels.answers import SUMMARIES, Answers, Settings, chooses_units
+from study_app.analysis.levels.statistic import between, statistics
+from study_app.analysis.levels.tracks import answers_timed, tracks
+from study_app.analysis.report.html_page import heading, paragraph, table_of
+from study_app.analysis.results import GroupAnswers, LevelsFound, number
+from study_app.protocol.quantities import quantity, quantity_words
+
+READ: Final = (
+    *("participant", "session", "trial", "block", "code", "track", "catch", "standard", "level", "level_delivered"),
+    *("comparison", "arrangement", "analysed", "response", "value", "success", "right", "response_s", "reversal"),
+    "setting",
+)
+"""The columns of tracks that statistics read."""
+
+SEALED: Final = (
+    "Not yet revealed: standards, levels, what each interval presented, and which answers were correct. They appear "
+    "here after unblinding."
+)
+
+
+def levels_found(study: Study, rows: pd.DataFrame | None = None) -> tuple[LevelsFound, ...]:
+    """Return what was answered in every main block of levels, in the order of the session.
+
+    ``rows`` are those of `tracks`, where they are already known.
+    """
+    main = [block for block in study.levels if block.phase == "main"]
+    if not main:
+        return ()
+    timed = answers_timed(study)
+    opened = rows if rows is not None else tracks(study) if study.revealed else None
+    opened = None if opened is None else opened[list(READ)]  # groups of few columns are made in less time
+    return tuple(_levels_of_block(study, block, timed, opened) for block in main)
+
+
+def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opened: pd.DataFrame | None) -> LevelsFound:
+    counted = timed[(timed["block"] == block.id) & timed["counted"] & timed["response"].notna()]
+    stimulus = block.stimulus
+    found = LevelsFound(
+        block=block.id,
+        title=block.title,
+        design=block.design.kind,
+        revealed=opened is not None,
+        times=tuple(
+            GroupAnswers(
+                one.code, setting_name(one, block.settings), _time_numbers(counted[counted["code"] == one.code])
+            )
+            for one in block.settings
+        ),
+        summary=SUMMARIES[block.design.reply],
+        counts=block.counts,
+        guess_rate=block.design.guess_rate if block.has_correct_answer else None,
+        bounds=next((one.bounds for one in study.others.questions if one.where.id == block.id), None),
+        own_units=chooses_units(block),
+        family=None if block.assumed is None else block.assumed.family,
+        adaptive=block.method is not None and block.method.adaptive,
+        published=tuple(PublishedValue(**one.model_dump(exclude={"block"})) for one in block.published),
+        device=study.own_dynamics,
+    )
+    if stimulus is not None:
+        found = replace(
+            found,
+            vary=stimulus.vary,
+            quantity=quantity_words(stimulus.vary),
+            unit=quantity(stimulus.vary).unit,
+            level_kind=stimulus.level_kind,
+            spacing=stimulus.spacing,
+        )
+    if opened is not None:
+        for one in statistics():
+            rows = tuple(one.compute(block, opened, study, found))
+            found = replace(found, statistics={**found.statistics, one.key: rows})
+    return found
+
+
+def _time_numbers(answers: pd.DataFrame) -> dict[str, Any]:
+    seconds = answers["response_s"].dropna().to_numpy(dtype=float)
+    low, middle, high = quartiles_or_none(seconds)
+    return {"n": len(seconds), "median": middle, "q1": low, "q3": high}
+
+
+def level_section(found: LevelsFound, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:
+    """Yield what a block's section says in addition to the counts of its answers.
+
+    ``estimator`` is the name of the servo's velocity estimator, None where the receipt has none.
+    """
+    yield heading(3, "Time to answer")
+    yield table_of(
+        found.times,
+        ("Setting" if found.revealed else "Code", lambda one: one.name),
+        ("n", lambda one: str(one.numbers["n"])),
+        ("median [s]", lambda one: number(one.numbers["median"])),
+        ("quartiles [s]", lambda one: between(one.numbers["q1"], one.numbers["q3"], number)),
+    )
+    at_each = "Answers at each level" if found.vary is not None or not found.revealed else "Answers"
+    if not Settings.of(found):
+        yield heading(3, "Answers over levels" if found.adaptive else at_each)
+    if not found.revealed:
+        yield paragraph(SEALED)
+        return
+    if not Settings.of(found) and not Answers.of(found):
+        yield paragraph("No answer counts yet.")
+        return
+    for one in (Settings,) if Settings.of(found) else statistics():
+        yield from one(found, {picture.name: picture for picture in pictures}, estimator).section()
+
+
+def level_findings(found: LevelsFound) -> Iterator[str]:
+    """Yield the findings of a block with n and interval; none while the key is sealed."""
+    sentences = [line for one in statistics() for line in one(found).sentences()]
+    yield from sentences
+    if sentences and found.published:
+        yield f"{found.title}: published values: {'; '.join(one.in_words() for one in found.published)}."
+
+
+def level_limits(found: LevelsFound) -> Iterator[str]:
+    """Yield what the statistics of a block cannot show."""
+    for one in statistics():
+        yield from one(found).limits()
+
+
+def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsFound]) -> Iterator[str]:
+    """Yield the sentences about blocks whose key is open and that have answers."""
+    by_id = {block.id: block for block in blocks}
+    opened = [found for found in levels if found.revealed and (Answers.of(found) or Settings.of(found))]
+    for found in opened:
+        for one in statistics():
+            yield from one(found).methods(by_id[found.block])
+    for one in statistics():
+        yield from one.common_methods(opened)
+
+
+def level_entries(found: LevelsFound) -> dict[str, Any]:
+    """Return the entries of report.json of a block's statistics; those of later formats only where there are rows."""
+    return {one.key: one.of(found) for one in statistics() if one.since == 1 or one.of(found)}

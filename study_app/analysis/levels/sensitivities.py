@@ -1,0 +1,286 @@
+"""Sensitivity and bias: over all levels of a standard, for each comparison, or for each level against the lowest."""
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.measures import number_or_none
+from study_app.analysis.levels.statistic import (
+    BLOCK,
+    INTERVAL_2,
+    OF_WHOM,
+    STANDARD,
+    LevelStatistic,
+    Shown,
+    analysed,
+    mean_over,
+    plain,
+    unit,
+)
+from study_app.analysis.levels.thresholds import Exponents, Thresholds
+from study_app.analysis.results import LevelsFound, number
+from study_app.protocol.trials.presentation import arrangement_of
+from study_app.psychophysics.detection import Sensitivity, rating
+from study_app.store.tables.csv_files import Column, optional
+
+Z_95: Final = 1.959964
+MODELS: Final = {
+    "differencing": " d′ is that of the differencing model, since standards vary from trial to trial.",
+    "independent": " d′ is that of independent observations; the differencing model is in the table of thresholds.",
+}
+BIASES: Final = {
+    "2ifc": " c is above 0 where the second interval is preferred.",
+    "yesno": " c is above 0 where “no” is preferred.",
+    "samedifferent": " k is the difference above which the answer is “different”.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class SensitivityFound:
+    """A participant's sensitivity and bias or, where ``participant`` is None, their means over ``n`` participants.
+
+    They are those at a ``standard``, to a condition as ``comparison``, or of ratings at a ``level`` against the lowest.
+    ``shares`` are those of each answer. ``d_prime`` has a 95 % interval where its variance is known, of the group by
+    Student's t; ``criterion`` is c, or k of same–different; ``other`` is d′ under the model that is not ``model``.
+    """
+
+    participant: str | None
+    n: int
+    shares: Mapping[str, float]
+    standard: float | None = None
+    comparison: str | None = None
+    level: float | None = None
+    d_prime: float | None = None
+    low: float | None = None
+    high: float | None = None
+    criterion: float | None = None
+    model: str | None = None
+    other: float | None = None
+
+
+def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SensitivityFound]:
+    """Yield the group's sensitivity at each standard, to each condition or at each level, then its participants'."""
+    rows = analysed(block, opened)
+    match block.design.reply:
+        case "choice":
+            by = "standard" if block.stimulus is not None else "track"
+            for which, some in rows.groupby(by, dropna=False, sort=True):
+                where = {"standard": number_or_none(which)} if by == "standard" else {"comparison": str(which)}
+                people = some.groupby("participant", sort=True)
+                yield from _with_group([_of_choices(block, str(person), one, where) for person, one in people])
+        case "rating":
+            lowest, *levels = sorted(rows["level"].dropna().unique()) or [None]
+            for level in levels:
+                people = rows.groupby("participant", sort=True)
+                own = [_of_ratings(str(person), one, lowest, level) for person, one in people]
+                yield from _with_group([one for one in own if one is not None])
+        case "number" | "setting":
+            return
+
+
+def _with_group(own: Sequence[SensitivityFound]) -> Iterator[SensitivityFound]:
+    """Yield the means over participants, followed by those of each."""
+    if own:
+        shares = {answer: float(np.mean([one.shares[answer] for one in own])) for answer in own[0].shares}
+        yield replace(mean_over(own, "d_prime", "criterion", "other"), shares=shares)
+    yield from own
+
+
+def _of_ratings(person: str, rows: pd.DataFrame, lowest: float, level: float) -> SensitivityFound | None:
+    noise, signal = (rows.loc[rows["level"] == at, "value"].dropna().to_numpy(float) for at in (lowest, level))
+    found = rating(noise, signal)
+    one = SensitivityFound(participant=person, n=len(noise) + len(signal), shares={}, level=float(level))
+    return None if found is None else _measured(one, found)
+
+
+def _of_choices(
+    block: LevelBlock, person: str, rows: pd.DataFrame, where: Mapping[str, float | str | None]
+) -> SensitivityFound:
+    design = block.design
+    pairs = zip(rows["arrangement"].astype(str), rows["response"].astype(str), strict=True)
+    counts = Counter((arrangement_of(design, letters), answer) for letters, answer in pairs)
+    given = Counter(rows["response"].astype(str))
+    found = design.sensitivity(counts, roving=block.standards_rove) if block.has_correct_answer else None
+    shares = {answer: given[answer] / len(rows) for answer in design.answers}
+    one = SensitivityFound(person, len(rows), shares, **where)  # type: ignore[arg-type]  # standard or comparison
+    return one if found is None else _measured(one, found)
+
+
+def _measured(one: SensitivityFound, found: Sensitivity) -> SensitivityFound:
+    half = math.nan if found.variance is None else Z_95 * math.sqrt(found.variance)
+    return replace(
+        one,
+        d_prime=found.d_prime,
+        low=number_or_none(found.d_prime - half),
+        high=number_or_none(found.d_prime + half),
+        criterion=found.criterion,
+        model=found.model,
+        other=found.other,
+    )
+
+
+def _where(one: SensitivityFound) -> str:
+    return plain(one.comparison or (one.level if one.standard is None else one.standard))
+
+
+class Sensitivities(LevelStatistic[SensitivityFound]):
+    """d′ and criterion of the group and of each participant.
+
+    The exported table has all estimates of a participant at a standard, thresholds among them.
+    """
+
+    key = "sensitivities"
+    place = 4
+    title = "Sensitivity and bias"
+    table = "thresholds"
+    row = "one row per participant and standard, or condition compared, after unblinding"
+    columns = (
+        BLOCK,
+        STANDARD,
+        optional("condition", "text", "The condition that was compared; n/a in a block of levels."),
+        Column("n", "integer", "Answers that count.", minimum=0),
+        optional(
+            "threshold",
+            "number",
+            "Level at which the psychometric function is half-way between guesses and lapses: posterior median, in the "
+            "unit of the stimulus' levels; n/a where the answers enter no such function.",
+        ),
+        optional("low", "number", "Lower end of the threshold's equal-tailed 95 % interval."),
+        optional("high", "number", "Upper end of the threshold's equal-tailed 95 % interval."),
+        optional(
+            "beyond",
+            "text",
+            "Whether the threshold lies beyond the levels that were presented; n/a: between them.",
+            levels=(("above", "above the highest"), ("below", "below the lowest")),
+        ),
+        optional(
+            "width",
+            "number",
+            "Posterior median of the function's width, from 5 to 95 % of its rise: in decades where levels are spaced "
+            "by their logarithm, else in the unit of the levels.",
+            minimum=0,
+        ),
+        optional("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1),
+        optional(
+            "weber_exponent",
+            "number",
+            "Slope of ln JND on ln standard over the participant's standards: the same in each of these rows; n/a with "
+            "fewer than two standards.",
+        ),
+        optional("flat_width_threshold", "number", "The threshold under a flat prior on the width."),
+        optional(
+            "reversal_mean",
+            "number",
+            "Mean of the last reversals of the up–down tracks; n/a for other methods and with too few.",
+        ),
+        optional(
+            "target_percent",
+            "number",
+            "Percentage of successes to which the rule of the up–down tracks converges.",
+            "%",
+            minimum=0,
+            maximum=100,
+        ),
+        optional("d_prime", "number", "Sensitivity over all levels presented; n/a where no answer is correct."),
+        optional(
+            "d_prime_model",
+            "text",
+            "The model of d_prime, where the design has two.",
+            levels=(
+                ("differencing", "intervals are compared with each other"),
+                ("independent", "each interval is compared with known alternatives"),
+            ),
+        ),
+        optional("d_prime_other", "number", "Sensitivity under the other model."),
+        optional(
+            "criterion",
+            "number",
+            "c of yes–no and of two-interval forced choice, k of the differencing model of same–different.",
+        ),
+        optional(
+            "share_first",
+            "number",
+            "Share of the first of the answers, such as “first” or “yes”.",
+            minimum=0,
+            maximum=1,
+        ),
+        optional(
+            "fit_p",
+            "number",
+            "p of the function's deviance among simulated sets of answers; below 0.05 the function does not fit.",
+            minimum=0,
+            maximum=1,
+        ),
+        optional("drift", "number", "Correlation of trial number and deviance residual.", minimum=-1, maximum=1),
+    )
+
+    compute = staticmethod(lambda block, opened, _study, _found: sensitivities(block, opened))
+
+    def exported(self) -> Iterator[Mapping[str, Any]]:
+        exponents = {one.participant: one.exponent for one in Exponents.of(self.found)}
+        thresholds = {(one.participant, one.standard): one for one in Thresholds.own(self.found)}
+        for one in self.own(self.found):
+            if one.level is not None:
+                continue
+            row = {column.name: getattr(one, column.name, None) for column in self.columns}
+            row |= {"low": None, "high": None, "participant": one.participant, "block": self.found.block}
+            if one.comparison is None and (threshold := thresholds.get((one.participant, one.standard))) is not None:
+                known = {column.name: getattr(threshold, column.name, None) for column in self.columns}
+                row |= {name: value for name, value in known.items() if value is not None}
+                row |= {"flat_width_threshold": threshold.flat_width, "weber_exponent": exponents.get(one.participant)}
+            yield row | {
+                "condition": one.comparison,
+                "d_prime_model": one.model,
+                "d_prime_other": one.other,
+                "share_first": next(iter(one.shares.values()), None),
+            }
+
+    def shown(self) -> Sequence[Shown]:
+        first = self.rows[0]
+        where = "Comparison" if first.level is None else "Level"
+        measured = any(one.d_prime is not None for one in self.rows)
+        biased = any(one.criterion is not None for one in self.rows)
+        answers = tuple(first.shares)
+        shares: list[Shown] = [
+            (f"“{answer.replace('_', ' ')}”", lambda one, answer=answer: f"{100 * one.shares[answer]:.0f} %")  # type: ignore[misc]
+            for answer in (answers[:1] if len(answers) == 2 else answers)
+        ]
+        return (
+            (where if first.standard is None else f"Standard{unit(self.found)}", _where)
+            if len(set(map(_where, self.rows))) > 1
+            else None,
+            *OF_WHOM,
+            ("d′", lambda one: number(one.d_prime)) if measured else None,
+            INTERVAL_2 if measured else None,
+            ("k" if self.found.design == "samedifferent" else "c", lambda one: number(one.criterion))
+            if biased
+            else None,
+            *shares,
+        )
+
+    def explained(self) -> str:
+        shares = "Percentages are shares of the answers." if self.rows[0].shares else ""
+        if all(one.d_prime is None for one in self.rows):
+            return shares
+        over = "over all levels presented" if self.found.vary is not None else "for each comparison"
+        if self.found.summary == "mean":
+            over = "of each level against the lowest, as d_a from the area under the ROC curve"
+        bias, model = BIASES.get(self.found.design, ""), MODELS.get(self.rows[0].model or "", "")
+        return (
+            f"d′ {over}, from rates with the log-linear correction (Hautus 1995; Macmillan & Creelman 2005); that of "
+            f"the group is the mean over participants with Student’s interval.{model}{bias} {shares}"
+        ).rstrip()
+
+    @classmethod
+    def common_methods(cls, blocks: Sequence[LevelsFound]) -> Iterator[str]:
+        if any(one.d_prime is not None for found in blocks for one in cls.of(found)):
+            yield (
+                "Sensitivity is d′ from rates with the log-linear correction (Hautus 1995), by the model of each "
+                "design (Macmillan & Creelman 2005)."
+            )

@@ -1,0 +1,253 @@
+"""The base class of statistics of levels: one declaration from which all outputs follow, and the words they share.
+
+The coordinate u of a level is its logarithm to the base of ten where levels are spaced so, otherwise the level itself.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis import levels
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.figures.page_layout import Picture
+from study_app.analysis.report.html_page import drawn, heading, paragraph, table_of
+from study_app.analysis.results import LevelsFound, listed, number
+from study_app.analysis.statistics.outcome import student_interval
+from study_app.discovery import modules_of
+from study_app.store.tables.csv_files import Column, optional
+
+R = TypeVar("R")
+Shown: TypeAlias = tuple[str, Callable[[Any], str]] | None
+"""A column of a table of the report: its heading and what makes a cell of a row; None is one that is left out."""
+
+MOTORS: Final = "motors are audible and were not masked: participants may have used their sound."
+BLOCK: Final = Column("block", "text", "Id of the block.")
+STANDARD: Final = optional(
+    "standard", "number", "The standard, in the unit of the varied number; n/a where there is none."
+)
+
+
+class LevelStatistic(Generic[R]):
+    """A statistic of blocks of levels; an instance says what outputs state of it in one block.
+
+    A subclass with a ``key`` in a module of this folder is in every output. ``R`` is the type of its rows; the
+    ``participant`` of a group's is None. A figure is a row of `level_figures.FIGURES`.
+
+    Attributes
+    ----------
+    key : str
+        Its name in report.json.
+    place : float
+        Its place among the others: statistics with lower places are computed before.
+    since : int
+        The first format of the study's file whose report.json has it even if there are no rows.
+    compute : callable
+        Returns the rows of a block from the block, the rows of `tracks`, the study, and what was found before.
+    title : str
+        The heading of its part of the report.
+    figures : tuple of str
+        What the figures below its table are called.
+    table, row, columns : str, str, tuple of Column
+        The name of the exported table (CSV, Parquet, SPSS, codebook), what a row of it is, and its columns: attributes
+        of rows of participants; empty where it exports none.
+    """
+
+    key: ClassVar[str]
+    place: ClassVar[float]
+    since: ClassVar[int] = 1
+    compute: "ClassVar[staticmethod[[LevelBlock, pd.DataFrame, Study, LevelsFound], Iterable[Any]]]"
+    title: ClassVar[str] = ""
+    figures: ClassVar[tuple[str, ...]] = ()
+    table: ClassVar[str] = ""
+    row: ClassVar[str] = ""
+    columns: ClassVar[tuple[Column, ...]] = ()
+
+    def __init__(
+        self, found: LevelsFound, pictures: Mapping[str, Picture] | None = None, estimator: str | None = None
+    ) -> None:
+        self.found = found
+        self.rows = self.of(found)
+        self.pictures = pictures or {}
+        self.estimator = estimator
+
+    @classmethod
+    def of(cls, found: LevelsFound) -> tuple[R, ...]:
+        """Return its rows in a block."""
+        return found.statistics.get(cls.key, ())
+
+    @classmethod
+    def own(cls, found: LevelsFound) -> tuple[R, ...]:
+        """Return its rows of participants in a block."""
+        return tuple(one for one in cls.of(found) if getattr(one, "participant", None) is not None)
+
+    @classmethod
+    def exported_in(cls, study: Study) -> bool:
+        """Return whether a study has its exported table."""
+        return bool(cls.table)
+
+    @classmethod
+    def common_methods(cls, blocks: Sequence[LevelsFound]) -> Iterable[str]:
+        """Return the sentences of the methods paragraph about all blocks together."""
+        return ()
+
+    def exported(self) -> Iterable[Mapping[str, Any]]:
+        """Return the rows of its exported table, with the participant of each."""
+        names = ["participant", *(column.name for column in self.columns)]
+        for one in self.own(self.found):
+            yield {name: getattr(one, name, None) for name in names} | {"block": self.found.block}
+
+    def section(self) -> Iterator[str]:
+        """Yield the HTML of its part of the report."""
+        if not self.rows:
+            return
+        yield heading(3, self.heading())
+        columns = [column for column in self.shown() if column is not None]
+        yield table_of(self.rows, *columns, words=int(columns[0][0] == "Participant"))
+        if words := self.explained():
+            yield paragraph(words, "soft")
+        if published := [one.in_words() for one in self.found.published if self.compares(one.measure)]:
+            yield paragraph(f"Published: {'; '.join(published)}.")
+        for name in self.figures:
+            yield from drawn(self.pictures, f"{name}-{self.found.block}")
+
+    def heading(self) -> str:
+        """Return the heading of its part of the report."""
+        return self.title
+
+    def shown(self) -> Sequence[Shown]:
+        """Return the columns of its table in the report."""
+        raise NotImplementedError
+
+    def explained(self) -> str:
+        """Return what is said below the table."""
+        return ""
+
+    def compares(self, measure: str) -> bool:
+        """Return whether published values of a measure are compared with it."""
+        return False
+
+    def sentences(self) -> Iterable[str]:
+        """Return the sentences of the summary."""
+        return ()
+
+    def limits(self) -> Iterable[str]:
+        """Return the sentences about what it cannot show."""
+        return ()
+
+    def methods(self, block: LevelBlock) -> Iterable[str]:
+        """Return the sentences of the methods paragraph about the block."""
+        return ()
+
+    def standard(self) -> Shown:
+        """Return the column of standards where the rows are at several; else None."""
+
+        def standard(one: Any) -> float | None:
+            return one["standard"] if isinstance(one, dict) else one.standard  # type: ignore[no-any-return]
+
+        if len(set(map(standard, self.rows))) < 2:
+            return None
+        return f"Standard{unit(self.found)}", lambda one: digits(standard(one), 4)
+
+
+@cache
+def statistics() -> tuple[type[LevelStatistic[Any]], ...]:
+    """Return every statistic of the modules of this folder, in the order of their places."""
+    held = {one for module in modules_of(levels) for one in vars(module).values() if isinstance(one, type)}
+    found = {one for one in held if issubclass(one, LevelStatistic) and hasattr(one, "key")}
+    return tuple(sorted(found, key=lambda one: one.place))
+
+
+def digits(value: float | None, count: int = 3) -> str:
+    """Return a number with so many digits, a dash where there is none."""
+    return "–" if value is None else f"{value:.{count}g}"
+
+
+def signed(value: float | None) -> str:
+    """Return a number with three digits and its sign, a dash where there is none."""
+    return "–" if value is None else f"{value:+.3g}".replace("-", "−")
+
+
+def plain(value: float | str | None) -> str:
+    """Return a level, a standard or a condition as a cell."""
+    return value.replace("_", " ") if isinstance(value, str) else digits(value, 4)
+
+
+def between(low: float | None, high: float | None, written: Callable[[float], str] = digits) -> str:
+    """Return an interval, a dash where there is none."""
+    return "–" if low is None or high is None else f"{written(low)} – {written(high)}"
+
+
+def unit(found: LevelsFound) -> str:
+    """Return the unit of the varied number in brackets."""
+    return f" [{found.unit}]" if found.unit else ""
+
+
+OF_WHOM: Final[tuple[tuple[str, Callable[[Any], str]], ...]] = (
+    ("Participant", lambda one: one.participant or f"group of {one.n}"),
+    ("n", lambda one: "–" if one.participant is None else str(one.n)),
+)
+"""The columns that say of whom a row is."""
+INTERVAL: Final[Shown] = ("95 % interval", lambda one: between(one.low, one.high))
+INTERVAL_2: Final[Shown] = ("95 % interval", lambda one: between(one.low, one.high, number))
+"""With two decimals."""
+
+KINDS: Final = {"weber": "Weber fractions", "difference": "differences", "value": "values"}
+LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
+
+
+def level_words(found: LevelsFound) -> str:
+    """Return what a level is, with its unit: "Weber fraction of viscosity", "Viscosity [Pa·s]", "Condition"."""
+    if found.quantity is None:
+        return "Condition"
+    words = f"{LEVELS[found.level_kind]}{found.quantity}"
+    return words[:1].upper() + words[1:] + ("" if found.level_kind == "weber" else unit(found))
+
+
+def with_unit(found: LevelsFound, value: float) -> str:
+    """Return a value of the varied number with its unit."""
+    return f"{value:g} {found.unit or ''}".rstrip()
+
+
+def standards_of(found: LevelsFound, rows: Iterable[Any]) -> str:
+    """Return the standards of rows in words: " of 4 and 8 N·s/m"; nothing without any."""
+    standards = sorted({one.standard for one in rows if one.standard is not None})
+    return f" of {listed([f'{one:g}' for one in standards])} {found.unit}".rstrip() if standards else ""
+
+
+def interval_words(one: Any, written: Callable[[float], str]) -> str:
+    """Return the interval of a row in words."""
+    if one.low is None or one.high is None:
+        return "no interval"
+    return f"95 % interval {written(one.low)} to {written(one.high)}"
+
+
+def analysed(block: LevelBlock, opened: pd.DataFrame, answer: str = "response") -> pd.DataFrame:
+    """Return the rows of a block that are analysed, those with this column known."""
+    return opened[(opened["block"] == block.id) & opened["analysed"] & opened[answer].notna()]
+
+
+def mean_over(
+    own: Sequence[R],
+    middle: str,
+    *others: str,
+    coordinate: Callable[[float], float] = float,
+    level_of: Callable[[float], float] = float,
+    **group: Any,
+) -> R:
+    """Return the group of these participants: means over those in whom a number is known; ``group`` are other values.
+
+    That of ``middle`` is a mean in the coordinate u with Student's 95 % interval.
+    """
+    known = {name: [value for one in own if (value := getattr(one, name)) is not None] for name in (middle, *others)}
+    means: dict[str, Any] = {name: float(np.mean(values)) if values else None for name, values in known.items()}
+    u = np.array([coordinate(value) for value in known.pop(middle)])
+    ends = student_interval(u) if len(u) else (None, None)
+    low, high = (None if end is None else level_of(end) for end in ends)
+    means[middle] = level_of(float(u.mean())) if len(u) else None
+    first: Any = own[0]
+    return replace(first, participant=None, n=len(own), low=low, high=high, **means, **group)  # type: ignore[no-any-return]

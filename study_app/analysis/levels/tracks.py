@@ -1,0 +1,153 @@
+"""Tracks of blocks with a design: the last attempt at each trial, with what it presented, as one table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import pandas as pd
+
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.study_tables import Study
+from study_app.protocol.trials.methods import Answer, TrackSetting
+from study_app.protocol.trials.presentation import arrangement_of
+from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus
+
+TRACK: Final = ["participant", "session", "block", "code"]
+"""What one track is in the rows of `tracks`."""
+PRESENTATION: Final = ["participant", "session", "trial", "attempt"]
+OF_INTERVALS: Final = ("force_mean_n", "mean_speed_mps")
+"""What a trial's row repeats of each of its intervals."""
+_DELIVERED: Final = tuple(f"{what}_{letter}" for what in ("value", "delay_error_ms") for letter in "CS")
+"""Means over the intervals of a trial that presented the comparison, and over those that presented the standard."""
+_TYPES: Final = {
+    "track": "string",
+    "comparison": "Float64",
+    "comparison_interval": "Int64",
+    "right": "boolean",
+    "success": "boolean",
+    "analysed": "boolean",
+    "level_delivered": "Float64",
+}
+"""What follows from a trial's arrangement, level and answer."""
+_READ: Final = ("block", "code", "index", "counted", "arrangement", "standard", "level", "response", *_DELIVERED)
+
+
+def answers_timed(study: Study) -> pd.DataFrame:
+    """Return all answers after trials of levels, with ``response_s``: from the question to the first choice [s]."""
+    rows = study.answered
+    if not study.levels:
+        return rows.iloc[:0].assign(response_s=pd.Series(dtype="Float64"))
+    rows = rows[rows["block"].isin([block.id for block in study.levels]).fillna(False)]
+    return rows.assign(response_s=(rows["first_choice_s"] - rows["onset_s"]).astype("Float64").round(6))
+
+
+def tracks(study: Study) -> pd.DataFrame:
+    """Return the last attempt at each trial of levels, with what it presented; the key must be open.
+
+    ``right`` says whether the answer was correct, ``success`` what it counts as for a psychometric function;
+    ``analysed`` is false where the trial does not count or presents the modulus of a magnitude estimation; ``reversal``
+    says where an up–down track changed its direction.
+    """
+    by_id = {block.id: block for block in study.levels}
+    rows = study.trials[study.trials["block"].isin(list(by_id))]
+    rows = rows.sort_values("attempt").drop_duplicates(PRESENTATION[:-1], keep="last").sort_index()
+    answers = answers_timed(study)[[*PRESENTATION, "response", "value", "response_s"]]
+    found = rows.merge(_presented(study.intervals), on=PRESENTATION, how="left")
+    found = found.merge(answers, on=PRESENTATION, how="left")
+    found["slot"] = found.groupby(TRACK).cumcount() + 1
+    track_rows = [_track_row(by_id[row["block"]], row) for row in found[list(_READ)].to_dict("records")]
+    found = found.drop(columns=list(_DELIVERED))
+    found = found.join(pd.DataFrame(track_rows, index=found.index, columns=list(_TYPES)).astype(_TYPES))
+    return found.assign(reversal=_reversals(found, by_id))
+
+
+def setting_of(block: LevelBlock, track: str) -> TrackSetting | None:
+    """Return what the levels of a track ("8/1") were chosen for; None where conditions are compared."""
+    number = track.rpartition("/")[2]
+    return None if block.stimulus is None else TrackSetting(block.stimulus, block.design, int(number))
+
+
+def answers_of(rows: pd.DataFrame) -> list[Answer]:
+    """Return the answers of one track as its method heard them: those that were not counted, too."""
+    heard = _heard(rows)
+    return list(zip(heard["level"].astype(float), heard["success"].astype(bool), strict=True))
+
+
+def _heard(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows whose answers moved their track, in order: neither catch trials nor the standard alone."""
+    compared = rows["success"].notna() & rows["level"].notna() & rows["arrangement"].str.contains("C").fillna(False)
+    return rows[compared & ~rows["catch"].fillna(False).astype(bool)].sort_values("trial")
+
+
+def _reversals(found: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Series[Any]:
+    """Return whether the direction of its track changed at each trial; missing where the method has no steps."""
+    reversal = pd.Series(pd.NA, index=found.index, dtype="boolean")
+    for _, rows in found.groupby(TRACK, sort=False):
+        block = blocks[rows["block"].iloc[0]]
+        setting = setting_of(block, rows["track"].iloc[0])
+        if setting is None or block.method is None or block.method.target_percent is None:
+            continue
+        at, places = block.method.reversals(setting, answers_of(rows)), _heard(rows).index
+        reversal[places] = False
+        reversal[places[list(at)]] = True
+    return reversal
+
+
+def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:
+    track = next(one.condition for one in block.settings if one.code == row["code"])
+    found: dict[str, Any] = {**dict.fromkeys(_TYPES, pd.NA), "track": track}
+    found["analysed"] = bool(row["counted"]) and not block.presents_modulus(int(row["index"]))
+    letters = row["arrangement"]
+    if pd.isna(letters) or len(letters) < block.design.intervals:  # the trial ended before its last interval
+        return found
+    if letters.count("C") == 1 and block.design.intervals > 1:
+        found["comparison_interval"] = letters.index("C") + 1
+    if block.stimulus is not None and not pd.isna(row["level"]):
+        standard = None if pd.isna(row["standard"]) else float(row["standard"])
+        found["comparison"] = block.stimulus.comparison(standard, float(row["level"]))
+        found["level_delivered"] = _level_delivered(block.stimulus, standard, found["comparison"], row)
+    if not pd.isna(row["response"]):
+        arrangement, answer = arrangement_of(block.design, letters), str(row["response"])
+        correct, success = block.design.is_correct(arrangement, answer), block.design.success(arrangement, answer)
+        if block.has_correct_answer and correct is not None:
+            found["right"] = correct
+        found["success"] = pd.NA if success is None else success
+    return found
+
+
+def _level_delivered(stimulus: Stimulus, standard: float | None, comparison: float, row: Mapping[Any, Any]) -> Any:
+    """Return the level at which the comparison was delivered; missing where it was not measured, or not presented.
+
+    Of a delay it is the requested one and how much more late the comparison's frames were than the standard's.
+    """
+    value, of_standard, error_ms, of_standard_ms = (row[name] for name in _DELIVERED)
+    if stimulus.vary == DELAY:
+        if pd.isna(error_ms):
+            return pd.NA
+        late_ms = float(error_ms) - (0.0 if pd.isna(of_standard_ms) else float(of_standard_ms))
+        return stimulus.level_between(standard, comparison + late_ms)
+    if pd.isna(value):
+        return pd.NA
+    if stimulus.vary == FORCE_DELAY and standard is not None and not pd.isna(of_standard):
+        return stimulus.level_between(standard, standard + float(value) - float(of_standard))
+    return stimulus.level_between(standard if pd.isna(of_standard) else float(of_standard), float(value))
+
+
+def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
+    """Return a row per presentation: standard, level, arrangement, and of each interval force and speed."""
+    ordered = intervals.sort_values([*PRESENTATION, "interval"])
+    letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")
+    found = ordered.groupby(PRESENTATION, sort=False)[["standard", "level", "catch", "setting"]].first()
+    presented: dict[Any, str] = {}
+    for which, letter in zip(zip(*(ordered[name] for name in PRESENTATION), strict=True), letters, strict=True):
+        presented[which] = presented.get(which, "") + letter
+    found["arrangement"] = pd.Series(presented, dtype="string").reindex(found.index)
+    for name, what in (("value_delivered", "value"), ("delay_error_mean_ms", "delay_error_ms")):
+        means = ordered.assign(letter=letters).groupby([*PRESENTATION, "letter"])[name].mean().unstack("letter")
+        for letter in "CS":
+            found[f"{what}_{letter}"] = means.get(letter, pd.NA)
+    for name in OF_INTERVALS:
+        wide = ordered.pivot(index=PRESENTATION, columns="interval", values=name)
+        found = found.join(wide.rename(columns={number: f"{name}_{number}" for number in wide.columns}))
+    return found.reset_index()
