@@ -11,10 +11,9 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.findings import all_findings
-from study_app.analysis.report import number_files, sentences
+from study_app.analysis.report import number_files, sections
 from study_app.analysis.report.number_files import plain
-from study_app.analysis.report.sections import answers, block, first_page
-from study_app.analysis.report.sentences import methods
+from study_app.analysis.report.sections import answers, block, first_page, methods
 from study_app.analysis.results import Failures, Results
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study
 from tests.analysis.report.read_report import FORBIDDEN, seen
@@ -53,8 +52,8 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
     json.dumps(plain(results), allow_nan=False)
     failures = Failures()
     figures = list(pictures(made, results, forms, failures)) if forms else []
-    texts = [*sentences.findings(results), methods(made, results), *sentences.limits(made, results)]
-    page = first_page(results, sentences.limits(made, results))
+    texts = [*sections.findings(results), methods(made, results), *sections.limits(made, results)]
+    page = first_page(results, sections.limits(made, results))
     texts.append(seen(re.sub(r'src="[^"]*"', 'src="#part-"', page)))
     for found in results.blocks:
         section = " ".join(block(found, results, figures, failures))

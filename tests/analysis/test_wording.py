@@ -12,8 +12,7 @@ from study_app.analysis.export.table_files import codebook_bytes
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold
 from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
 from study_app.analysis.findings.statement_tests import DelayTrend, SessionsDiffer, SettingsDiffer
-from study_app.analysis.report.sections import block
-from study_app.analysis.report.sentences import findings, methods
+from study_app.analysis.report.sections import block, findings, methods
 from study_app.analysis.results import BlockFound, Results, all_of, said_of_presentations
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 

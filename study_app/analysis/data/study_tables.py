@@ -13,7 +13,7 @@ Without groups or sites, and until the study is unblinded, there is nothing.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -78,16 +78,6 @@ def _all(each: Mapping[str, Iterable[Setting]]) -> tuple[Setting, ...]:
     return tuple(dict.fromkeys(renamed(site, one) for site, settings in each.items() for one in settings))
 
 
-def pooled_settings(sites: Mapping[str, Settings]) -> Settings:
-    """Return what every (block, code) of the merged study stands for; nothing while the sites are sealed."""
-    return {
-        (block, own.code): own
-        for site, settings in sites.items()
-        for (block, _), one in settings.items()
-        for own in [renamed(site, one)]
-    }
-
-
 def pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, ...]:
     """Return the blocks, which all sites have, with the settings of all sites."""
     first = next(iter(sites.values()))
@@ -121,29 +111,18 @@ def pooled_questions(sites: Mapping[str, AskedQuestions]) -> AskedQuestions:
     return AskedQuestions(questions({site: asked.questions for site, asked in sites.items()}), scores)
 
 
-def pooled_table(sites: Mapping[str, tuple[Settings, pd.DataFrame]]) -> pd.DataFrame:
-    """Return a table of all sites, with the site in the participants' IDs and the merged study's codes."""
-    return pd.concat([_own(site, *of_site) for site, of_site in sites.items()], ignore_index=True)
-
-
-def _own(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame:
+def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of a site, with the site in the participants' IDs and the merged study's codes."""
     if "participant" not in table:
         return table
     table = table.assign(participant=f"{site}{DASH}" + table["participant"])
     if "code" not in table:
         return table
-    pairs = list(zip(table["block"].to_numpy(), table["code"].to_numpy(), strict=True))
-    places = {pair: place for place, pair in enumerate(dict.fromkeys(pairs))}
-    codes = [_code(site, settings, *pair) for pair in places]
-    which = np.fromiter((places[pair] for pair in pairs), dtype=np.int64, count=len(pairs))
-    return table.assign(code=pd.array(codes, dtype="string").take(which))
-
-
-def _code(site: str, settings: Settings, block: object, code: object) -> str | None:
-    """Return the code of a row in the merged study; None of an answer in a form."""
-    if pd.isna(code):  # type: ignore[call-overload]
-        return None
-    return renamed(site, settings.get((str(block), str(code)), Setting(str(code)))).code
+    codes = [
+        None if pd.isna(code) else renamed(site, settings.get((block, code), Setting(code))).code
+        for block, code in zip(table["block"], table["code"], strict=True)
+    ]
+    return table.assign(code=pd.array(codes, dtype="string"))
 
 
 def pooled_dynamics(sites: Iterable[OwnDynamics | None], sessions: int) -> OwnDynamics | None:
@@ -339,7 +318,8 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
     estimators = [one.estimator.split(" or ") for one in studies if one.estimator is not None]
 
     def table(name: str) -> pd.DataFrame:
-        return pooled_table({site: (one.settings, getattr(one, name)) for site, one in sites.items()})
+        tables = [_of_site(site, one.settings, getattr(one, name)) for site, one in sites.items()]
+        return pd.concat(tables, ignore_index=True)
 
     return replace(
         studies[0],
@@ -348,7 +328,12 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
         blocks=pooled_blocks({site: one.blocks for site, one in sites.items()}),
         levels=pooled_blocks({site: one.levels for site, one in sites.items()}),
         others=pooled_questions({site: one.others for site, one in sites.items()}),
-        settings=pooled_settings({site: one.settings for site, one in sites.items()}),
+        settings={
+            (block, own.code): own
+            for site, one in sites.items()
+            for (block, _), setting in one.settings.items()
+            for own in [renamed(site, setting)]
+        },
         responses=table("responses"),
         trials=table("trials"),
         participants=table("participants"),
@@ -507,44 +492,32 @@ def _of_statements(table: pd.DataFrame) -> pd.DataFrame:
 By: TypeAlias = Literal["group", "site"]
 
 
-@dataclass(frozen=True, slots=True)
-class GroupMean:
-    """Answers of one group, or site, to one statement on one setting; each participant's mean counts once.
-
-    ``mean`` is in points of the scale; ``sd``, between participants, is None for one participant.
-    """
-
-    block: str
-    item: str
-    code: str
-    group: str
-    n: int
-    mean: float
-    sd: float | None
-
-
 def group_counts(study: Study, by: By = "group") -> dict[str, int]:
     """Return how many participants that count each group, or site, has, by name."""
     counts = _members(study, by)[by].value_counts()
     return {str(group): int(counts[group]) for group in sorted(counts.index)}
 
 
-def group_means(study: Study, by: By = "group") -> Iterator[GroupMean]:
-    """Yield the answers to each statement of each block, by group or site, in the order of the blocks."""
+def group_means(study: Study, by: By = "group") -> list[Any]:
+    """Return rows of the answers to each statement, by group or site, in the order of blocks, items and settings.
+
+    They have ``block``, ``item``, ``code``, ``group``, ``n`` participants, each with his or her mean, and their
+    ``mean`` and ``sd`` in points of the scale, NaN of one participant.
+    """
     members = _members(study, by)
     if members.empty:
-        return
-    rows = study.responses[study.responses["counted"]].merge(members, on="participant")
-    rows = rows.assign(response=rows["response"].astype("Float64")).dropna(subset=["response"])
-    for block in study.blocks:
-        own = rows[rows["block"] == block.id]
-        for item in block.items:
-            for code in block.codes:
-                here = own[(own["item"] == item.id) & (own["code"] == code)]
-                for group, answers in here.groupby(by):
-                    means = answers.groupby("participant")["response"].mean().astype(float)
-                    sd = float(means.std()) if len(means) > 1 else None
-                    yield GroupMean(block.id, item.id, code, str(group), len(means), float(means.mean()), sd)
+        return []
+    rows = study.responses[study.responses["counted"] & study.responses["response"].notna()].merge(
+        members, on="participant"
+    )
+    rows = rows.assign(response=rows["response"].astype(float))
+    of = ["block", "item", "code", by]
+    each = rows.groupby([*of, "participant"])["response"].mean().groupby(of).agg(["size", "mean", "std"])
+    found = each.reset_index().set_axis(["block", "item", "code", "group", "n", "mean", "sd"], axis="columns")
+    order = [(block.id, item.id, code) for block in study.blocks for item in block.items for code in block.codes]
+    places = [order.index(which) for which in zip(found["block"], found["item"], found["code"], strict=True)]
+    found = found.assign(place=places).sort_values(["place", "group"])
+    return list(found.itertuples(index=False))
 
 
 def _members(study: Study, by: By) -> pd.DataFrame:

@@ -233,20 +233,18 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
 
 
 def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
-    """Add what the code stood for, where the key is open."""
-    if not study.revealed:
-        return table
-    pairs = list(zip(table["block"].to_numpy(), table["code"].to_numpy(), strict=True))
-    places = {pair: place for place, pair in enumerate(dict.fromkeys(pairs))}
-    which = np.fromiter((places[pair] for pair in pairs), dtype=np.int64, count=len(pairs))
-    settings = [OF_A_FORM if pd.isna(pair[0]) else study.settings[pair] for pair in places]
-    delay_ms = np.array([np.nan if one.delay_ms is None else one.delay_ms for one in settings], np.float64)[which]
-    return table.assign(
-        condition=pd.array([one.condition for one in settings], dtype="string").take(which),
-        liquid=pd.array([one.liquid for one in settings], dtype="string").take(which),
+    """Add what each code stood for: nothing of an answer in a form, and while the key is sealed."""
+    pairs = zip(table["block"], table["code"], strict=True)
+    settings = [study.settings.get(pair, OF_A_FORM) for pair in pairs]
+    delay_ms = np.array([np.nan if one.delay_ms is None else one.delay_ms for one in settings], np.float64)
+    named = table.assign(
+        condition=pd.array([one.condition for one in settings], dtype="string"),
+        liquid=pd.array([one.liquid for one in settings], dtype="string"),
         delay_ms=delay_ms,
-        delay_achieved_ms=(table["delay_error_mean_ms"] + delay_ms).round(6),
     )
+    if "delay_error_mean_ms" in table:
+        named["delay_achieved_ms"] = (table["delay_error_mean_ms"] + delay_ms).round(6)
+    return named
 
 
 def _with_delay_error(study: Study) -> pd.DataFrame:
@@ -264,25 +262,14 @@ def _aggregate_head() -> tuple[Column, ...]:
 def _aggregate(study: Study) -> pd.DataFrame:
     frames = []
     for block in study.blocks:
-        settings = {setting.code: setting for setting in block.settings}
         found = study.aggregate(block)
-        presented = [settings[code] for code in found["code"]]
-        frames.append(
-            found.assign(
-                study=study.name,
-                simulated=study.simulated,
-                pilot=study.pilot,
-                block=block.id,
-                condition=pd.array([setting.condition for setting in presented], dtype="string"),
-                liquid=pd.array([setting.liquid for setting in presented], dtype="string"),
-                delay_ms=np.array([setting.delay_ms for setting in presented], dtype=np.float64),
-                short=found["item"].map({item.id: item.short for item in block.items}),
-            )
-        )
+        shorts = found["item"].map({item.id: item.short for item in block.items})
+        frames.append(found.assign(block=block.id, short=shorts))
     if not frames:
         names = [*header(_aggregate_head()), *header(OPENED), *header(MEASURED)]
         return pd.DataFrame({name: pd.Series(dtype=object) for name in names})
-    return pd.concat(frames, ignore_index=True)
+    found = pd.concat(frames, ignore_index=True)
+    return _named(study, found.assign(study=study.name, simulated=study.simulated, pilot=study.pilot))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from study_app.analysis.data.blocks import Block, Direction
 from study_app.analysis.data.motion import OF_REACHES
-from study_app.analysis.figures import delay_figures
+from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.finding import (
     FOUND,
@@ -515,7 +515,7 @@ class DetectionThreshold(Finding[Threshold | None]):
             f"{curve}{dashed}"
         )
         return drawing.picture(
-            self.figure_title, caption, lambda look: delay_figures.draw_threshold(threshold, lowest, look)
+            self.figure_title, caption, lambda look: answer_figures.draw_threshold(threshold, lowest, look)
         )
 
     def sentences(self) -> Iterator[str]:
@@ -669,13 +669,13 @@ class Movement(Finding[None]):
         foot = "Added delay, ms. A participant's point: the median of a trial's reaches, the first left out."
         caption = (
             f"How participants reached, over the delay that was asked for ({drawing.simulated}{n} with recordings). "
-            f"Thin lines: {delay_figures.line_words(len(people))}; thick line: median; band: the middle half. "
+            f"Thin lines: {answer_figures.line_words(len(people))}; thick line: median; band: the middle half. "
             "Movement time: from the lighting of a target to the entry that was held. Scales do not begin at zero. "
             f"{_kept(block, drawing.results)}"
         )
         return drawing.picture(
             self.figure_title,
             caption,
-            partial(delay_figures.draw_movement, plots, [setting.delay_ms or 0.0 for setting in block.settings], foot),
+            partial(answer_figures.draw_movement, plots, [setting.delay_ms or 0.0 for setting in block.settings], foot),
             (f"{n} with recordings", n),
         )

@@ -18,7 +18,7 @@ from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
-from study_app.analysis.report import number_files, sections, sentences
+from study_app.analysis.report import number_files, sections
 from study_app.analysis.report.html_page import (
     attempted,
     box,
@@ -31,7 +31,7 @@ from study_app.analysis.report.html_page import (
     table,
 )
 from study_app.analysis.report.number_files import r_script
-from study_app.analysis.report.sentences import methods, version_words
+from study_app.analysis.report.sections import methods, version_words
 from study_app.analysis.results import Failure, Failures, Progress, Results, counted, silent
 from study_app.errors import AnalysisError
 from study_app.store.blinded.unblinding import reveals_of
@@ -106,8 +106,8 @@ def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, b
         return (f"Not there: {found.why}.",) if isinstance(found, Failure) else found
 
     texts: dict[str, Any] = {
-        "findings": told("findings", lambda: sentences.findings(results)),
-        "limits": told("limits", lambda: sentences.limits(study, results)),
+        "findings": told("findings", lambda: sections.findings(results)),
+        "limits": told("limits", lambda: sections.limits(study, results)),
         "methods": told("methods", lambda: (methods(study, results),))[0],
     }
     files: dict[str, bytes] = {}
@@ -196,7 +196,7 @@ def _short(texts: Mapping[str, Any], results: Results) -> Iterator[str]:
         return
     yield heading(2, "In short: every finding in a sentence")
     found = texts["findings"]
-    yield bullets(found) if found else paragraph(sentences.none_found(results))
+    yield bullets(found) if found else paragraph(sections.none_found(results))
 
 
 def _again(study: Study, results: Results) -> Iterator[str]:

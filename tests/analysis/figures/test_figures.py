@@ -11,7 +11,7 @@ from matplotlib.text import Text
 
 from study_app import figure_style as style
 from study_app.analysis.data.study_tables import load_study
-from study_app.analysis.figures import answer_figures, delay_figures, study_figures
+from study_app.analysis.figures import answer_figures, study_figures
 from study_app.analysis.figures.page_layout import Look
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Answer, Results, twelve
@@ -165,7 +165,7 @@ def test_the_lowest_delay_is_marked_at_its_place_on_the_true_scale(rek: Results,
 
 def test_motion_is_drawn_for_every_participant_with_its_own_scale() -> None:
     values = np.array([[0.8, 0.9, 1.0], [0.85, np.nan, 1.1]])
-    figure = delay_figures.draw_movement(
+    figure = answer_figures.draw_movement(
         [("Time, s", values), ("Flat", np.ones((2, 3)))],
         [0.0, 100.0, 200.0],
         "",
@@ -185,16 +185,16 @@ def test_motion_is_drawn_for_every_participant_with_its_own_scale() -> None:
 def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
     values = np.tile(np.array([1.0, 2.0, 3.0]), (500, 1))
     values[::2] += 1
-    figure = delay_figures.draw_movement(
+    figure = answer_figures.draw_movement(
         [("Time, s", values)], [0.0, 100.0, 200.0], "", Look("Motion", [], ["n = 500"], style.PRINT_FONTS)
     ).figure
     gids = {str(line.get_gid()): line for line in figure.axes[0].lines}
     drawn = [gid for gid in gids if "participant" in gid]
-    assert len(drawn) == delay_figures.MOST_LINES
+    assert len(drawn) == answer_figures.MOST_LINES
     assert {"measure1-participant1", "measure1-participant500"} <= set(drawn)
     assert np.asarray(gids["measure1-median"].get_ydata()).tolist() == [1.5, 2.5, 3.5]
-    assert delay_figures.line_words(500) == "60 of the 500 participants, evenly chosen in the order of their ids"
-    assert delay_figures.line_words(60) == "participants"
+    assert answer_figures.line_words(500) == "60 of the 500 participants, evenly chosen in the order of their ids"
+    assert answer_figures.line_words(60) == "participants"
 
 
 def words(figure: Figure) -> list[str]:

@@ -11,7 +11,7 @@ from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.findings.delays import ContrastsWithControl, ContrastWithControl, Lowest, LowestDelay, by_delay
 from study_app.analysis.findings.finding import MANY
 from study_app.analysis.findings.other_assumptions import asked_again
-from study_app.analysis.report.sentences import findings, limits
+from study_app.analysis.report.sections import findings, limits
 from study_app.analysis.results import BlockFound
 from study_app.analysis.results import Results as Found
 from study_app.analysis.statistics.equivalence import tost

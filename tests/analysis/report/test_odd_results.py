@@ -7,7 +7,7 @@ import pytest
 
 from study_app.analysis.data.study_tables import group_counts, group_means, load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.report.sentences import methods
+from study_app.analysis.report.sections import methods
 from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse, source_bytes

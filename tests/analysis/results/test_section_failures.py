@@ -32,7 +32,7 @@ TESTS = {
 WRITING = {
     "figures.answer_figures.render": "figure liquids",
     "report.write_report.methods": "texts: methods",
-    "report.write_report.sentences.findings": "texts: findings",
+    "report.write_report.sections.findings": "texts: findings",
     "report.write_report.r_script": "report.R",
     "report.number_files.motion_csv": "motion.csv",
     "findings.delays.LowestDelay.section": "lowest delay",
