@@ -11,7 +11,7 @@ from study_app.analysis.data.motion import Performance, performance
 from study_app.analysis.data.questions import questions_found, scores_found
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
-from study_app.analysis.findings.finding import SEALED, Asked, asked, facts, untested
+from study_app.analysis.findings.finding import SEALED, BlockAnswers, block_answers, block_facts, untested
 from study_app.analysis.levels.evaluate import levels_found
 from study_app.analysis.levels.thresholds import site_thresholds
 from study_app.analysis.results import (
@@ -68,11 +68,11 @@ def _ending(progress: Progress, what: str, share: float) -> None:
 
 def _evaluated(study: Study, failures: Failures, progress: Progress, *, planning: bool) -> Results:
     def tested(number: int, block: Block) -> BlockFound:
-        def each(what: str) -> None:
+        def tell(what: str) -> None:
             progress(f"testing: {what}", 0.5 * number / len(study.blocks))
 
         def test() -> BlockFound:
-            return found_in(study, asked(study, block, SEED, each, failures, planning=planning))
+            return found_in(study, block_answers(study, block, SEED, tell, failures, planning=planning))
 
         found = failures.attempt("all tests", test, block=block.id)
         return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
@@ -103,10 +103,10 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, planning
     )
 
 
-def found_in(study: Study | None, answers: Asked) -> BlockFound:
+def found_in(study: Study | None, answers: BlockAnswers) -> BlockFound:
     """Test everything that a block's answers can answer; without a study no measures."""
     block = answers.block
-    found = facts(study, answers)
+    found = block_facts(study, answers)
     settings: list[NotTested] = []
     not_tested: list[NotTested] = []
     for finding in all_findings():

@@ -113,7 +113,7 @@ def unreadable(path: Path, error: OSError, remedy: str = "restore it from a copy
 
 @dataclass(frozen=True)
 class Session:
-    """What was asked, what was answered, and the facts of the visit (``facts``: one row of ``Study.participants``).
+    """What was asked, what was answered, and the facts of the visit (``visit``: one row of ``Study.participants``).
 
     ``own_dynamics`` are the device's own damping [N·s/m], friction [N] and mass [kg], means over axes; None where they
     were not measured. ``device_velocity`` is whether the device measured its velocity, in place of the estimator.
@@ -125,14 +125,14 @@ class Session:
     version: str
     protocol: Mapping[str, Any]
     blocks: tuple[Block, ...]
-    facts: Mapping[str, Any]
+    visit: Mapping[str, Any]
     others: AskedQuestions = NO_QUESTIONS
     levels: tuple[LevelBlock, ...] = ()
     own_dynamics: tuple[float, float, float] | None = None
     device_velocity: bool = False
 
     @property
-    def asked(self) -> tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]:
+    def questionnaire(self) -> tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]:
         """Block, codes and items, and forms with their items: what must be alike in sessions that are pooled."""
         blocks = ((block.id, block.codes_as_dealt, tuple(item.id for item in block.items)) for block in self.blocks)
         others = ((one.where.id, (one.id,), (one.question.kind_id,)) for one in self.others.questions)
@@ -160,7 +160,7 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             text_in(head["title"], spoken(protocol)),
             str(head["version"]),
         )
-        facts = {
+        visit = {
             "participant": folder.participant,
             "session": folder.number,
             **{name: receipt[name] for name in ("simulated", "pilot", "status", "language", "started_at", "ended_at")},
@@ -182,7 +182,7 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             "written by another version of the program; restore it from a copy"
         ) from error
     return Session(
-        folder, study, title, version, protocol, blocks, facts, others, levels, own_dynamics, device_velocity
+        folder, study, title, version, protocol, blocks, visit, others, levels, own_dynamics, device_velocity
     )
 
 
@@ -228,7 +228,7 @@ def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
     _check_own(sessions, paths, table, lengths)
     if name == "responses":
         _check_answers(sessions, paths, table, lengths)
-    status = np.repeat([session.facts["status"] for session in sessions], lengths)
+    status = np.repeat([session.visit["status"] for session in sessions], lengths)
     return table.assign(session_status=pd.array(status, dtype="string"))
 
 

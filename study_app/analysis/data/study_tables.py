@@ -378,7 +378,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
     answers_count = (of_forms["session_status"] == COMPLETED) & ~of_forms["excluded"]
     of_forms = of_forms.assign(counted=answers_count.astype(bool))
     answered = pd.concat([counted, of_forms]).sort_index() if len(of_forms) else counted
-    participants = with_excluded(pd.DataFrame([session.facts for session in records]), listed)
+    participants = with_excluded(pd.DataFrame([session.visit for session in records]), listed)
     return Study(
         folder=place.path,
         name=records[0].study,
@@ -457,12 +457,12 @@ def _check_alike(first: Session, other: Session) -> None:
     """Refuse to pool what was not asked alike, or not under one key."""
     if other.study != first.study:
         raise AnalysisError(_other_study(other, first))
-    if other.facts["key_hash"] != first.facts["key_hash"]:
+    if other.visit["key_hash"] != first.visit["key_hash"]:
         raise AnalysisError(
             f"{other.folder.path} and {first.folder.path} ran under different sealed keys, so that one code does not "
             "mean one thing: keep them in folders of their own"
         )
-    if other.asked != first.asked:
+    if other.questionnaire != first.questionnaire:
         raise AnalysisError(
             f"{other.folder.path} (version {other.version}) was asked other statements than {first.folder.path} "
             f"(version {first.version}): keep the versions of a study in folders of their own"

@@ -10,15 +10,7 @@ from matplotlib.axes import Axes
 
 from study_app import figure_style as style
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.page_layout import (
-    MARGIN_PT,
-    Picture,
-    Sheet,
-    attempted,
-    files_of,
-    sample_words,
-    study_marks,
-)
+from study_app.analysis.figures.page_layout import MARGIN_PT, Look, Picture, Sheet, attempted, picture_of, sample_words
 from study_app.analysis.levels.answers import (
     Answers,
     LevelAnswers,
@@ -54,13 +46,11 @@ LEAST_LEVELS: Final = 3
 
 
 def panels(
-    study: Study,
-    title: str,
+    look: Look,
     above: str,
     names: Sequence[tuple[str, str]],
     draw: Callable[[Axes, int, bool], None],
     below: str,
-    fonts: Sequence[str],
     *,
     keys: Sequence[tuple[str, str]] = (),
     foot_pt: float = 28.0,
@@ -71,9 +61,7 @@ def panels(
     panel's place, and whether it is the first of its row.
     """
     rows = math.ceil(len(names) / COLUMNS)
-    height = HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + foot_pt + 14
-    sheet = Sheet(style.PAGE_WIDTH_PT, height, fonts)
-    sheet.heading(title, study_marks(study), (counted(study.n, "participant"),))
+    sheet = look.sheet(HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + foot_pt + 14)
     sheet.text(MARGIN_PT, 28, above, size=7, colour=style.TEXT_SOFT)
     x = sheet.width_pt - MARGIN_PT
     for words, colour in reversed(keys):
@@ -157,7 +145,6 @@ COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b
 def level_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
     """Draw the answers over levels of a block."""
     bands = _bands(study, found)
-    files = files_of(partial(_draw_levels, study, found, bands), forms, f"{study.name}: {found.title}")
     own = len(people(found)) - MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} in the table alone." if own > 0 else ""
     chance = "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
@@ -165,7 +152,7 @@ def level_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
         f"{found.title}: {summary_words(found)} at each level. {_panels(found, bool(bands))}{chance}{left_out} "
         f"{sample_words(study, len(people(found)))}"
     )
-    return Picture(found.block, name, caption, files)
+    return picture_of(study, found.block, name, found.title, caption, partial(_draw_levels, found, bands), forms)
 
 
 def _bands(study: Study, found: LevelsFound) -> Mapping[str, Array]:
@@ -193,7 +180,7 @@ def _panels(found: LevelsFound, banded: bool) -> str:
 
 
 @style.own_settings()
-def _draw_levels(study: Study, found: LevelsFound, bands: Mapping[str, Array], fonts: Sequence[str]) -> Sheet:
+def _draw_levels(found: LevelsFound, bands: Mapping[str, Array], look: Look) -> Sheet:
     shown_people = people(found)[:MOST_PEOPLE]
     words = summary_words(found)
     above = words[:1].upper() + words[1:]
@@ -211,7 +198,7 @@ def _draw_levels(study: Study, found: LevelsFound, bands: Mapping[str, Array], f
 
     names = [(name, "") for name in ("All", *shown_people)]
     shown = keys if len(standards) > 1 else ()
-    return panels(study, found.title, above, names, draw, level_words(found), fonts, keys=shown, foot_pt=FOOT_PT)
+    return panels(look, above, names, draw, level_words(found), keys=shown, foot_pt=FOOT_PT)
 
 
 def _standards(found: LevelsFound) -> list[float]:
@@ -380,7 +367,6 @@ def track_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
     """Draw the tracks of a block whose levels answers chose, once the key is open."""
     block = next(block for block in study.levels if block.id == found.block)
     shown = list(courses(block, tracks(study), MOST_PANELS))
-    files = files_of(partial(_draw_tracks, study, found, shown), forms, f"{study.name}: {found.title}, tracks")
     rest = len(Thresholds.own(found)) - len(shown)
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
     success = "correct" if found.counts == "correct" else f"“{found.counts}”"
@@ -391,11 +377,13 @@ def track_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
         f"{found.title}: the level of each trial. Filled: {success}; hollow: not.{marks} Band: 95 % interval of "
         f"the threshold from the answers so far.{left_out} {sample_words(study, len(people(found)))}"
     )
-    return Picture(found.block, name, caption, files)
+    return picture_of(
+        study, found.block, name, f"{found.title}: tracks", caption, partial(_draw_tracks, found, shown), forms
+    )
 
 
 @style.own_settings()
-def _draw_tracks(study: Study, found: LevelsFound, shown: Sequence[TrackCourse], fonts: Sequence[str]) -> Sheet:
+def _draw_tracks(found: LevelsFound, shown: Sequence[TrackCourse], look: Look) -> Sheet:
     standards = len({one.standard for one in shown}) > 1
     names = [(one.participant, f"standard {one.standard:g}" if standards else "") for one in shown]
     ends = _ends(found, (level for one in shown for level in (*one.levels, one.low[-1], one.high[-1])), 0.12, 1.1, 0.06)
@@ -407,7 +395,7 @@ def _draw_tracks(study: Study, found: LevelsFound, shown: Sequence[TrackCourse],
         _track_panel(axes, shown[place])
 
     below = "Trial at the standard" if standards else "Trial"
-    return panels(study, f"{found.title}: tracks", level_words(found), names, draw, below, fonts)
+    return panels(look, level_words(found), names, draw, below)
 
 
 def _track_panel(axes: Axes, course: TrackCourse) -> None:
@@ -444,7 +432,6 @@ def _marks(
 
 def settings_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
     """Draw the settings of a block whose levels participants set, once the key is open."""
-    files = files_of(partial(_draw_settings, study, found), forms, f"{study.name}: {found.title}, settings")
     rest = len(Settings.own(found)) - MOST_PANELS
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
     compared = any(one.constant_error is not None for one in Settings.own(found))
@@ -454,11 +441,13 @@ def settings_picture(study: Study, found: LevelsFound, forms: Sequence[str], nam
         f"Line and band: point of subjective equality with its 95 % interval (Student's t).{standard}{left_out} "
         f"{sample_words(study, len(people(found)))}"
     )
-    return Picture(found.block, name, caption, files)
+    return picture_of(
+        study, found.block, name, f"{found.title}: settings", caption, partial(_draw_settings, found), forms
+    )
 
 
 @style.own_settings()
-def _draw_settings(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
+def _draw_settings(found: LevelsFound, look: Look) -> Sheet:
     shown = Settings.own(found)[:MOST_PANELS]
     standards = len({one.standard for one in shown}) > 1
     names = [
@@ -476,7 +465,7 @@ def _draw_settings(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sh
         over_trials(axes, found, shown[place].n, ends, first=first)
         _settings_panel(axes, shown[place])
 
-    return panels(study, f"{found.title}: settings", level_words(found), names, draw, "Setting", fonts)
+    return panels(look, level_words(found), names, draw, "Setting")
 
 
 def _compared(one: SettingFound) -> float | None:
@@ -539,19 +528,26 @@ def weber_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
     """Draw the Weber fractions of a block with thresholds at two standards or more."""
     listed = "; ".join(one.in_words() for one in found.published)
     published = f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
-    files = files_of(partial(_draw_fractions, study, found), forms, f"{study.name}: {found.title}, Weber fractions")
     caption = (
         f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, over the standard. Thin: participants; "
         f"thick: random-effects mean with its 95 % interval.{published} "
         f"{sample_words(study, len(people(found)))}"
     )
-    return Picture(found.block, name, caption, files)
+    return picture_of(
+        study,
+        found.block,
+        name,
+        found.title,
+        caption,
+        partial(_draw_fractions, found),
+        forms,
+        (counted(study.n, "participant"), f"n = {study.n}"),
+    )
 
 
 @style.own_settings()
-def _draw_fractions(study: Study, found: LevelsFound, fonts: Sequence[str]) -> Sheet:
-    sheet = Sheet(style.PAGE_WIDTH_PT / 2, HEIGHT_PT, fonts)
-    sheet.heading(found.title, study_marks(study), (counted(study.n, "participant"), f"n = {study.n}"))
+def _draw_fractions(found: LevelsFound, look: Look) -> Sheet:
+    sheet = look.sheet(HEIGHT_PT, style.PAGE_WIDTH_PT / 2)
     sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(found)}", size=7, colour=style.TEXT_SOFT)
     axes = sheet.axes(
         WEBER_LEFT_PT, TOP_PT, sheet.width_pt - WEBER_LEFT_PT - RIGHT_PT, sheet.height_pt - TOP_PT - WEBER_FOOT_PT

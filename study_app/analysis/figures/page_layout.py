@@ -206,9 +206,25 @@ def attempted(
             yield drawn
 
 
-def files_of(draw: Callable[[Sequence[str]], Sheet], forms: Sequence[str], title: str) -> dict[str, bytes]:
-    """Return the bytes of a figure in each of its forms; ``draw`` takes the fonts."""
-    return {form: style.file_bytes(draw(style.fonts_for(form)).figure, form, title) for form in forms}
+def picture_of(
+    study: Study,
+    block: str,
+    name: str,
+    title: str,
+    caption: str,
+    draw: Callable[[Look], Sheet],
+    forms: Sequence[str],
+    counts: Sequence[str] | None = None,
+) -> Picture:
+    """Return the figure that ``draw`` draws in each form; ``counts`` say how many took part if not all of the study."""
+    people = (counted(study.n, "participant"),) if counts is None else counts
+    files = {
+        form: style.file_bytes(
+            draw(Look(title, study_marks(study), people, style.fonts_for(form))).figure, form, f"{study.name}: {title}"
+        )
+        for form in forms
+    }
+    return Picture(block, name, caption, files)
 
 
 def sample_words(study: Study, n: int) -> str:
@@ -236,8 +252,4 @@ class Drawing:
         self, title: str, caption: str, draw: Callable[[Look], Sheet], counts: Sequence[str] = ("",)
     ) -> Picture:
         """Return the figure that ``draw`` draws in each form."""
-        marks = study_marks(self.study)
-        files = files_of(
-            lambda fonts: draw(Look(title, marks, counts, fonts)), self.forms, f"{self.study.name}: {title}"
-        )
-        return Picture(self.block.id, self.name, caption, files)
+        return picture_of(self.study, self.block.id, self.name, title, caption, draw, self.forms, counts)

@@ -19,11 +19,10 @@ from study_app.analysis.figures.page_layout import (
     Sheet,
     Style,
     attempted,
-    files_of,
+    picture_of,
     sample_words,
-    study_marks,
 )
-from study_app.analysis.results import Failures, QuestionFound, counted
+from study_app.analysis.results import Failures, QuestionFound
 
 LEFT_PT: Final = 120.0
 RIGHT_PT: Final = 40.0
@@ -210,7 +209,5 @@ def question_pictures(
 def _picture(study: Study, asked: AskedQuestion, found: QuestionFound, forms: Sequence[str], name: str) -> Picture:
     figure = FIGURES[found.figure or ""]
     title = found.short if found.short == found.title else f"{found.title}: {found.short}"
-    look = partial(Look, title, study_marks(study), (counted(study.n, "participant"),))
-    files = files_of(lambda fonts: figure.draw(asked, found, look(fonts)), forms, f"{study.name}: {title}")
     caption = f"{found.title}: “{found.text}” {figure.caption} {sample_words(study, study.n)}"
-    return Picture(found.where, name, caption, files)
+    return picture_of(study, found.where, name, title, caption, partial(figure.draw, asked, found), forms)

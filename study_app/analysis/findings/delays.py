@@ -16,7 +16,7 @@ from study_app.analysis.findings.finding import (
     NO_EVIDENCE,
     Absent,
     Answer,
-    Asked,
+    BlockAnswers,
     Finding,
     Row,
     codes_of,
@@ -223,7 +223,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[ContrastWithControl, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[ContrastWithControl, ...], Absent]:
         """Compare every delay with the shortest one, by the bound that was decided."""
         bound, delays_ms = answers.decided.equivalence_bound, answers.block.delays_ms
         if answers.k < 2:
@@ -233,7 +233,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             return (), (NotTested(cls.what, why),)
         outcomes = []
         for item in answers.block.items:
-            answers.each(item.short)
+            answers.tell(item.short)
             values = answers.values[item.id]
             for place, delay_ms in enumerate(delays_ms[1:], start=1):
                 differences = values[:, place] - values[:, 0]
@@ -379,7 +379,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[Lowest, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Lowest, ...], Absent]:
         """Step down in the statements whose trend is there at all."""
         trends, lowest = DelayTrend.of(found), []
         showing = [one for one in trends if one.verdict in FOUND]
@@ -456,11 +456,11 @@ class DetectionThreshold(Finding[Threshold | None]):
     figure_title = "When a delay is noticed"
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[Threshold | None, Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[Threshold | None, Absent]:
         item = answers.decided.noticed
         if item is None or item not in answers.values:
             return None, (NotTested(cls.what, "the protocol names no statement that asks for it"),)
-        answers.each(cls.what)
+        answers.tell(cls.what)
         single, delays_ms = answers.single[item], answers.block.delays_ms
         return noticed(single, delays_ms, alpha=answers.decided.alpha, seed=answers.seed), ()
 

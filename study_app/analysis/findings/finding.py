@@ -36,7 +36,7 @@ FEWER_DRAWS: Final = 1999
 
 
 @dataclass(frozen=True)
-class Asked:
+class BlockAnswers:
     """A block's answers as arrays, settings in their order; NaN where one is missing.
 
     ``values`` (participants, settings) are the medians of ``single`` answers (participants, settings, presentations);
@@ -50,7 +50,7 @@ class Asked:
     people: tuple[str, ...]
     values: Mapping[str, Array]
     seed: int
-    each: Callable[[str], object]
+    tell: Callable[[str], object]
     failures: Failures
     single: Mapping[str, Array]
     sessions: Mapping[str, Array]
@@ -92,10 +92,10 @@ class Asked:
         return draws_for(self.decided.alpha, DRAWS if self.n <= MANY else FEWER_DRAWS)
 
 
-def asked(
-    study: Study, block: Block, seed: int, each: Callable[[str], object], failures: Failures, *, planning: bool = True
-) -> Asked:
-    """Collect a block's answers; ``each`` receives every statement that is begun."""
+def block_answers(
+    study: Study, block: Block, seed: int, tell: Callable[[str], object], failures: Failures, *, planning: bool = True
+) -> BlockAnswers:
+    """Collect a block's answers; ``tell`` receives every statement that is begun."""
     answers = study.answers(block)
     people = tuple(sorted(map(str, answers["participant"].unique())))
     by_item = dict(iter(answers.groupby("item", sort=False)))
@@ -106,7 +106,7 @@ def asked(
     single = {item: answers_ for item, (answers_, _) in given.items()}
     sessions = {item: numbers for item, (_, numbers) in given.items()}
     found = of_tables(
-        block, study.decided, people, single, sessions, seed=seed, each=each, failures=failures, planning=planning
+        block, study.decided, people, single, sessions, seed=seed, tell=tell, failures=failures, planning=planning
     )
     return replace(found, sites=tuple(map(study.site_of, people))) if study.sites else found
 
@@ -119,22 +119,22 @@ def of_tables(
     sessions: Mapping[str, Array] | None = None,
     *,
     seed: int = 1,
-    each: Callable[[str], object] = str,
+    tell: Callable[[str], object] = str,
     failures: Failures | None = None,
     planning: bool = True,
     verdicts_only: bool = False,
-) -> Asked:
+) -> BlockAnswers:
     """Return a block's answers from tables of single answers (participants, settings, presentations) of each item.
 
     Without ``sessions``, arrays of the same shape, all answers are of one session.
     """
-    return Asked(
+    return BlockAnswers(
         block,
         decided,
         people,
         {item: medians(answers) for item, answers in single.items()},
         seed,
-        each,
+        tell,
         Failures() if failures is None else failures,
         single,
         {item: np.ones_like(answers) for item, answers in single.items()} if sessions is None else sessions,
@@ -143,7 +143,7 @@ def of_tables(
     )
 
 
-def facts(study: Study | None, answers: Asked) -> BlockFound:
+def block_facts(study: Study | None, answers: BlockAnswers) -> BlockFound:
     """Return a block without findings: settings, statements, counts; without a study no measures."""
     block = answers.block
     measures, no_measures = answers.attempt(MEASURES, lambda: _measures(study, block), ())
@@ -204,11 +204,11 @@ def _replicated(block: Block) -> tuple[float, ...]:
     return tuple(delay for place, delay in enumerate(block.delays_ms) if columns.count(place) > 1)
 
 
-def each_statement(answers: Asked, test: Callable[[Array], Outcome]) -> dict[str, Outcome]:
+def each_statement(answers: BlockAnswers, test: Callable[[Array], Outcome]) -> dict[str, Outcome]:
     """Return the outcomes of a test of every statement's answers (participants, settings), by statement."""
     found = {}
     for item in answers.block.items:
-        answers.each(item.short)
+        answers.tell(item.short)
         found[item.id] = test(answers.values[item.id])
     return found
 
@@ -448,7 +448,7 @@ class Finding(Generic[R]):
         return replace(found, findings={**found.findings, cls.key: value})
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[R, Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[R, Absent]:
         """Return the value, of a block's answers and the findings with lower places, and what was not tested."""
         raise NotImplementedError
 

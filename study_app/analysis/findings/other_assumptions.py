@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from study_app.analysis.data.measures import Array
-from study_app.analysis.findings.finding import MANY, Absent, Asked, Finding, Row, alone, judged_row
+from study_app.analysis.findings.finding import MANY, Absent, BlockAnswers, Finding, Row, alone, judged_row
 from study_app.analysis.report.html_page import heading, paragraph, table_of
 from study_app.analysis.results import BlockFound, NotTested, Tested, interval, number, p_value, short, statistic
 from study_app.analysis.statistics.mixed_model import Ordinal, ordinal
@@ -24,7 +24,9 @@ class OtherAssumptions:
     incomplete: tuple[Tested, ...] = ()
 
 
-def asked_again(answers: Asked, columns: Array | None, what: str) -> tuple[OtherAssumptions, tuple[NotTested, ...]]:
+def asked_again(
+    answers: BlockAnswers, columns: Array | None, what: str
+) -> tuple[OtherAssumptions, tuple[NotTested, ...]]:
     """Return the same questions under other assumptions: the mixed model, and with missing answers; and what is not.
 
     ``columns`` (settings, columns) are what the mixed model tests, ``what`` names it.
@@ -39,7 +41,7 @@ def asked_again(answers: Asked, columns: Array | None, what: str) -> tuple[Other
     else:
         models = {}
         for item in answers.block.items:
-            answers.each(item.short)
+            answers.tell(item.short)
             models[item.id] = ordinal(
                 answers.single[item.id], columns, sessions=answers.sessions[item.id], sites=answers.sites or None
             )
@@ -63,7 +65,7 @@ def asked_again(answers: Asked, columns: Array | None, what: str) -> tuple[Other
     return OtherAssumptions(mixed, incomplete), tuple(absent)
 
 
-def _no_model(answers: Asked) -> str:
+def _no_model(answers: BlockAnswers) -> str:
     if answers.k < 2:
         return "there is one setting"
     if answers.sites and not answers.block.revealed:
@@ -103,7 +105,7 @@ class SameWithOtherAssumptions(Finding[OtherAssumptions]):
         return {"mixed": cls.of(found).mixed, "incomplete": cls.of(found).incomplete}
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[OtherAssumptions, Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[OtherAssumptions, Absent]:
         if answers.block.kind == "delays":
             return asked_again(answers, np.array(answers.block.delays_ms)[:, None] / 100, "the delay")
         return asked_again(answers, None, "the settings")

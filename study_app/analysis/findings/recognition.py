@@ -15,7 +15,7 @@ from study_app.analysis.findings.finding import (
     NO_EVIDENCE,
     Absent,
     Answer,
-    Asked,
+    BlockAnswers,
     Finding,
     Row,
     rows_alone,
@@ -68,7 +68,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
     figure_title = "What each liquid was named"
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[RecognitionResult | None, Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[RecognitionResult | None, Absent]:
         """Test whether settings were named for what they were."""
         labels = answers.decided.names
         right = tuple(setting.label for setting in answers.block.settings)

@@ -20,7 +20,7 @@ from study_app.analysis.findings.finding import (
     HOLM,
     SEALED,
     Absent,
-    Asked,
+    BlockAnswers,
     Finding,
     Row,
     each_statement,
@@ -143,7 +143,7 @@ def families(tests: Sequence[Tested]) -> str:
     )
 
 
-def compared(answers: Asked) -> tuple[tuple[Tested, ...], Absent]:
+def compared(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
     """Test in every statement whether the settings are answered alike."""
     if answers.k < 2:
         return (), (NotTested("test of settings", "the block has one setting: there is nothing to compare it with"),)
@@ -151,7 +151,7 @@ def compared(answers: Asked) -> tuple[tuple[Tested, ...], Absent]:
     return judged(outcomes, answers.decided, f"{answers.block.id}: settings differ"), ()
 
 
-def _alike(answers: Asked, values: Any) -> Outcome:
+def _alike(answers: BlockAnswers, values: Any) -> Outcome:
     if values.shape[1] == 2:
         return paired(values[:, 0], values[:, 1], alpha=answers.decided.alpha)
     return friedman(values, draws=answers.draws, seed=answers.seed)
@@ -201,7 +201,7 @@ class SettingsDiffer(StatementTests):
     nothing = "in no single statement a difference between the {noun}s"
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
         return compared(answers)
 
     def compared(self) -> Sequence[str]:
@@ -237,13 +237,13 @@ class DelayTrend(StatementTests):
     nothing = "in no statement a trend over the delay"
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY),)
         outcomes = {}
         for item in answers.block.items:
             if (direction := answers.decided.direction(item.id)) is not None:
-                answers.each(item.short)
+                answers.tell(item.short)
                 outcomes[item.id] = page(answers.values[item.id], direction, seed=answers.intervals)
         undirected = [item.short for item in answers.block.items if item.id not in outcomes]
         why = f"the protocol does not say whether answers should rise or fall with delay ({', '.join(undirected)})"
@@ -280,14 +280,14 @@ class SessionsDiffer(StatementTests):
         return [f"session {number}" for number in self.found.sessions]
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
         """A participant's answers in a session are their median over the settings answered in all sessions."""
         numbers = found.sessions
         if len(numbers) < 2:
             return (), ()
         outcomes = {}
         for item in answers.block.items:
-            answers.each(f"{item.short}, sessions")
+            answers.tell(f"{item.short}, sessions")
             single, of = answers.single[item.id], answers.sessions[item.id]
             each = np.stack([medians(np.where(of == one, single, np.nan)) for one in numbers], axis=2)
             common = np.asarray(~np.isnan(each).any(axis=2))
@@ -324,7 +324,7 @@ class SitesDiffer(Finding[SiteTests]):
     empty = SiteTests()
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[SiteTests, Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[SiteTests, Absent]:
         """A participant's level is the median over settings; the profile has their ranks, or the difference of two."""
         if not answers.sites:
             return SiteTests(), ()
@@ -336,7 +336,7 @@ class SitesDiffer(Finding[SiteTests]):
 
         levels, profiles = {}, {}
         for item in answers.block.items:
-            answers.each(f"{item.short}, sites")
+            answers.tell(f"{item.short}, sites")
             values = answers.values[item.id]
             levels[item.id] = differ(np.median(values, axis=1)[:, None], "Kruskal-Wallis")
             if answers.k == 2:
@@ -397,11 +397,11 @@ class SitesDiffer(Finding[SiteTests]):
             )
 
 
-def over_all(answers: Asked, draws: int | None = None) -> Outcome | None:
+def over_all(answers: BlockAnswers, draws: int | None = None) -> Outcome | None:
     """Test once over all statements whether the settings are answered alike; ``draws`` of them if not as usual."""
     if answers.k < 2 or (answers.verdicts_only and draws is None):
         return None
-    answers.each("all statements")
+    answers.tell("all statements")
     values = np.array(list(answers.values.values()))
     return global_permutation(values, draws=draws or answers.draws_over_all, seed=answers.seed)
 
@@ -417,7 +417,7 @@ class OverAll(Finding[Outcome | None]):
     waits = ("liquids", "views")
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[Outcome | None, Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[Outcome | None, Absent]:
         return over_all(answers), ()
 
     def rows(self) -> Iterator[Row]:
@@ -470,7 +470,7 @@ def smallest_of_pairs(settings: int, participants: int) -> float:
     return min(1.0, math.comb(settings, 2) * 2.0 ** (1 - participants))
 
 
-def pairs_of(answers: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], Absent]:
+def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], Absent]:
     """Compare settings two by two in the statements that differ at all; all pairs of all of them are one Holm family.
 
     Where one liquid differs from all others, every statement is opened, and each holds pairs that do not differ.
@@ -515,7 +515,7 @@ class Pairs(Finding[tuple[Pair, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: Asked, found: BlockFound) -> tuple[tuple[Pair, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Pair, ...], Absent]:
         return pairs_of(answers, SettingsDiffer.of(found))
 
     def rows(self) -> Iterator[Row]:

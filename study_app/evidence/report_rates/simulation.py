@@ -22,7 +22,7 @@ from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import Array
 from study_app.analysis.evaluate import found_in
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, common_ms
-from study_app.analysis.findings.finding import FOUND, Asked, of_tables
+from study_app.analysis.findings.finding import FOUND, BlockAnswers, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, OverAll, Pairs, SettingsDiffer, over_all
 from study_app.analysis.planning.power_curves import interval
@@ -292,7 +292,7 @@ def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) ->
     return found
 
 
-def _in_liquids(asked: Asked, found: BlockFound, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
+def _in_liquids(asked: BlockAnswers, found: BlockFound, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
     if cell.extent == "empty":
         yield (
             ("settings differ in a statement", "at most 5 %"),
@@ -325,7 +325,7 @@ def _equal_pairs(block: Block, extent: Extent) -> set[tuple[str, str]]:
     }
 
 
-def _in_delays(asked: Asked, found: BlockFound, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
+def _in_delays(asked: BlockAnswers, found: BlockFound, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
     block = asked.block
     null = [block.settings[at].delay_ms or 0.0 for at in alike(block, cell.extent)]
     if cell.extent == "empty":
@@ -348,7 +348,7 @@ def _printed(found: BlockFound) -> bool:
     return threshold is not None and threshold.effect is not None
 
 
-def _equivalence(asked: Asked, found: BlockFound, truth: Array) -> Iterator[tuple[Event, bool]]:
+def _equivalence(asked: BlockAnswers, found: BlockFound, truth: Array) -> Iterator[tuple[Event, bool]]:
     """Yield whether a delay is called equivalent that is not: the one nearest to the bound, and on the first page."""
     bound = asked.decided.equivalence_bound
     if bound is None or not ContrastsWithControl.of(found):
