@@ -11,9 +11,9 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.findings import all_findings
-from study_app.analysis.report import number_files, sections
-from study_app.analysis.report.number_files import plain
+from study_app.analysis.report import sections
 from study_app.analysis.report.sections import answers, block, first_page, methods
+from study_app.analysis.report.write_report import plain, tests_csv
 from study_app.analysis.results import Failures, Results
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study
 from tests.analysis.report.read_report import FORBIDDEN, seen
@@ -74,5 +74,5 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
         texts.append(picture.caption)
     for text in texts:
         assert (wrong := FORBIDDEN.search(text)) is None, text[max(0, wrong.start() - 80) : wrong.end() + 40]
-    assert number_files.tests_csv(results)
+    assert tests_csv(results)
     return results

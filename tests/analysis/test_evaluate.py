@@ -18,7 +18,7 @@ from study_app.analysis.findings.finding import MANY, judged, of_tables
 from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of
-from study_app.analysis.report.number_files import plain
+from study_app.analysis.report.write_report import plain
 from study_app.analysis.results import BlockFound, Results
 from study_app.analysis.statistics.outcome import DRAWS, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import friedman, paired

@@ -89,7 +89,7 @@ def test_the_recipe_contains_the_pages_of_help(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_the_recipe_names_every_library_whose_version_a_receipt_or_a_report_states() -> None:
-    from study_app.analysis.report.number_files import LIBRARIES
+    from study_app.analysis.report.write_report import LIBRARIES
 
     recipe = (PACKAGING / "liquid-study.spec").read_text("utf-8")
     assert 'project["optional-dependencies"]["analysis"]' in recipe

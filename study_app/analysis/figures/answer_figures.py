@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -23,7 +22,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from study_app import figure_style as style
-from study_app.analysis.data.blocks import Block, Kind
+from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import COUNT_COLUMNS, LEVELS, NEUTRAL, QUARTILES, Array, by_participant, quartiles
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import MARGIN_PT, Look, Sheet, Style, study_marks
@@ -582,30 +581,28 @@ def _segment(sheet: Sheet, axes: Axes, left: float, y: int, level: int, count: i
         axes.text(left + count / 2, y, str(count), fontproperties=font, color=ink, **place)
 
 
-def liquids(study: Study, block: Block | None = None, *, fonts: Sequence[str] | None = None) -> Figure:
-    """Draw the counts of answers as diverging bars, a panel per setting; by default of the first block of liquids.
-
-    Raises AnalysisError where there is no such block, or no session was completed.
-    """
-    block = block or _only(study, "liquids")
-    return draw_agreement(study, block, _look(study, block, fonts)).figure
-
-
-def delays(
-    study: Study,
-    block: Block | None = None,
-    *,
-    fonts: Sequence[str] | None = None,
-    lowest: Mapping[str, float] = MappingProxyType({}),
+def figure(
+    study: Study, block: Block, fonts: Sequence[str] | None = None, lowest: Mapping[str, float] = MappingProxyType({})
 ) -> Figure:
-    """Draw the answers over the delay that was asked for, a small plot per statement; by code while blinded.
+    """Draw the answers of a block: diverging bars, a panel per setting; of delays, a plot per statement over delay.
 
-    Parameters and errors as in :func:`liquids`. A participant's repeated answers are drawn as their median. ``lowest``
-    maps items to the lowest delay at which a trend shows [ms], which is marked.
+    A participant's repeated answers are drawn over delay as their median; ``lowest`` maps items to the lowest delay at
+    which a trend shows [ms], which is marked. Raises AnalysisError where no session was completed.
     """
-    block = block or _only(study, "delays")
-    look = _look(study, block, fonts)
     answers = study.answers(block)
+    if not len(answers):
+        columns = ["participant", "session", "status", "excluded"]
+        states = ", ".join(
+            f"{participant} session {session} {'excluded' if excluded else status}"
+            for participant, session, status, excluded in study.participants[columns].head(5).itertuples(index=False)
+        )
+        raise AnalysisError(
+            f"{study.folder}: no completed session with answers in {block.id!r} yet ({states}): figures are drawn from "
+            "completed sessions; export writes what there is"
+        )
+    look = Look(title(block), study_marks(study), counts(study, block), fonts or style.screen_fonts())
+    if block.kind != "delays":
+        return draw_agreement(study, block, look).figure
     people = sorted(answers["participant"].unique())
     plots = [(item.short, by_participant(answers, people, block.columns, item.id)) for item in block.items]
     marked = [lowest.get(item.id) for item in block.items]
@@ -616,32 +613,9 @@ def delays(
 
 
 def render(study: Study, block: Block, form: str, lowest: Mapping[str, float] = MappingProxyType({})) -> bytes:
-    """Return the figure of a block as a file of ``form`` (png, svg or pdf); ``lowest`` as in :func:`delays`."""
-    draw = partial(delays, lowest=lowest) if block.kind == "delays" else liquids
-    drawn = draw(study, block, fonts=style.fonts_for(form))
+    """Return the figure of a block as a file of ``form`` (png, svg or pdf); ``lowest`` as in :func:`figure`."""
+    drawn = figure(study, block, style.fonts_for(form), lowest)
     return style.file_bytes(drawn, form, f"{study.name}: {title(block)}")
-
-
-def _only(study: Study, kind: Kind) -> Block:
-    blocks = study.blocks_of(kind)
-    if not blocks:
-        raise AnalysisError(f"{study.folder}: the study {study.name!r} has no part that compares {kind}")
-    return blocks[0]
-
-
-def _look(study: Study, block: Block, fonts: Sequence[str] | None) -> Look:
-    """Return what every figure of the block has."""
-    if not len(study.answers(block)):
-        columns = ["participant", "session", "status", "excluded"]
-        states = ", ".join(
-            f"{participant} session {session} {'excluded' if excluded else status}"
-            for participant, session, status, excluded in study.participants[columns].head(5).itertuples(index=False)
-        )
-        raise AnalysisError(
-            f"{study.folder}: no completed session with answers in {block.id!r} yet ({states}): figures are drawn from "
-            "completed sessions; export writes what there is"
-        )
-    return Look(title(block), study_marks(study), counts(study, block), fonts or style.screen_fonts())
 
 
 CELL_PT: Final = (52.0, 26.0)

@@ -529,9 +529,8 @@ def weber_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
     listed = "; ".join(one.in_words() for one in found.published)
     published = f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
     caption = (
-        f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, over the standard. Thin: participants; "
-        f"thick: random-effects mean with its 95 % interval.{published} "
-        f"{sample_words(study, len(people(found)))}"
+        f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, over the standard. Thin: participants; thick: "
+        f"random-effects mean with its 95 % interval.{published} {sample_words(study, len(people(found)))}"
     )
     return picture_of(
         study,

@@ -313,8 +313,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         undecided = [one for one in against if one.verdict in ("inconclusive", "out of reach")]
         if undecided:
             yield (
-                f"{lead(found)}: inconclusive or out of reach: {len(undecided)} of {len(against)} comparisons "
-                "with "
+                f"{lead(found)}: inconclusive or out of reach: {len(undecided)} of {len(against)} comparisons with "
                 f"{ms(undecided[0].control_ms)}, which show neither a difference nor that it stays within the bound."
             )
 
@@ -325,13 +324,11 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             beforehand = ", decided before the first session" if self.results.decided.binding else ""
             yield (
                 f"Equivalence to {self.found.delays_ms[0]:g} ms was tested by two one-sided t tests on paired "
-                "differences with "
-                f"a bound of ±{bound:g} {points}{beforehand}, and {level} intervals, and called equivalent only "
-                "where changes of signs, signed ranks and the bootstrap-t agreed, and with "
-                f"{least(self.results.decided.alpha)}; it was called different where "
-                "the larger p of a t test and of exact signed ranks, Holm-adjusted over all these comparisons, was at "
-                "most "
-                "alpha, and otherwise inconclusive."
+                f"differences with a bound of ±{bound:g} {points}{beforehand}, and {level} intervals, and called "
+                "equivalent only where changes of signs, signed ranks and the bootstrap-t agreed, and with "
+                f"{least(self.results.decided.alpha)}; it was called different where the larger p of a t test and of "
+                "exact signed ranks, Holm-adjusted over all these comparisons, was at most alpha, and otherwise "
+                "inconclusive."
             )
 
 
@@ -419,9 +416,8 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         yield paragraph(
             "Only where a trend is there at all, the longest delay is dropped as long as a trend is left. The order is "
             f"fixed. The lowest delay is the one whose steps all have p of at most alpha / {members}, so that the "
-            "error "
-            "rate holds over all statements; uncorrected it holds within one statement alone. The result is an upper "
-            "bound and biased upward: few participants find only long delays.",
+            "error rate holds over all statements; uncorrected it holds within one statement alone. The result is an "
+            "upper bound and biased upward: few participants find only long delays.",
             "soft",
         )
 
@@ -484,12 +480,11 @@ class DetectionThreshold(Finding[Threshold | None]):
             yield from self.drawn()
             return
         yield paragraph(
-            f"Detection threshold {number(threshold.effect, 0)} ms, 95 % interval {interval(threshold.interval, 0)} ms"
-            f"{f' ({threshold.no_interval})' if threshold.no_interval else ''}; guesses {number(threshold.guess)}, "
-            "lapses "
-            f"{number(threshold.lapse)}; {threshold.method}; n = {threshold.n}. Noticed: {counts}. "
-            f"{threshold.note[:1].upper()}{threshold.note[1:]}. Agreement is no yes or no: "
-            "who agrees somewhat with “different” may mean little."
+            f"Detection threshold {number(threshold.effect, 0)} ms, 95 % interval {interval(threshold.interval, 0)} "
+            f"ms{f' ({threshold.no_interval})' if threshold.no_interval else ''}; guesses {number(threshold.guess)}, "
+            f"lapses {number(threshold.lapse)}; {threshold.method}; n = {threshold.n}. Noticed: {counts}. "
+            f"{threshold.note[:1].upper()}{threshold.note[1:]}. Agreement is no yes or no: who agrees somewhat with "
+            "“different” may mean little."
         )
         yield from self.drawn()
 
@@ -511,8 +506,7 @@ class DetectionThreshold(Finding[Threshold | None]):
         )
         caption = (
             f"Share of answers that noticed the delay, over the delay asked for ({drawing.simulated}n = "
-            f"{threshold.n}). "
-            f"{curve}{dashed}"
+            f"{threshold.n}). {curve}{dashed}"
         )
         return drawing.picture(
             self.figure_title, caption, lambda look: answer_figures.draw_threshold(threshold, lowest, look)

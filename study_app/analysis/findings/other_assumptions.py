@@ -151,14 +151,12 @@ class SameWithOtherAssumptions(Finding[OtherAssumptions]):
         if any(one.mixed for one in asked):
             yield (
                 "As a check, answers were fitted by cumulative logit models with a random intercept for each "
-                "participant "
-                "(adaptive quadrature, likelihood ratio)."
+                "participant (adaptive quadrature, likelihood ratio)."
             )
         again = (
             " and Skillings and Mack's test uses those who missed some" if any(one.incomplete for one in asked) else ""
         )
         yield (
             "Missing answers were never replaced; tests over several settings use participants who answered under all "
-            "of "
-            f"them, comparisons of two those who answered under both{again}."
+            f"of them, comparisons of two those who answered under both{again}."
         )

@@ -111,8 +111,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         yield paragraph(
             f"Hits {number(outcome.statistic, 0)}, {number(outcome.expected, 1)} expected by chance, "
             f"{p_equals(outcome.p)} (smallest attainable {p_value(outcome.smallest_p)}), {named.verdict}. Kappa of "
-            "decided "
-            f"answers {number(outcome.effect)}, 95 % interval {interval(outcome.interval)}{why}. Chance: "
+            f"decided answers {number(outcome.effect)}, 95 % interval {interval(outcome.interval)}{why}. Chance: "
             f"{outcome.method}.{note} One test, corrected for no other."
         )
         yield paragraph("Intervals of the shares: Clopper-Pearson, which takes participants one by one.", "soft")
@@ -128,14 +127,12 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         if hits is not None and expected is not None and named.found.p is not None:
             chance = (
                 f" Right: {hits:g}; {number(expected, 1)} would be by chance, that is after exchanging the liquids "
-                "within "
-                f"each participant (exact, one-sided, {p_equals(named.found.p)})."
+                f"within each participant (exact, one-sided, {p_equals(named.found.p)})."
             )
         caption = (
-            f"The name that was rated highest for each liquid ({drawing.simulated}"
-            f"{answer_figures.counts(study, block)[0]}). "
-            f"Cells: counts and share of the row; framed: right. Undecided: {counted(2, 'name')} or more were rated "
-            f"equally high.{chance}"
+            "The name that was rated highest for each liquid "
+            f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells: counts and share of the row; "
+            f"framed: right. Undecided: {counted(2, 'name')} or more were rated equally high.{chance}"
         )
         return drawing.picture(
             self.figure_title,
@@ -171,9 +168,8 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         if self.value is not None:
             yield (
                 "A participant was taken to have named the liquid whose statement he or she rated highest; equal "
-                "highest "
-                "ratings are undecided and count as no hit. Hits were tested against exchanging the liquids within "
-                "participants (exact, one-sided)."
+                "highest ratings are undecided and count as no hit. Hits were tested against exchanging the liquids "
+                "within participants (exact, one-sided)."
             )
 
 

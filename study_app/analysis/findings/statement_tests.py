@@ -254,12 +254,11 @@ class DelayTrend(StatementTests):
         if trends := self.value:
             yield (
                 "Trends over the delay were tested by Page's L "
-                f"({_first_tested(trends).outcome.method.split(',')[0]}), "
-                "one-sided in the direction stated "
-                f"{'beforehand' if self.results.decided.binding else 'by the protocol'}, "
-                f"{families(trends)}; where a trend showed, the longest delay was dropped and the test repeated "
-                "until it no longer did, which gives an upper bound of the lowest delay that is noticed (every step at "
-                "alpha over the number of statements, so that the error rate holds over all of them)."
+                f"({_first_tested(trends).outcome.method.split(',')[0]}), one-sided in the direction stated "
+                f"{'beforehand' if self.results.decided.binding else 'by the protocol'}, {families(trends)}; where a "
+                "trend showed, the longest delay was dropped and the test repeated until it no longer did, which gives "
+                "an upper bound of the lowest delay that is noticed (every step at alpha over the number of "
+                "statements, so that the error rate holds over all of them)."
             )
 
 
@@ -450,8 +449,7 @@ class OverAll(Finding[Outcome | None]):
         if self.value is not None and not self.found.delays_ms:
             yield (
                 f"The {settings_noun(self.found)}s were compared over {all_of(len(self.found.items), 'statement')} at "
-                "once by "
-                "permuting them within participants, the statistic being the sum of the statements' Friedman "
+                "once by permuting them within participants, the statistic being the sum of the statements' Friedman "
                 "statistics."
             )
 
@@ -481,9 +479,8 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
     if (corrected := smallest_of_pairs(k, n)) > alpha:
         why = (
             f"{number_text.counted(n, 'participant')} cannot show it: the smallest p that "
-            f"{number_text.counted(n, 'pair')} can give is "
-            f"{smallest_of_pairs(2, n):.4g}, after Holm's correction over {math.comb(k, 2)} pairs {corrected:.4g}, "
-            f"which is above {alpha:g}"
+            f"{number_text.counted(n, 'pair')} can give is {smallest_of_pairs(2, n):.4g}, after Holm's correction over "
+            f"{math.comb(k, 2)} pairs {corrected:.4g}, which is above {alpha:g}"
         )
         return (), (NotTested(Pairs.what, why),)
     opened = [one.item for one in omnibus if one.verdict in ("shown", "suggested")]
@@ -545,11 +542,10 @@ class Pairs(Finding[tuple[Pair, ...]]):
         )
         yield paragraph(
             "Wilcoxon's signed ranks, exact, only in statements that differ as a whole; above 0 the first of a pair "
-            "was "
-            f"rated higher. p adjusted by Holm over all {pairs[0].tested.members} pairs of this table. "
-            f"{pairs[0].tested.outcome.method}. "
-            "Intervals: 95 %, Fisher z, which cover about 90 % up to two dozen pairs; none where all pairs that differ "
-            "went one way, since −1 and 1 are the ends of the scale, nor below six pairs that differ.",
+            f"was rated higher. p adjusted by Holm over all {pairs[0].tested.members} pairs of this table. "
+            f"{pairs[0].tested.outcome.method}. Intervals: 95 %, Fisher z, which cover about 90 % up to two dozen "
+            "pairs; none where all pairs that differ went one way, since −1 and 1 are the ends of the scale, nor below "
+            "six pairs that differ.",
             "soft",
         )
 

@@ -1,6 +1,7 @@
 import re
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from study_app import figure_style as style
-from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures, study_figures
 from study_app.analysis.figures.page_layout import Look
 from study_app.errors import AnalysisError
@@ -19,9 +20,17 @@ from tests.analysis.conftest import HIDDEN, Answer, Results, twelve
 pytestmark = pytest.mark.slow
 
 
+def liquids(study: Study, **look: Any) -> Figure:
+    return answer_figures.figure(study, study.blocks_of("liquids")[0], **look)
+
+
+def delays(study: Study, **look: Any) -> Figure:
+    return answer_figures.figure(study, study.blocks_of("delays")[0], **look)
+
+
 def test_disagreement_ends_and_agreement_begins_at_the_line_and_neutral_stands_apart(rek: Results) -> None:
     by_person(rek, [1, 2, 2, 3, 4, 4, 5, 6, 6, 6, 7])
-    axes = panel(answer_figures.liquids(load_study(rek.folder)), "L1")
+    axes = panel(liquids(load_study(rek.folder)), "L1")
     found = segments(axes, 1)
     assert {level: width for level, (_, width, _) in found.items()} == {1: 1, 2: 2, 3: 1, 4: 2, 5: 1, 6: 3, 7: 1}
     assert [found[level][0] for level in (1, 2, 3)] == [-4, -3, -1]
@@ -34,11 +43,11 @@ def test_disagreement_ends_and_agreement_begins_at_the_line_and_neutral_stands_a
 
 def test_blinded_panels_are_titled_by_code_and_opened_ones_by_name(rek: Results) -> None:
     by_person(rek, [4, 5])
-    blinded = words(answer_figures.liquids(load_study(rek.folder)))
+    blinded = words(liquids(load_study(rek.folder)))
     assert [word for word in blinded if word in ("L1", "L2", "L3", "Water", "Honey", "Light oil")] == ["L1", "L2", "L3"]
     assert "Blinded: by code" in blinded
     rek.open()
-    opened = words(answer_figures.liquids(load_study(rek.folder)))
+    opened = words(liquids(load_study(rek.folder)))
     assert [word for word in opened if word in ("L1", "L2", "L3", "Water", "Honey", "Light oil")] == [
         "Water",
         "Honey",
@@ -47,7 +56,7 @@ def test_blinded_panels_are_titled_by_code_and_opened_ones_by_name(rek: Results)
     assert "Blinded: by code" not in opened
 
 
-@pytest.mark.parametrize("draw", [answer_figures.liquids, answer_figures.delays])
+@pytest.mark.parametrize("draw", [liquids, delays])
 def test_simulated_participants_are_called_so_in_the_heading_and_real_ones_are_not(
     rek: Results, small: Results, draw, tmp_path: Path
 ) -> None:
@@ -68,7 +77,7 @@ def test_delays_lie_on_a_true_scale_with_a_line_per_participant_and_the_median(r
     for number, shift in enumerate((0, 0, 1), start=1):
         rek.add(f"P{number}", answer(shift))
     rek.open()
-    axes = panel(answer_figures.delays(load_study(rek.folder)), "item1")
+    axes = panel(delays(load_study(rek.folder)), "item1")
     lines = gids(axes, r"participant\d+")
     assert len(lines) == 3
     for line in lines:
@@ -89,7 +98,7 @@ def test_delays_lie_on_a_true_scale_with_a_line_per_participant_and_the_median(r
 
 def test_blinded_delays_are_dots_by_code_in_code_order_without_lines(rek: Results) -> None:
     by_person(rek, [2, 2, 2, 5])
-    axes = panel(answer_figures.delays(load_study(rek.folder)), "item1")
+    axes = panel(delays(load_study(rek.folder)), "item1")
     codes = [f"D{number}" for number in range(1, 8)]
     assert [label.get_text() for label in axes.get_xticklabels()] == codes
     for place, code in enumerate(codes):
@@ -112,7 +121,7 @@ def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opene
     if opened:
         rek.open()
     study = load_study(rek.folder)
-    for figure in (answer_figures.liquids(study, fonts=fonts), answer_figures.delays(study, fonts=fonts)):
+    for figure in (liquids(study, fonts=fonts), delays(study, fonts=fonts)):
         figure.canvas.draw()  # tick labels have their places only then
         boxes = [(text.get_text(), text.get_window_extent().padded(-1)) for text in shown(figure)]
         width, height = figure.bbox.size
@@ -155,7 +164,7 @@ def texts(figure: Figure, label: str) -> list[str]:
 def test_the_lowest_delay_is_marked_at_its_place_on_the_true_scale(rek: Results, lowest_ms: float) -> None:
     twelve(rek, people=3)
     rek.open()
-    figure = answer_figures.delays(load_study(rek.folder), lowest={"different": lowest_ms})
+    figure = delays(load_study(rek.folder), lowest={"different": lowest_ms})
     marks = [line for axes in figure.axes for line in axes.lines if str(line.get_gid()).endswith("-lowest")]
     (mark,) = marks
     assert np.asarray(mark.get_xdata()).tolist() == [lowest_ms, lowest_ms]

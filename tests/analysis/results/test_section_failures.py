@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.statement_tests import OverAll
-from study_app.analysis.report.number_files import plain
+from study_app.analysis.report.write_report import plain
 from study_app.cli import commands
 from study_app.protocol.load import load
 from tests.analysis.conftest import Results, make_results, twelve
@@ -34,7 +34,7 @@ WRITING = {
     "report.write_report.methods": "texts: methods",
     "report.write_report.sections.findings": "texts: findings",
     "report.write_report.r_script": "report.R",
-    "report.number_files.motion_csv": "motion.csv",
+    "report.write_report.motion_csv": "motion.csv",
     "findings.delays.LowestDelay.section": "lowest delay",
     "report.write_report.sections.conduct": "section “How it was run”",
 }
