@@ -16,10 +16,10 @@ from study_app.analysis.data.blocks import AskedQuestion, AskedScore, Block, Ite
 from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.data.questions import scored
 from study_app.analysis.data.study_tables import Study
+from study_app.analysis.levels.columns import OF_TRACKS, RESULTS
 from study_app.analysis.levels.evaluate import levels_found
 from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS, tracks
-from study_app.store.tables.column_dictionary import table_markdown
 from study_app.store.tables.columns import INTERVALS, PARTICIPANTS, RESPONSES, TRIALS_2, tables_of
 from study_app.store.tables.csv_files import Column, Kind, header, optional, unsealed
 
@@ -72,57 +72,7 @@ _LEVEL_COLUMNS: Final = {column.name: column for column in (*TRIALS_2, *INTERVAL
 _OF_PERSON: Final = tuple(_LEVEL_COLUMNS[name] for name in ("study", "participant", "simulated", "pilot", "group"))
 TYPES: Final[dict[Kind, str]] = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
 
-OF_TRACKS: Final[tuple[Column, ...]] = (
-    Column("analysed", "flag", "true where the row counts and does not present the modulus of a magnitude estimation."),
-    Column("track", "text", "What the code stands for: standard and number of the track (8/1), or the condition."),
-    Column("slot", "integer", "Position of the trial among those of its code in the session, from 1.", minimum=1),
-    _LEVEL_COLUMNS["catch"],
-    _LEVEL_COLUMNS["standard"],
-    replace(_LEVEL_COLUMNS["level"], name="level_asked"),
-    optional(
-        "level_delivered",
-        "number",
-        "The level at which the hand met the comparison: from the delivered values, and for a visual delay from the "
-        "mean errors of the frames; n/a where it was not measured.",
-    ),
-    optional(
-        "comparison",
-        "number",
-        "The comparison at this level, in the unit of the varied number; n/a where conditions are compared.",
-    ),
-    optional(
-        "arrangement",
-        "text",
-        "What the intervals presented, in order: S the standard, C the comparison; n/a if none was presented.",
-    ),
-    optional(
-        "comparison_interval",
-        "integer",
-        "The interval that alone presented the comparison, from 1; n/a where there is none.",
-        minimum=1,
-    ),
-    optional("response", "text", "The answer; n/a without one."),
-    optional("value", "number", "The answer as a number, where it is one."),
-    optional("right", "flag", "true if the answer was correct; n/a where no answer is."),
-    optional("response_s", "number", "Time from the question to the first choice of an answer.", "s", minimum=0),
-    optional(
-        "reversal", "flag", "true if the up–down track changed its direction here; n/a where the method has no steps."
-    ),
-    replace(_LEVEL_COLUMNS["setting"], description="The level that the participant set, from level_asked on."),
-)
-
 TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, *OF_TRACKS)
-
-
-def dictionary_markdown() -> str:
-    """Return the columns of the tables of levels as Markdown: a heading and a table for each."""
-    of_tracks = "one row per trial with a design, after unblinding; what it has in addition to the columns of trials"
-    sections = [("tracks", of_tracks, OF_TRACKS), *((one.table, one.row, one.columns) for one in statistics())]
-    return "\n".join(
-        table_markdown(name.capitalize(), f"study-…_description-{name}_data.csv", row, columns)
-        for name, row, columns in sections
-        if name
-    )
 
 
 def level_tables(study: Study) -> Iterator[Delivered]:
@@ -141,7 +91,7 @@ def level_tables(study: Study) -> Iterator[Delivered]:
     groups = dict(zip(frame["participant"], frame["group"], strict=True))
     for one in statistics():
         if one.exported_in(study):
-            columns = (*_OF_PERSON, *one.columns)
+            columns = (*_OF_PERSON, *RESULTS[one.table].columns)
             rows = [{**row, **about, "group": groups[row["participant"]]} for of in found for row in one(of).exported()]
             table = pd.DataFrame(rows, columns=list(header(columns)))
             yield delivered(one.table, columns, table.astype({column.name: TYPES[column.kind] for column in columns}))

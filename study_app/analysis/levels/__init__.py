@@ -1,1 +1,1 @@
-"""Blocks of levels: thresholds, exponents, sensitivities and settings of participants and groups."""
+"""Blocks of levels: their tracks, and each statistic of participants and groups as one declaration."""

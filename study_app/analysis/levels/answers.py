@@ -13,12 +13,10 @@ from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.statistic import (
-    BLOCK,
     INTERVAL,
     KINDS,
     MOTORS,
     OF_WHOM,
-    STANDARD,
     LevelStatistic,
     Shown,
     analysed,
@@ -38,19 +36,15 @@ from study_app.analysis.statistics.outcome import Array, clopper_pearson, studen
 from study_app.analysis.statistics.thresholds import setting_statistics
 from study_app.protocol.trials.designs import Reply
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.store.tables.csv_files import Column, optional
 
 MOST_NAMED = 6
 
 
 @dataclass(frozen=True, slots=True)
 class SettingFound:
-    """A participant's settings at one standard or, where ``participant`` is None, the means of all participants.
+    """A participant's settings at one standard, as in `columns.RESULTS`, or the means of all ``n`` participants.
 
-    ``pse`` with the ends of its 95 % interval is a level; ``jnd``, ``constant_error`` (PSE − standard) and
-    ``hysteresis`` (started high − started low) are in u: decades on log spacing, else in the unit of the levels.
-    ``levels`` are a participant's settings, in order, and ``started_high`` says from which end; of the group ``n`` is
-    the number of participants.
+    ``levels`` are a participant's settings, in order, and ``started_high`` says from which end.
     """
 
     participant: str | None
@@ -113,26 +107,6 @@ class Settings(LevelStatistic[SettingFound]):
     title = "Settings"
     figures = ("settings",)
     table = "settings"
-    row = "one row per participant and standard of a block whose levels participants set, after unblinding"
-    columns = (
-        BLOCK,
-        STANDARD,
-        Column("n", "integer", "Settings that count.", minimum=0),
-        Column("pse", "number", "Point of subjective equality, a level: the mean of the settings in u."),
-        optional("low", "number", "Lower end of the 95 % interval of the PSE (Student's t)."),
-        optional("high", "number", "Upper end of the 95 % interval of the PSE (Student's t)."),
-        optional(
-            "jnd",
-            "number",
-            "Just-noticeable difference: the standard deviation of the settings, in u (decades where levels are spaced "
-            "by their logarithm, else in the unit of the levels).",
-            minimum=0,
-        ),
-        optional("constant_error", "number", "PSE minus standard, in u; n/a where no standard was presented."),
-        optional(
-            "hysteresis", "number", "Mean of the settings that started high minus mean of those that started low, in u."
-        ),
-    )
 
     compute = staticmethod(lambda block, opened, _study, _found: settings(block, opened))
 

@@ -11,11 +11,10 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import number_or_none
+from study_app.analysis.levels.columns import RESULTS
 from study_app.analysis.levels.statistic import (
-    BLOCK,
     INTERVAL_2,
     OF_WHOM,
-    STANDARD,
     LevelStatistic,
     Shown,
     analysed,
@@ -27,7 +26,6 @@ from study_app.analysis.levels.thresholds import Exponents, Thresholds
 from study_app.analysis.results import LevelsFound, number
 from study_app.protocol.trials.presentation import arrangement_of
 from study_app.psychophysics.detection import Sensitivity, rating
-from study_app.store.tables.csv_files import Column, optional
 
 Z_95: Final = 1.959964
 MODELS: Final = {
@@ -139,99 +137,20 @@ class Sensitivities(LevelStatistic[SensitivityFound]):
     place = 4
     title = "Sensitivity and bias"
     table = "thresholds"
-    row = "one row per participant and standard, or condition compared, after unblinding"
-    columns = (
-        BLOCK,
-        STANDARD,
-        optional("condition", "text", "The condition that was compared; n/a in a block of levels."),
-        Column("n", "integer", "Answers that count.", minimum=0),
-        optional(
-            "threshold",
-            "number",
-            "Level at which the psychometric function is half-way between guesses and lapses: posterior median, in the "
-            "unit of the stimulus' levels; n/a where the answers enter no such function.",
-        ),
-        optional("low", "number", "Lower end of the threshold's equal-tailed 95 % interval."),
-        optional("high", "number", "Upper end of the threshold's equal-tailed 95 % interval."),
-        optional(
-            "beyond",
-            "text",
-            "Whether the threshold lies beyond the levels that were presented; n/a: between them.",
-            levels=(("above", "above the highest"), ("below", "below the lowest")),
-        ),
-        optional(
-            "width",
-            "number",
-            "Posterior median of the function's width, from 5 to 95 % of its rise: in decades where levels are spaced "
-            "by their logarithm, else in the unit of the levels.",
-            minimum=0,
-        ),
-        optional("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1),
-        optional(
-            "weber_exponent",
-            "number",
-            "Slope of ln JND on ln standard over the participant's standards: the same in each of these rows; n/a with "
-            "fewer than two standards.",
-        ),
-        optional("flat_width_threshold", "number", "The threshold under a flat prior on the width."),
-        optional(
-            "reversal_mean",
-            "number",
-            "Mean of the last reversals of the up–down tracks; n/a for other methods and with too few.",
-        ),
-        optional(
-            "target_percent",
-            "number",
-            "Percentage of successes to which the rule of the up–down tracks converges.",
-            "%",
-            minimum=0,
-            maximum=100,
-        ),
-        optional("d_prime", "number", "Sensitivity over all levels presented; n/a where no answer is correct."),
-        optional(
-            "d_prime_model",
-            "text",
-            "The model of d_prime, where the design has two.",
-            levels=(
-                ("differencing", "intervals are compared with each other"),
-                ("independent", "each interval is compared with known alternatives"),
-            ),
-        ),
-        optional("d_prime_other", "number", "Sensitivity under the other model."),
-        optional(
-            "criterion",
-            "number",
-            "c of yes–no and of two-interval forced choice, k of the differencing model of same–different.",
-        ),
-        optional(
-            "share_first",
-            "number",
-            "Share of the first of the answers, such as “first” or “yes”.",
-            minimum=0,
-            maximum=1,
-        ),
-        optional(
-            "fit_p",
-            "number",
-            "p of the function's deviance among simulated sets of answers; below 0.05 the function does not fit.",
-            minimum=0,
-            maximum=1,
-        ),
-        optional("drift", "number", "Correlation of trial number and deviance residual.", minimum=-1, maximum=1),
-    )
 
     compute = staticmethod(lambda block, opened, _study, _found: sensitivities(block, opened))
 
     def exported(self) -> Iterator[Mapping[str, Any]]:
         exponents = {one.participant: one.exponent for one in Exponents.of(self.found)}
         thresholds = {(one.participant, one.standard): one for one in Thresholds.own(self.found)}
+        columns = RESULTS[self.table].columns
         for one in self.own(self.found):
             if one.level is not None:
                 continue
-            row = {column.name: getattr(one, column.name, None) for column in self.columns}
+            row = {column.name: getattr(one, column.name, None) for column in columns}
             row |= {"low": None, "high": None, "participant": one.participant, "block": self.found.block}
             if one.comparison is None and (threshold := thresholds.get((one.participant, one.standard))) is not None:
-                known = {column.name: getattr(threshold, column.name, None) for column in self.columns}
+                known = {column.name: getattr(threshold, column.name, None) for column in columns}
                 row |= {name: value for name, value in known.items() if value is not None}
                 row |= {"flat_width_threshold": threshold.flat_width, "weber_exponent": exponents.get(one.participant)}
             yield row | {

@@ -15,21 +15,17 @@ from study_app.analysis import levels
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import Picture
+from study_app.analysis.levels.columns import RESULTS
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table_of
 from study_app.analysis.results import LevelsFound, listed, number
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.discovery import modules_of
-from study_app.store.tables.csv_files import Column, optional
 
 R = TypeVar("R")
 Shown: TypeAlias = tuple[str, Callable[[Any], str]] | None
 """A column of a table of the report: its heading and what makes a cell of a row; None is one that is left out."""
 
 MOTORS: Final = "motors are audible and were not masked: participants may have used their sound."
-BLOCK: Final = Column("block", "text", "Id of the block.")
-STANDARD: Final = optional(
-    "standard", "number", "The standard, in the unit of the varied number; n/a where there is none."
-)
 
 
 class LevelStatistic(Generic[R]):
@@ -52,8 +48,8 @@ class LevelStatistic(Generic[R]):
         The heading of its part of the report.
     figures : tuple of str
         What the figures below its table are called.
-    table, row, columns : str, str, tuple of Column
-        The name of the exported table (CSV, Parquet, SPSS, codebook), what a row of it is, and its columns: attributes
+    table : str
+        The name of the exported table (CSV, Parquet, SPSS, codebook) in `columns.RESULTS`, whose columns are attributes
         of rows of participants; empty where it exports none.
     """
 
@@ -64,8 +60,6 @@ class LevelStatistic(Generic[R]):
     title: ClassVar[str] = ""
     figures: ClassVar[tuple[str, ...]] = ()
     table: ClassVar[str] = ""
-    row: ClassVar[str] = ""
-    columns: ClassVar[tuple[Column, ...]] = ()
 
     def __init__(
         self, found: LevelsFound, pictures: Mapping[str, Picture] | None = None, estimator: str | None = None
@@ -97,7 +91,7 @@ class LevelStatistic(Generic[R]):
 
     def exported(self) -> Iterable[Mapping[str, Any]]:
         """Return the rows of its exported table, with the participant of each."""
-        names = ["participant", *(column.name for column in self.columns)]
+        names = ["participant", *(column.name for column in RESULTS[self.table].columns)]
         for one in self.own(self.found):
             yield {name: getattr(one, name, None) for name in names} | {"block": self.found.block}
 

@@ -21,7 +21,6 @@ from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.answers import Answers
 from study_app.analysis.levels.statistic import (
-    BLOCK,
     INTERVAL,
     INTERVAL_2,
     MOTORS,
@@ -43,7 +42,6 @@ from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, drift,
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
 from study_app.psychophysics.grid import Grid, fit
-from study_app.store.tables.csv_files import Column
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
@@ -57,15 +55,11 @@ MOST_NAMED: Final = 6
 
 @dataclass(frozen=True, slots=True)
 class ThresholdFound:
-    """A participant's threshold at one standard or, where ``participant`` is None, the group's.
+    """A participant's threshold at one standard, as in `columns.RESULTS`, or the group's of ``n`` participants.
 
-    ``threshold`` with the ends of its 95 % interval and ``flat_width`` (the threshold under a flat prior on the width)
-    are levels. ``width`` reaches from 5 to 95 % of the function's rise, in decades on log spacing.
-    ``beyond`` says that the threshold lies above or below the levels presented; ``variance`` is the threshold's
-    posterior variance in u. ``fit_p`` is that of the deviance, ``drift`` the correlation of trial number and deviance
-    residual. ``reversal_mean`` is the classical estimate of the up–down tracks, at ``target_percent`` successes.
-    ``compared`` is the level at the percentage of successes of the published value, see `compared_percent`. Of the
-    group only ``n`` (participants), threshold and ``compared`` are known, each with its interval.
+    ``flat_width`` is the threshold under a flat prior on the width, ``variance`` the posterior variance in u, and
+    ``compared`` the level at the percentage of successes of the published value, see `compared_percent`. Of the group
+    only threshold and ``compared`` are known, each with its interval.
     """
 
     participant: str | None
@@ -596,17 +590,6 @@ class Exponents(LevelStatistic[ExponentFound]):
     key = "exponents"
     place = 3
     table = "exponents"
-    row = "one row per participant of a block of magnitude estimation, after unblinding"
-    columns = (
-        BLOCK,
-        Column("levels", "integer", "Levels with answers that count.", minimum=2),
-        Column(
-            "exponent",
-            "number",
-            "Exponent of the power law: the slope of the mean ln answer at each level on ln level, at delivered "
-            "levels.",
-        ),
-    )
 
     compute = staticmethod(
         lambda block, opened, _study, found: (

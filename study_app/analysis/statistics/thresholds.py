@@ -329,20 +329,10 @@ def drifts(correlation: float | None, n: int) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class SettingStatistics:
-    """What settings of one observer show, in u: log10 of the level on log spacing, else the level.
+    """What ``n`` settings of one observer show, in u: log10 of the level on log spacing, else the level.
 
-    Attributes
-    ----------
-    n : int
-        How many settings.
-    pse : float
-        Point of subjective equality, their mean.
-    low, high : float or None
-        Student's 95 % interval of the PSE; None where there is none.
-    jnd : float or None
-        Just-noticeable difference, their standard deviation (n − 1); None of a single setting.
-    hysteresis : float or None
-        Mean of the settings that started high − mean of those that started low; None where either is lacking.
+    ``pse``, the point of subjective equality, is their mean, with Student's 95 % interval; ``jnd`` their standard
+    deviation (n − 1), ``hysteresis`` the mean of those that started high − that of those that started low.
     """
 
     n: int
@@ -354,14 +344,9 @@ class SettingStatistics:
 
 
 def setting_statistics(u: Array, started_high: NDArray[np.bool_]) -> SettingStatistics:
-    """Return what settings show (Gescheider 1997, Psychophysics: The Fundamentals, chapter 3).
+    """Return what settings (n,) show (Gescheider 1997, Psychophysics: The Fundamentals, chapter 3).
 
-    Parameters
-    ----------
-    u : (n,) array
-        The settings, at least one.
-    started_high : (n,) array
-        Of each whether it started in the upper half of the levels.
+    ``started_high`` (n,) says of each whether it started in the upper half of the levels.
     """
     above, below = u[started_high], u[~started_high]
     low, high = student_interval(u)

@@ -1,0 +1,190 @@
+"""The exported tables of blocks of levels: what a row is, and the columns of each.
+
+Statistics name their table; rows, formats, codebook and data dictionary follow from the columns. Help reads them
+without the libraries of the analysis, which may not be installed.
+"""
+
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+from study_app.store.tables.column_dictionary import table_markdown
+from study_app.store.tables.columns import INTERVALS
+from study_app.store.tables.csv_files import Column, optional
+
+_INTERVALS: Final = {column.name: column for column in INTERVALS}
+_BLOCK: Final = Column("block", "text", "Id of the block.")
+_STANDARD: Final = optional(
+    "standard", "number", "The standard, in the unit of the varied number; n/a where there is none."
+)
+
+OF_TRACKS: Final[tuple[Column, ...]] = (
+    Column("analysed", "flag", "true where the row counts and does not present the modulus of a magnitude estimation."),
+    Column("track", "text", "What the code stands for: standard and number of the track (8/1), or the condition."),
+    Column("slot", "integer", "Position of the trial among those of its code in the session, from 1.", minimum=1),
+    _INTERVALS["catch"],
+    _INTERVALS["standard"],
+    replace(_INTERVALS["level"], name="level_asked"),
+    optional(
+        "level_delivered",
+        "number",
+        "The level at which the hand met the comparison: from the delivered values, and for a visual delay from the "
+        "mean errors of the frames; n/a where it was not measured.",
+    ),
+    optional(
+        "comparison",
+        "number",
+        "The comparison at this level, in the unit of the varied number; n/a where conditions are compared.",
+    ),
+    optional(
+        "arrangement",
+        "text",
+        "What the intervals presented, in order: S the standard, C the comparison; n/a if none was presented.",
+    ),
+    optional(
+        "comparison_interval",
+        "integer",
+        "The interval that alone presented the comparison, from 1; n/a where there is none.",
+        minimum=1,
+    ),
+    optional("response", "text", "The answer; n/a without one."),
+    optional("value", "number", "The answer as a number, where it is one."),
+    optional("right", "flag", "true if the answer was correct; n/a where no answer is."),
+    optional("response_s", "number", "Time from the question to the first choice of an answer.", "s", minimum=0),
+    optional(
+        "reversal", "flag", "true if the up–down track changed its direction here; n/a where the method has no steps."
+    ),
+    replace(_INTERVALS["setting"], description="The level that the participant set, from level_asked on."),
+)
+
+
+SETTINGS: Final[tuple[Column, ...]] = (
+    _BLOCK,
+    _STANDARD,
+    Column("n", "integer", "Settings that count.", minimum=0),
+    Column("pse", "number", "Point of subjective equality, a level: the mean of the settings in u."),
+    optional("low", "number", "Lower end of the 95 % interval of the PSE (Student's t)."),
+    optional("high", "number", "Upper end of the 95 % interval of the PSE (Student's t)."),
+    optional(
+        "jnd",
+        "number",
+        "Just-noticeable difference: the standard deviation of the settings, in u (decades where levels are spaced by "
+        "their logarithm, else in the unit of the levels).",
+        minimum=0,
+    ),
+    optional("constant_error", "number", "PSE minus standard, in u; n/a where no standard was presented."),
+    optional(
+        "hysteresis", "number", "Mean of the settings that started high minus mean of those that started low, in u."
+    ),
+)
+
+EXPONENTS: Final[tuple[Column, ...]] = (
+    _BLOCK,
+    Column("levels", "integer", "Levels with answers that count.", minimum=2),
+    Column(
+        "exponent",
+        "number",
+        "Exponent of the power law: the slope of the mean ln answer at each level on ln level, at delivered levels.",
+    ),
+)
+
+THRESHOLDS: Final[tuple[Column, ...]] = (
+    _BLOCK,
+    _STANDARD,
+    optional("condition", "text", "The condition that was compared; n/a in a block of levels."),
+    Column("n", "integer", "Answers that count.", minimum=0),
+    optional(
+        "threshold",
+        "number",
+        "Level at which the psychometric function is half-way between guesses and lapses: posterior median, in the "
+        "unit of the stimulus' levels; n/a where the answers enter no such function.",
+    ),
+    optional("low", "number", "Lower end of the threshold's equal-tailed 95 % interval."),
+    optional("high", "number", "Upper end of the threshold's equal-tailed 95 % interval."),
+    optional(
+        "beyond",
+        "text",
+        "Whether the threshold lies beyond the levels that were presented; n/a: between them.",
+        levels=(("above", "above the highest"), ("below", "below the lowest")),
+    ),
+    optional(
+        "width",
+        "number",
+        "Posterior median of the function's width, from 5 to 95 % of its rise: in decades where levels are spaced by "
+        "their logarithm, else in the unit of the levels.",
+        minimum=0,
+    ),
+    optional("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1),
+    optional(
+        "weber_exponent",
+        "number",
+        "Slope of ln JND on ln standard over the participant's standards: the same in each of these rows; n/a with "
+        "fewer than two standards.",
+    ),
+    optional("flat_width_threshold", "number", "The threshold under a flat prior on the width."),
+    optional(
+        "reversal_mean",
+        "number",
+        "Mean of the last reversals of the up–down tracks; n/a for other methods and with too few.",
+    ),
+    optional(
+        "target_percent",
+        "number",
+        "Percentage of successes to which the rule of the up–down tracks converges.",
+        "%",
+        minimum=0,
+        maximum=100,
+    ),
+    optional("d_prime", "number", "Sensitivity over all levels presented; n/a where no answer is correct."),
+    optional(
+        "d_prime_model",
+        "text",
+        "The model of d_prime, where the design has two.",
+        levels=(
+            ("differencing", "intervals are compared with each other"),
+            ("independent", "each interval is compared with known alternatives"),
+        ),
+    ),
+    optional("d_prime_other", "number", "Sensitivity under the other model."),
+    optional(
+        "criterion",
+        "number",
+        "c of yes–no and of two-interval forced choice, k of the differencing model of same–different.",
+    ),
+    optional(
+        "share_first", "number", "Share of the first of the answers, such as “first” or “yes”.", minimum=0, maximum=1
+    ),
+    optional(
+        "fit_p",
+        "number",
+        "p of the function's deviance among simulated sets of answers; below 0.05 the function does not fit.",
+        minimum=0,
+        maximum=1,
+    ),
+    optional("drift", "number", "Correlation of trial number and deviance residual.", minimum=-1, maximum=1),
+)
+
+
+class Results(NamedTuple):
+    """A table of results: what a row is, and its columns."""
+
+    row: str
+    columns: tuple[Column, ...]
+
+
+RESULTS: Final = {
+    "thresholds": Results("one row per participant and standard, or condition compared, after unblinding", THRESHOLDS),
+    "settings": Results(
+        "one row per participant and standard of a block whose levels participants set, after unblinding", SETTINGS
+    ),
+    "exponents": Results("one row per participant of a block of magnitude estimation, after unblinding", EXPONENTS),
+}
+"""By the names of the tables."""
+
+
+def dictionary_markdown() -> str:
+    """Return the columns of these tables as Markdown: a heading and a table for each."""
+    of_tracks = "one row per trial with a design, after unblinding; what it has in addition to the columns of trials"
+    return "\n".join(
+        table_markdown(name.capitalize(), f"study-…_description-{name}_data.csv", row, columns)
+        for name, (row, columns) in {"tracks": Results(of_tracks, OF_TRACKS), **RESULTS}.items()
+    )
