@@ -75,11 +75,11 @@ def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """A reference with a tail of one element less is another liquid."""
     true = appraisal_measurement.reference_model.respond
 
-    def shorter(scene, motion, *, exact=False):  # type: ignore[no-untyped-def]
+    def shorter(scene, motion):  # type: ignore[no-untyped-def]
         liquid = scene.liquids[0]
         wake = liquid.wake.model_copy(update={"length": liquid.wake.length - 1})
         other = scene.model_copy(update={"liquids": (liquid.model_copy(update={"wake": wake}),)})
-        return true(other, motion, exact=exact)
+        return true(other, motion)
 
     monkeypatch.setattr(appraisal_measurement.reference_model, "respond", shorter)
     found = appraisal_measurement.errors(THESIS["light_oil"])
@@ -215,14 +215,14 @@ class Clock:
         def run(bench, ticks):
             self.now_ns += ticks * cost_ns(bench.scene)
 
-        original = cost.Bench.__init__
+        original = cost.TickTimer.__init__
 
         def begin(bench, scene):
             bench.scene = scene
             original(bench, scene)
 
-        monkeypatch.setattr(cost.Bench, "__init__", begin)
-        monkeypatch.setattr(cost.Bench, "run", run)
+        monkeypatch.setattr(cost.TickTimer, "__init__", begin)
+        monkeypatch.setattr(cost.TickTimer, "run", run)
 
 
 PRICES = {"drag": 2, "wake": 40, "current": 5, "buoyancy": 3, "surface": 7, "added_mass": 11, "history": 90}

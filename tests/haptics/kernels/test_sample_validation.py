@@ -3,7 +3,7 @@ import pytest
 
 from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_GLITCH, LIMITER_STALE, STATUS_OK, STATUS_STALE_FAULT
-from study_app.haptics.model.scene import Ewma, Kalman, Raw
+from study_app.haptics.model.scene import Ewma, Kalman
 from tests.haptics.scenes import HONEY, TICK_NS, UNBENT, WATER, Hand, scene
 
 RAW = scene(velocity=Ewma(alpha=1.0), knee=UNBENT, scale=1)
@@ -170,7 +170,7 @@ def test_a_motion_that_begins_like_a_jump_is_felt_after_five_samples():
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("velocity", [Ewma(), Kalman(), Raw()])
+@pytest.mark.parametrize("velocity", [Ewma(), Kalman()])
 def test_a_jump_during_a_gap_is_no_motion(velocity):
     """The jump is 1 m/s over the gap, 10 m/s in the scene."""
     found = stirred(Hand(HONEY.model_copy(update={"velocity": velocity})), 1000, gap=(500, 520), off_m=0.02)
