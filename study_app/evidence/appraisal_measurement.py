@@ -1,12 +1,13 @@
 """Measures computation time and accuracy of a scene with one liquid, fast enough for use while it is presented."""
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from study_app.evidence import reference_model
-from study_app.evidence.appraisal import Costs, EffectCost, Errors
+from study_app.evidence.appraisal import Costs, EffectCost, Errors, Question
 from study_app.evidence.cost import measure
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, Dynamics
 from study_app.haptics.model.effects import NAMED
@@ -15,6 +16,7 @@ from study_app.haptics.model.motion import Motion, path
 from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
 from study_app.haptics.runtime.offline import samples_along, simulate
 from study_app.protocol.trials.tasks import Stroke
+from study_app.workers.server import Send, Stop
 
 BATCHES: Final = 60
 RAMP_MPS2: Final = 2.0
@@ -127,3 +129,16 @@ def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
     samples = samples_along(scene, Motion(t_s, position_m), dynamics)
     permitted_n = float(samples["permitted_n"].sum())
     return float(samples["withheld_n"].sum()) / permitted_n if permitted_n > 0.0 else 0.0
+
+
+def appraise(question: Question, send: Send, stop: Stop) -> Errors | None:
+    """Send the `Costs` of a scene, then return its `Errors`; None if another question waits."""
+    if stop():
+        return None
+    send(costs(question.scene))
+    if stop():
+        return None
+    stroke = question.stroke
+    share = withheld_share(question.scene, stroke, question.dynamics) if stroke is not None else None
+    velocity = velocity_errors(question.scene, question.dynamics) if question.dynamics.unknown else None
+    return replace(errors(question.scene), withheld=share, velocity=velocity)

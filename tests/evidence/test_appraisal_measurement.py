@@ -10,8 +10,8 @@ import pytest
 
 from study_app.errors import StudyError
 from study_app.evidence import appraisal_measurement, cost
-from study_app.evidence.appraisal import Costs, Question, appraise, start_appraisal_worker
-from study_app.evidence.appraisal_measurement import withheld_share
+from study_app.evidence.appraisal import Costs, Question, start_appraisal_worker
+from study_app.evidence.appraisal_measurement import appraise, withheld_share
 from study_app.evidence.cost import measure, report
 from study_app.evidence.expected_error import error_report, expected
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics

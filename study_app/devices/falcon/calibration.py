@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -38,9 +38,6 @@ from study_app.errors import DeviceError
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
 from study_app.haptics.model.layout import new_command, new_reading
 from study_app.user_folder import FOLDER_VARIABLE, user_folder
-
-if TYPE_CHECKING:
-    from study_app.devices.falcon.device import FalconDevice
 
 UNCALIBRATED_UNITS_PER_NM: Final = 6616.0
 """Martin & Hillier 2009, quoted from another source; with libnifalcon's 10 000 forces would be half as strong again."""
@@ -242,7 +239,7 @@ class Grip:
     virtual : whether time is counted in ticks instead of read from the clock
     """
 
-    def __init__(self, device: FalconDevice, *, virtual: bool = False) -> None:
+    def __init__(self, device: Any, *, virtual: bool = False) -> None:
         self._device = device
         self._virtual = virtual
         self._now_ns = 0 if virtual else time.monotonic_ns()

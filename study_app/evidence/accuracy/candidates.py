@@ -21,7 +21,7 @@ from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.kernels.tick import tick
 from study_app.haptics.kernels.vector import norm, subtract
 from study_app.haptics.model.effects.drag import REFERENCE
-from study_app.haptics.model.estimators import NAMED
+from study_app.haptics.model.estimators import GIVEN
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws import Law
 from study_app.haptics.model.layout import SAMPLE, Record, records
@@ -275,7 +275,7 @@ def _tick(model: Any, safety: Record, sample: Record, motion: Any, k: int) -> No
     sample.fresh = 1
     for axis in range(3):
         sample.position_m[axis] = hand_m[k, axis]
-    if model.parameters[0].estimator == NAMED["given"].code:
+    if model.parameters[0].estimator == GIVEN:
         for axis in range(3):
             state.estimate_mps[axis] = velocity_mps[k, axis]
     tick(model, safety, sample)

@@ -285,7 +285,7 @@ class TankWidget(QWidget):
         self._box, self.camera = look(self._page, self._captions, width, height)
         self._captions.lay_out(width, height, self.camera.point((0, self._box.floor, self._box.z))[1])
         if self.controls is not None:
-            self.controls.place(self._captions)
+            self.controls.place(self._captions.small_scale, self._captions.controls_middle)
         self.placer = BallPlacer(self.camera, self._box, self._page.body_radius_m)
         self.video.place = video_place(self.camera, self._box)
         for step in range(DEPTH_STEPS):

@@ -29,6 +29,7 @@ from study_app.session.transitions.events import (
 )
 from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import advance, open_session
+from study_app.store.journals.journal_events import FormAnswered, Responses
 from tests.gui.participant.driver import KEY, Participant, description_of, tap, told_of
 from tests.gui.small import FIVE, QUESTIONS, form, questionnaire
 from tests.protocol.forms.mixed import mixed_file
@@ -277,8 +278,8 @@ class Session:
     def post(self, event: Any) -> None:
         self.state, commands = advance(self.state, event)
         for command in commands:
-            if isinstance(command, Write) and command.event in ("form_answered", "responses"):
-                self.answered.append(command.fields)
+            if isinstance(command, Write) and isinstance(command.line, FormAnswered | Responses):
+                self.answered.append(command.line)
             if isinstance(command, ShowPage) and self.state.phase is not Phase.TASK:
                 self.seen.window.show_page(command.page)
 
@@ -303,9 +304,9 @@ def test_a_session_with_a_question_of_every_kind_is_done_by_keys_alone(opening: 
         if seen.focus is focused:
             seen.press(KEY.Key_Down)
     assert session.state.phase is Phase.COMPLETE
-    rows = [row for fields in session.answered for row in fields["items"]]
+    rows = [row for line in session.answered for row in line.items]
     assert len(rows) == 3 + 2 * 3 + 6 + 10 + 1
-    assert all(row["onset_s"] is not None and row["first_s"] is not None for row in rows)
-    values = {row["item"]: row["value"] for row in rows}
+    assert all(row.onset_s is not None and row.first_s is not None for row in rows)
+    values = {row.item: row.value for row in rows}
     assert (values["age"], values["hand"], values["used"]) == (33, "left", ("mouse",))
     assert (values["thickness"], values["pleasant"], values["effort"], values["sus10"]) == (2, 5, 5, 2)

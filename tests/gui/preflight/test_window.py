@@ -11,6 +11,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.preflight import Masking
 from study_app.viewmodels.preflight import resumed_rows
 from tests.gui.windows import SCALED, WELL, checked, preflight
+from tests.journal_lines import event_from
 
 pytestmark = pytest.mark.slow
 
@@ -88,7 +89,8 @@ def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
         {"event": "responses", "trial": first, "attempt": 1, "items": [{"item": "a"}, {"item": "b"}]},
         {"event": "trial_started", "trial": second, "attempt": 1},
     )
-    rows = resumed_rows(protocol, schedule, [{**line, "t_s": float(at)} for at, line in enumerate(happened)])
+    journal = [event_from({**line, "t_s": float(at)}) for at, line in enumerate(happened)]
+    rows = resumed_rows(protocol, schedule, journal)
     assert rows == (("Continues at", "Liquid setting 2, attempt\u00a02"), ("Kept", "2 of 8 answers"))
     window.show_view(checked(WELL, goes_on=rows))
     assert {value.text() for value in window.values()} >= {"Liquid setting 2, attempt\u00a02", "2 of 8 answers"}

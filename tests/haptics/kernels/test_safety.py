@@ -91,12 +91,13 @@ def test_below_500_hz_no_participant_is_to_feel_the_limits(rate_hz, may):
 
 
 def test_the_table_has_every_estimator_period_and_delay_and_falls_with_delay():
-    keys = [(entry.estimator, entry.parameter, entry.period_s, entry.delay_ticks) for entry in table()]
+    rows = [entry for entry in table() if entry.estimator != "line"]  # those are of velocities that a device measures
+    keys = [(entry.estimator, entry.parameter, entry.period_s, entry.delay_ticks) for entry in rows]
     assert len(set(keys)) == len(keys) == len(measured_estimators()) * 4 * 4
-    for entry in table():
+    for entry in rows:
         if entry.delay_ticks > 1:
             kind = NAMED[entry.estimator]
-            named = {} if kind.parameter is None else {kind.parameter: entry.parameter}
+            named = {} if entry.parameter is None else {"alpha": entry.parameter}
             before = damping_limits(entry.period_s, entry.delay_ticks - 1, kind.model(**named))
             assert entry.limits.drag_nspm <= before.drag_nspm
         assert entry.limits.inertia_nspm < entry.limits.drag_nspm

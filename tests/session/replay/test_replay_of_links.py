@@ -9,7 +9,7 @@ from study_app.analysis.data.blocks import setting_name
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.levels.conduct import Withheld
 from study_app.analysis.levels.evaluate import levels_found
-from study_app.analysis.levels.thresholds import tracks
+from study_app.analysis.levels.tracks import tracks
 from study_app.protocol.load import parse
 from study_app.protocol.trials.presentation import presented_by
 from study_app.session import replay as replay_module

@@ -27,6 +27,7 @@ from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
+from study_app.store.journals.journal_events import Responses
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.study_files import write_description
 from tests.compiled import needs_servo
@@ -162,7 +163,7 @@ def test_a_rehearsal_that_was_interrupted_and_resumed_answers_like_one_that_was_
     kept, pages = SessionStore.append, count(1)
 
     def interrupted(self: SessionStore, event: Any, **about: Any) -> None:
-        if event == "responses" and next(pages) == page:
+        if isinstance(event, Responses) and next(pages) == page:
             raise KeyboardInterrupt
         kept(self, event, **about)
 
@@ -187,7 +188,7 @@ def test_a_resumed_session_goes_on_with_the_model_that_it_began_with(
     results, kept, used = StudyFolder(tmp_path / "results"), SessionStore.append, []
 
     def interrupted(self: SessionStore, event: Any, **about: Any) -> None:
-        if event == "responses":
+        if isinstance(event, Responses):
             raise KeyboardInterrupt
         kept(self, event, **about)
 

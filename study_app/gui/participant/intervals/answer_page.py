@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from PySide6.QtCore import QEvent, QObject, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QPainter, QPen, QShowEvent, QWheelEvent
@@ -20,10 +20,6 @@ from study_app.protocol.wording.languages import Words
 from study_app.session.device_buttons import STEP_S
 from study_app.session.pages import ChoicePage, DesignPage, FeedbackPage, Interval, NumberPage, TaskPage
 from study_app.session.transitions.events import Chosen, ItemShown, Stepped, Submitted
-
-if TYPE_CHECKING:
-    from study_app.gui.participant.tank.captions import Captions
-    from study_app.protocol.wording.languages import Words
 
 QUESTION_PX = 26
 ASKING = 0.8  # share of the present trial's bar that is full
@@ -365,9 +361,8 @@ class SettingControls(QWidget):
         self._let_go()
         self.setVisible(self._adjusts and self._buttons)
 
-    def place(self, captions: Captions) -> None:
+    def place(self, scale: float, middle: float) -> None:
         """Lie at the foot of the tank among its words, above the way to pause where both have no room side by side."""
-        scale = captions.small_scale
         width, height = (round(side * scale) for side in BUTTON_PX)
         for button in (self.less, self.more):
             button.setFont(sized(TEXT_PX * scale))
@@ -376,7 +371,7 @@ class SettingControls(QWidget):
             button.setMinimumWidth(width)
         self.done.set_scale(scale)
         self.adjustSize()
-        x, y = (self._room.width() - self.width()) / 2, captions.controls_middle - self.height() / 2
+        x, y = (self._room.width() - self.width()) / 2, middle - self.height() / 2
         self.move(round(x), round(min(y, self._room.height() - self.height() - 4)))
         self.raise_()
 
