@@ -77,7 +77,7 @@ class Program:
         found: list[str] = []
 
         def look() -> list[str]:
-            assert self.process.poll() is None, self.process.stderr.read()  # type: ignore[union-attr]
+            assert self.process.poll() is None, f"{self.process.returncode} {self.process.stderr.read()}"  # type: ignore[union-attr]
             found[:] = self.xdotool("search", "--onlyvisible", "--name", title).splitlines()
             return found
 
@@ -89,7 +89,7 @@ class Program:
         found: list[str] = []
 
         def look() -> list[str]:
-            assert self.process.poll() is None, self.process.stderr.read()  # type: ignore[union-attr]
+            assert self.process.poll() is None, f"{self.process.returncode} {self.process.stderr.read()}"  # type: ignore[union-attr]
             found[:] = [one for one in self.windows(title) if QSize(*self.size(one)) == size]
             return found
 
