@@ -13,7 +13,6 @@ MODULES = (
     "study_app.protocol.load",
     "study_app.protocol.orders.schedule",
     "study_app.haptics.model.scene",
-    "study_app.haptics.model.scene",
     "study_app.haptics.runtime.offline",
     "study_app.devices.base",
     "study_app.devices.descriptor",

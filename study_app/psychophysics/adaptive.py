@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from study_app.psychophysics.families import Family, Floats, success
 from study_app.psychophysics.grid import Grid, Values, fit, quantile, tables
 
+# The level presented, in the coordinate u, and whether it was a success; in the order of presentation.
 Answer: TypeAlias = tuple[float, bool]
-"""The level presented, in the coordinate u, and whether it was a success; in the order of presentation."""
 
 RATIOS: Final = {1: 0.2845, 2: 0.5488, 3: 0.7393, 4: 0.8415}
 """Ratio of the step down to the step up, by the number of successes in a row before a step down."""
@@ -174,8 +174,8 @@ def _weighted_entropy(joint: NDArray[np.float64], axis: int) -> NDArray[np.float
     return np.asarray(total * np.log(total) - terms.sum(axis=axis), float)
 
 
+# Successes and failures of each track at each level, (tracks, levels) arrays.
 Counts: TypeAlias = tuple[Floats, Floats]
-"""Successes and failures of each track at each level, (tracks, levels) arrays."""
 
 
 @dataclass(frozen=True, eq=False)
