@@ -117,9 +117,13 @@ class StudyFolder:
 
     def sessions(self) -> tuple[SessionFolder, ...]:
         """Return the sessions that were begun, by participant and number."""
+        try:
+            paths = list(self.data.glob("sub-*/ses-*"))
+        except FileNotFoundError:  # a participant was withdrawn meanwhile
+            return self.sessions()
         found = [
             SessionFolder(path, path.parent.name.removeprefix("sub-"), int(match[1]))
-            for path in self.data.glob("sub-*/ses-*")
+            for path in paths
             if (match := _SESSION_FOLDER.fullmatch(path.name))
         ]
         return tuple(sorted(found, key=lambda session: (session.participant, session.number)))

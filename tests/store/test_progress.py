@@ -1,6 +1,6 @@
 import itertools
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.protocol.streams import stream
 from study_app.session.start import resumed
 from study_app.store.blinded.blinding import open_or_draw_key, read_key, whole_protocol
+from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal import read
 from study_app.store.journals.journal_events import Event
@@ -186,3 +187,17 @@ def test_of_a_folder_a_torn_line_does_not_count_and_what_is_no_session_is_named(
         resumed(tmp_path)
     with pytest.raises(StoreError, match="does not begin with session_started"):
         progress_of([])
+
+
+def test_sessions_are_listed_while_a_participant_is_withdrawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study, listed = StudyFolder(tmp_path), Path.glob
+    study.session("P002", 1).path.mkdir(parents=True)
+    gone = iter([True, False])
+
+    def folder_that_goes(self: Path, pattern: str) -> Iterator[Path]:
+        if next(gone):
+            raise FileNotFoundError(self / "sub-P001")
+        return listed(self, pattern)
+
+    monkeypatch.setattr(Path, "glob", folder_that_goes)
+    assert study.ids() == ("P002",)
