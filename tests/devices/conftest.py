@@ -24,9 +24,8 @@ def falcon_socket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[N
     points = {"falcon-socket": "tests.devices.falcon.served.device:FALCON_SOCKET"}
     install_metadata(site, "liquid_study_socket", "1.0", points)
     monkeypatch.syspath_prepend(site)
-    monkeypatch.setenv(
-        "PYTHONPATH", os.pathsep.join((str(site), str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")))
-    )
+    paths = (str(site), str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH"))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, paths)))  # an empty one is the present folder
     discover.cache_clear()
     yield
     discover.cache_clear()
