@@ -95,13 +95,13 @@ P = ParamSpec("P")
 
 
 def guarded(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, P], None]:
-    """Let no exception leave a slot: whatever it is ends in zero force."""
+    """Let no exception leave a slot: each one ends in zero force."""
 
     @wraps(slot)
     def run(self: F, /, *arguments: P.args, **named: P.kwargs) -> None:
         try:
             slot(self, *arguments, **named)
-        except Exception as error:  # noqa: BLE001 - whatever it is, the hand comes first
+        except Exception as error:  # noqa: BLE001 - zero force comes first, after any of them
             self.fail(error)
 
     return run

@@ -36,13 +36,12 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
     Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz differs).
     """
     from study_app.haptics.model import motion
-    from study_app.haptics.model import motion as paths
     from study_app.haptics.runtime import offline
     from study_app.store.tables import csv_files
 
     chosen = _changed(scene, liquid, changes)
-    programmed = path in paths.NAMES or not (Path(path).suffix or Path(path).exists())
-    moved = paths.path(path, rate_hz=chosen.rate_hz) if programmed else motion.read(Path(path))
+    programmed = path in motion.NAMES or not (Path(path).suffix or Path(path).exists())
+    moved = motion.path(path, rate_hz=chosen.rate_hz) if programmed else motion.read(Path(path))
     table = offline.simulate(chosen, moved)
     csv_files.write_columns(to, table)
     click.echo(f"{to}: {len(table)} rows")

@@ -21,7 +21,6 @@ from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_sus
 
 WORD: Final = b"done\n"
 READY: Final = b"ready\n"
-DIED: Final = "its guard process has died, so the force was turned off: start the program again"
 PATIENCE_S: Final = 10.0
 """Time in which the guard tries to open the device: the system needs a moment to release it from a dead program."""
 

@@ -105,13 +105,12 @@ def motion_along(path: str, scene: Scene) -> Motion:
     """Return the motion of a path's name or a motion file, at the scene's rate."""
     from study_app.evidence.reference_solutions import stir
     from study_app.haptics.model import motion
-    from study_app.haptics.model import motion as paths
     from study_app.lab.identify.measured_force import at_rate
 
     if path == DEFAULT_PATH:
         return stir(scene.scale, scene.rate_hz)
-    programmed = path in paths.NAMES or not (Path(path).suffix or Path(path).exists())
-    return paths.path(path, rate_hz=scene.rate_hz) if programmed else at_rate(motion.read(Path(path)), scene.rate_hz)
+    programmed = path in motion.NAMES or not (Path(path).suffix or Path(path).exists())
+    return motion.path(path, rate_hz=scene.rate_hz) if programmed else at_rate(motion.read(Path(path)), scene.rate_hz)
 
 
 @click.command()

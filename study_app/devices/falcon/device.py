@@ -136,7 +136,7 @@ class FalconDevice(FramedDevice):
 
     @property
     def failure_mode(self) -> str | None:
-        """The id of what ended the exchange; without positions it is told from homed bits and errors of transfers."""
+        """The id of what ended the exchange; without positions it follows from homed bits and errors of transfers."""
         mode, state = super().failure_mode, self.exchange
         if mode != self.silent:
             return mode

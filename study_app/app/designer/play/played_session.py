@@ -69,7 +69,7 @@ class PlayedSession(LiveSession):
         finally:
             bridge.leave_now()
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Take the closing of the participant's window as the end of the session."""
         closes = event.type() == QEvent.Type.Close and self.bridge is not None and watched is self.bridge.participant
         if not closes or self.bridge is None or self.bridge.participant.may_close:
