@@ -5,13 +5,13 @@ import pickle
 import pytest
 
 from study_app import errors
-from study_app.app.designer.play.playable import NotPlayableError
-from study_app.authoring.edited_study import Refused
-from study_app.authoring.versions.contents import ChangedOutsideError
+from study_app.designer.document.edited_study import Refused
+from study_app.designer.participant.playable import NotPlayableError
 from study_app.devices.doctor import DeviceFailure, DeviceFailureNotFound
 from study_app.devices.falcon.boot import BootFailure
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure
 from study_app.errors import Problem, ProtocolError, StudyError
+from study_app.store.study_versions import ChangedOutsideError
 from study_app.workers.server import Stopped
 
 PLAIN = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, StudyError)]

@@ -14,10 +14,11 @@ from study_app.app.machine import WorkstationController
 from study_app.gui.widgets.background import Background
 
 if TYPE_CHECKING:
-    from study_app.app.designer.controller import DesignerController
-    from study_app.app.designer.feeling import LabLiquids
     from study_app.app.lab.controller import LabController
-    from study_app.gui.designer.view import DesignerPlace
+    from study_app.app.session.playing import Playing
+    from study_app.designer.participant.feeling import LabLiquids
+    from study_app.designer.place.controller import DesignerController
+    from study_app.designer.place.view import DesignerPlace
     from study_app.gui.lab.view import LabPlace
     from study_app.lab.ab_comparison import Setting, Side
     from study_app.viewmodels.sessions import SessionFacts
@@ -41,6 +42,7 @@ class LabAndDesigner(QObject):
         super().__init__()
         self._machine, self._results = machine, results
         self.designer: DesignerController | None = None
+        self.playing: Playing | None = None
         self.lab: LabController | None = None
         self._loading = Background(self)
 
@@ -63,11 +65,13 @@ class LabAndDesigner(QObject):
     def make_designer(self) -> DesignerPlace:
         """Return the study designer's place, with its controller."""
         self._loading.wait()
-        from study_app.app.designer.controller import DesignerController  # noqa: PLC0415 - only once it is needed
+        from study_app.app.session.playing import Playing  # noqa: PLC0415 - only once they are needed
+        from study_app.designer.place.controller import DesignerController  # noqa: PLC0415
 
         self.designer = DesignerController(self._results)
+        self.playing = Playing(self.designer)
         self.designer.saving.saved.connect(self.saved)
-        self.designer.playing.kept.connect(self.saved)
+        self.playing.kept.connect(self.saved)
         self.designer.feeling.asked.connect(self._feel)
         self.designer.editing.opened_other.connect(self._forget_study)
         self.designer.feeling.returned.connect(lambda: self.go_asked.emit("designer"))
@@ -117,21 +121,21 @@ class LabAndDesigner(QObject):
 
     def end(self, patience: Patience) -> None:
         """End what plays, and let go of the lab's device."""
-        if self.designer is not None:
-            self.designer.playing.end(patience)
+        if self.playing is not None:
+            self.playing.end(patience)
         if self.lab is not None:
             self.lab.end(patience)
 
     def end_by_signal(self, number: int) -> None:
         """End what plays because the program is being ended from outside."""
-        if self.designer is not None:
-            self.designer.playing.end_by_signal(number)
+        if self.playing is not None:
+            self.playing.end_by_signal(number)
 
 
 def load_modules() -> None:
     """Load the modules of lab and designer, the compiler, and what the first page is computed from."""
-    import study_app.app.designer.controller  # noqa: PLC0415
     import study_app.app.lab.controller  # noqa: PLC0415
+    import study_app.app.session.playing  # noqa: PLC0415
     import study_app.lab.live  # noqa: F401, PLC0415
     from study_app.gui.participant.tank.glass import brightness  # noqa: PLC0415
     from study_app.protocol.source.json_schema import schema  # noqa: PLC0415

@@ -9,13 +9,13 @@ from typing import Any, Final
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.app.workstation_settings import settings_here
 from study_app.devices.descriptor import Backend
 from study_app.devices.registry import backends, descriptor_of
 from study_app.errors import StoreError
 from study_app.gui.application import open_here
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.devices.view import DevicesPlace
+from study_app.gui.kit.workstation import settings_here
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.theme.theme import Theme
 from study_app.store import workstation

@@ -14,13 +14,13 @@ from study_app.app.lab_and_designer import LabAndDesigner
 from study_app.app.machine import DevicesController, WorkstationController
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.session.timing import collecting_here
-from study_app.app.workstation_settings import screen_number, theme_named
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import place
 from study_app.gui.home.dialogs import WorkspaceDialog
 from study_app.gui.home.main_window import MainWindow, bug_words
 from study_app.gui.home.view import HomePlace
+from study_app.gui.kit.workstation import screen_number, theme_named
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.session.start import NewSession
 from study_app.store.workstation import MachineSettings, create_workspace

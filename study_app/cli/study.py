@@ -7,7 +7,6 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from study_app.authoring.templates import templates
 from study_app.cli.options import (
     FILE,
     RESULTS,
@@ -19,6 +18,7 @@ from study_app.cli.options import (
     study_at,
     takes_session,
 )
+from study_app.designer.new_study.templates import templates
 from study_app.devices import DEFAULT_DEVICE
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 from study_app.number_text import counted
@@ -58,8 +58,8 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
     else:
         import time
 
-        from study_app.authoring.edited_study import read
-        from study_app.authoring.measures.participant_texts import to_translate
+        from study_app.designer.document.edited_study import read
+        from study_app.designer.measures.participant_texts import to_translate
         from study_app.protocol.source.files import find
         from study_app.store import workstation
         from study_app.video.sources import missing_here
@@ -87,7 +87,7 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
 @click.option("--no-window", is_flag=True, help="Write the file directly, without opening the study designer.")
 def new(name: str, template: str, *, no_window: bool) -> None:
     """Create a study from a template, and open it in the study designer."""
-    from study_app.authoring import new_study
+    from study_app.designer.new_study import new_study
 
     study = new_study.template(template)
     keep_offered_workspace()

@@ -9,8 +9,6 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Final
 
-from study_app.authoring.drafts import draft_files, draft_of, unsaved_files
-from study_app.authoring.kept_settings import kept_original
 from study_app.errors import ProtocolError, StudyError
 from study_app.number_text import counted
 from study_app.protocol.describe import spread
@@ -24,10 +22,12 @@ from study_app.protocol.wording.languages import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
+from study_app.store.drafts import draft_files, draft_of, unsaved_files
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.folder_lock import is_open
+from study_app.store.study_settings import kept_original
 from study_app.store.workstation import recent_protocols
 from study_app.viewmodels.number_words import duration_range
 from study_app.viewmodels.session import operator_language, step_title
@@ -163,7 +163,7 @@ def _of_draft(file: Path) -> DraftFacts | None:
     draft = draft_of(file)
     if draft is None:  # it was saved meanwhile
         return None
-    from study_app.viewmodels.designer.draft_words import draft_title  # noqa: PLC0415 - the designer's modules: only for a draft
+    from study_app.designer.versions.draft_words import draft_title  # noqa: PLC0415 - the designer's modules: only for a draft
 
     title = draft_title(draft.text, file.parent)
     note = DraftNote(f"Draft of {time_words(draft.kept_at)}, never saved", draft.kept_at)
@@ -243,7 +243,7 @@ def _draft_note(source: str) -> DraftNote | None:
         file = find(source)
         draft, content = None if is_shipped(source) else draft_of(file), file.read_bytes()
         if draft is not None and draft.text.encode() != content:
-            from study_app.viewmodels.designer.draft_words import edited_words  # noqa: PLC0415 - likewise
+            from study_app.designer.versions.draft_words import edited_words  # noqa: PLC0415 - likewise
 
             edited = edited_words(content.decode("utf-8", "replace"), draft.text, file.parent)
             return DraftNote(f"Draft of {time_words(draft.kept_at)}, not saved{edited}", draft.kept_at)

@@ -7,7 +7,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from study_app.authoring.versions.runs import run_of
 from study_app.errors import StoreError
 from study_app.store import receipt
 from study_app.store.exclusions import Exclusion, exclusions
@@ -15,6 +14,7 @@ from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sites.merged import session_in
+from study_app.store.study_runs import run_of
 from study_app.store.tables.study_files import participants_at_once
 
 Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]

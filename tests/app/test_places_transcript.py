@@ -339,7 +339,8 @@ def test_lab_and_designer(qapp: Any, monkeypatch: Any, pytestconfig: pytest.Conf
     lab, designer = Calls("lab", done), Calls("designer", done)
     lab_place = Calls("lab place", done)
     monkeypatch.setattr("study_app.gui.lab.view.LabPlace", lambda: lab_place)
-    monkeypatch.setattr("study_app.app.designer.controller.DesignerController", lambda _results: designer)
+    monkeypatch.setattr("study_app.designer.place.controller.DesignerController", lambda _results: designer)
+    monkeypatch.setattr("study_app.app.session.playing.Playing", lambda it: it.playing)
 
     def compose(_place: Any, *, device: str, options: Any) -> Any:
         done.append(f"lab with {device} {dict(options)}")

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from study_app.authoring.drafts import REST_S, Draft, Keeper, discard, draft_of, drafted_files, keep
-from study_app.authoring.versions.contents import kept_content, kept_versions
 from study_app.errors import StoreError
+from study_app.store.drafts import REST_S, Draft, Keeper, discard, draft_of, drafted_files, keep
+from study_app.store.study_versions import kept_content, kept_versions
 from study_app.user_folder import data_folder
 
 KILLS = int(os.environ.get("LIQUID_STUDY_DRAFT_KILLS", "10"))
@@ -99,7 +99,7 @@ def test_a_broken_draft_is_none(tmp_path: Path, content: bytes) -> None:
 TYPING = """
 import sys, time
 from pathlib import Path
-from study_app.authoring.drafts import Keeper
+from study_app.store.drafts import Keeper
 keeper, letters = Keeper(Path(sys.argv[1]), "base"), 0
 while True:
     letters += 1

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.edited_study import Study, read
-from study_app.authoring.fields import Row, rows, unit_of
+from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.fields import Row, rows, unit_of
+from study_app.designer.form.form_rows import Form, form
+from study_app.designer.problems.problem_rows import element_of
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.problems import Fault, shown
-from study_app.viewmodels.designer.form.form_rows import Form, form
-from study_app.viewmodels.designer.problem_rows import element_of
 from tests.protocol.faulty_protocols import CASES, Case
 
 DEFS = schema()["$defs"]

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.edited_study import Study, read
-from study_app.authoring.names import (
+from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.names import (
     check_id,
     choices_at,
     deletions,
@@ -16,8 +16,8 @@ from study_app.authoring.names import (
     renamed,
     with_references,
 )
-from study_app.authoring.templates import FOLDER
-from study_app.authoring.writer.refused import Refused
+from study_app.designer.document.writer.refused import Refused
+from study_app.designer.new_study.templates import FOLDER
 from study_app.ids import MAX_ID
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.source.document import Path, entries

@@ -7,15 +7,14 @@ from typing import Any
 
 import pytest
 
-from study_app.app.designer.edit_steps import Steps
-from study_app.authoring.changes.fragments import copied
-from study_app.authoring.changes.series import number_rows
-from study_app.authoring.edited_study import Study, read
-from study_app.authoring.fields import Row, row_at, rows
-from study_app.authoring.writer.refused import Refused
-from study_app.protocol.source.document import Path, entries
-from study_app.viewmodels.designer.addable import addable
-from study_app.viewmodels.designer.requests import (
+from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.fields import Row, row_at, rows
+from study_app.designer.document.fragments import copied
+from study_app.designer.document.series import number_rows
+from study_app.designer.document.writer.refused import Refused
+from study_app.designer.outline.addable import addable
+from study_app.designer.place.edit_steps import Steps
+from study_app.designer.place.requests import (
     AddElement,
     AddEntry,
     AddInstrument,
@@ -35,6 +34,7 @@ from study_app.viewmodels.designer.requests import (
     SwitchKey,
     SwitchKind,
 )
+from study_app.protocol.source.document import Path, entries
 from tests.authoring.grown import PROTOCOLS
 from tests.golden import compare
 from tests.golden_values import changed, one_line

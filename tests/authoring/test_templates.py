@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from study_app.authoring.edited_study import read
-from study_app.authoring.fields import row_at
-from study_app.authoring.known_answers import known_answers, simulated
-from study_app.authoring.new_study import Answers, answered, copy_of, template
-from study_app.authoring.templates import FOLDER, QUESTIONS, templates
-from study_app.authoring.writer.refused import Refused
 from study_app.cli import commands
+from study_app.designer.document.edited_study import read
+from study_app.designer.document.fields import row_at
+from study_app.designer.document.known_answers import known_answers, simulated
+from study_app.designer.document.writer.refused import Refused
+from study_app.designer.new_study.new_study import Answers, answered, copy_of, template
+from study_app.designer.new_study.templates import FOLDER, QUESTIONS, templates
 from study_app.errors import StudyError
 from study_app.protocol.checks.warnings import level_warnings
 from study_app.protocol.describe import describe

@@ -8,9 +8,9 @@ import pytest
 from click.testing import CliRunner
 
 from study_app import app
-from study_app.authoring.writer.refused import Refused
 from study_app.cli import commands, main
 from study_app.cli.devices import _ask_operator
+from study_app.designer.document.writer.refused import Refused
 from study_app.errors import OutletError, ProtocolError, StudyError
 from study_app.evidence.accuracy import survey
 from study_app.evidence.table import Evidence

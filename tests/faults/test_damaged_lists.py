@@ -13,10 +13,9 @@ import pytest
 
 from study_app import workspace
 from study_app.analysis.planning import preregistration
-from study_app.authoring import drafts
 from study_app.devices.falcon import calibration
 from study_app.errors import StudyError
-from study_app.store import workstation
+from study_app.store import drafts, workstation
 from study_app.store.blinded.allocation import claims
 from study_app.store.checksums import listed, unreadable
 from study_app.store.exclusions import Exclusion, reversals

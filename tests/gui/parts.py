@@ -9,7 +9,8 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.designer.outline.card import OutlineCard
+from study_app.designer.outline.card import OutlineCard
+from study_app.designer.outline.outline_rows import OutlineRow
 from study_app.gui.help.view import PageReader
 from study_app.gui.lab.view import EstimateCard
 from study_app.gui.settings.view import ScreenNumber
@@ -21,7 +22,6 @@ from study_app.gui.widgets.controls import Cap
 from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.labels import Clamped, Elided, set_ink
 from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot
-from study_app.viewmodels.designer.outline_rows import OutlineRow
 from tests.gui.lab.sample import blind, still_view, workbench
 from tests.gui.lab.states import FOUND_VALUES
 from tests.gui.transcript import Actions

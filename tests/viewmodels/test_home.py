@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from study_app.authoring.drafts import Draft, draft_files, keep
-from study_app.authoring.kept_settings import begin_settings
 from study_app.errors import ProtocolError
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.session.resume import REHEARSED_SCREENS
+from study_app.store.drafts import Draft, draft_files, keep
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal_events
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.study_settings import begin_settings
 from study_app.viewmodels.home import (
     BrokenFacts,
     StudyFacts,

@@ -21,19 +21,19 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.failures import BY_SIGNAL_S, CrashTrace
 from study_app.app.session.timing import unfreeze_garbage
-from study_app.app.workstation_settings import described, screen_number, settings_here, text_scale_on
-from study_app.authoring.versions.contents import keep_content
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.errors import SessionError, StoreError, StudyError
 from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.home.startup_window import OpeningWindow
+from study_app.gui.kit.workstation import described, screen_number, settings_here, text_scale_on
 from study_app.gui.theme.theme import Theme
 from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.start import NewSession, Ready, check, measured, open_outlets, open_store, videos_of
 from study_app.store.journals import journal_events
+from study_app.store.study_versions import keep_content
 
 if TYPE_CHECKING:
     from study_app.app.session.bridge import SessionBridge

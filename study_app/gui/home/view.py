@@ -32,11 +32,11 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vb
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import choose_protocol
+from study_app.gui.widgets.keys import key_cap, with_key
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place, make_shortcuts
 from study_app.session.start import resumed
 from study_app.store.workstation import DEFAULTS, MachineSettings
-from study_app.viewmodels.designer.keys import key_cap, with_key
 from study_app.viewmodels.devices import DeviceShown, looking
 from study_app.viewmodels.home import (
     SHIPPED,

@@ -10,8 +10,8 @@ from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Chip, Icon, Logo
 from study_app.gui.widgets.controls import ActionButton, CompactStop
+from study_app.gui.widgets.keys import key_cap
 from study_app.gui.widgets.labels import Elided, figures, label
-from study_app.viewmodels.designer.keys import key_cap
 from study_app.viewmodels.number_words import minutes
 from study_app.viewmodels.operator import OperatorView, State
 from study_app.viewmodels.tones import Tone

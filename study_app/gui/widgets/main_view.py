@@ -7,7 +7,7 @@ from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.themed import Themed
-from study_app.viewmodels.designer.keys import keys_of
+from study_app.gui.widgets.keys import keys_of
 
 
 class Place(Themed, QWidget):

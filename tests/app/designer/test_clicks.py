@@ -9,8 +9,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 from shiboken6 import isValid
 
-from study_app.authoring.kept_settings import begin_settings
 from study_app.protocol.source.files import shipped
+from study_app.store.study_settings import begin_settings
 
 pytestmark = pytest.mark.slow
 

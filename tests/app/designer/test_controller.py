@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.drafts import draft_of
+from study_app.designer.place.requests import RetypeFile, SetText, SetValue
 from study_app.protocol.source.files import shipped, shipped_file
-from study_app.viewmodels.designer.requests import RetypeFile, SetText, SetValue
+from study_app.store.drafts import draft_of
 
 pytestmark = pytest.mark.slow
 

@@ -9,9 +9,9 @@ import pytest
 from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
+from study_app.designer.place.requests import ChangeLanguage, RetypeFile, SetValue
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.requests import ChangeLanguage, RetypeFile, SetValue
 from tests.app.designer.support.designer import DEMO
 from tests.authoring.test_study_transcripts import elements, generic, studies
 from tests.golden_values import changed
@@ -29,9 +29,9 @@ TIP = re.compile(r"^(StaticText readOnly .+) \| = \|  \| =$")
 @pytest.fixture(autouse=True)
 def no_time_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the participant's page stand still, typing be one step, and drafts be due."""
-    for module in ("app.designer.editing", "app.designer.participant.preview", "gui.designer.participant.live_page"):
-        monkeypatch.setattr(f"study_app.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
-    monkeypatch.setattr("study_app.app.designer.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
+    for module in ("place.editing", "participant.preview", "participant.live_page"):
+        monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
+    monkeypatch.setattr("study_app.designer.place.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
 
 
 def settle(designer: Any) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.drafts import draft_of
+from study_app.store.drafts import draft_of
 from tests.app.designer.support.inputs import QtInput
 from tests.app.designer.support.made_studies import STUDIES, check_file, save
 from tests.app.designer.support.users import USERS
@@ -68,7 +68,7 @@ import sys, time
 from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from study_app.app.designer.controller import DesignerController
+from study_app.designer.place.controller import DesignerController
 from study_app.gui.application import application_here
 
 application = application_here()

@@ -7,8 +7,8 @@ from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt
 from PySide6.QtGui import QDropEvent, QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.designer.outline.rows import ROW_ROLE
-from study_app.viewmodels.designer.requests import MoveTo, SetValue
+from study_app.designer.outline.rows import ROW_ROLE
+from study_app.designer.place.requests import MoveTo, SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -145,8 +145,8 @@ def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: An
 
 def test_what_changes_by_itself_is_said_once(designer: Any, monkeypatch: Any) -> None:
     said: list[str] = []
-    monkeypatch.setattr("study_app.gui.designer.designer_header.say", lambda _widget, words: said.append(words))
-    monkeypatch.setattr("study_app.gui.designer.view.say", lambda _widget, words: said.append(words))
+    monkeypatch.setattr("study_app.designer.place.designer_header.say", lambda _widget, words: said.append(words))
+    monkeypatch.setattr("study_app.designer.place.view.say", lambda _widget, words: said.append(words))
     designer.open()
     assert said == []
     designer.editing.ask(MoveTo((("sequence", 1),), 3))

@@ -7,9 +7,9 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.authoring.study_facts import facts
-from study_app.authoring.writer.edits import Set
-from study_app.viewmodels.designer.requests import SetValue
+from study_app.designer.document.study_facts import facts
+from study_app.designer.document.writer.edits import Set
+from study_app.designer.place.requests import SetValue
 
 pytestmark = pytest.mark.slow
 

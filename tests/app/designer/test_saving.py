@@ -7,12 +7,12 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
-from study_app.authoring.drafts import Draft, draft_of, keep
-from study_app.authoring.versions.contents import content_hash, kept_content
+from study_app.designer.place.requests import ChangeLanguage, SetText, SetValue
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
+from study_app.store.drafts import Draft, draft_of, keep
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.viewmodels.designer.requests import ChangeLanguage, SetText, SetValue
+from study_app.store.study_versions import content_hash, kept_content
 
 pytestmark = pytest.mark.slow
 
@@ -37,7 +37,7 @@ def stuck(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     def refuse(file: Path) -> None:
         raise StoreError(f"the draft of {file} cannot be deleted: Permission denied")
 
-    monkeypatch.setattr("study_app.authoring.drafts.discard", refuse)
+    monkeypatch.setattr("study_app.store.drafts.discard", refuse)
     return monkeypatch
 
 
@@ -45,7 +45,7 @@ def stuck(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What the banner has a screen reader say."""
     found: list[str] = []
-    monkeypatch.setattr("study_app.gui.designer.banner.say", lambda _banner, words: found.append(words))
+    monkeypatch.setattr("study_app.designer.place.banner.say", lambda _banner, words: found.append(words))
     return found
 
 
@@ -76,7 +76,7 @@ def test_nothing_is_written_where_the_content_cannot_be_kept(drafted: Any, monke
 
     before = drafted.file.read_bytes()
     with monkeypatch.context() as broken:
-        broken.setattr("study_app.app.designer.open_study.keep_content", full)
+        broken.setattr("study_app.designer.place.open_study.keep_content", full)
         drafted.saving.save()
     assert ("The study was not saved", "the disk is full.") in drafted.messages
     assert drafted.file.read_bytes() == before
@@ -126,7 +126,7 @@ def test_a_file_that_cannot_be_read_is_said_at_once_until_it_can_be(
     designer.open()
     for _ in range(2):
         with monkeypatch.context() as broken:
-            broken.setattr("study_app.app.designer.open_study.OpenStudy.changed_outside", unreadable)
+            broken.setattr("study_app.designer.place.open_study.OpenStudy.changed_outside", unreadable)
             designer.saving.look_again()
             designer.saving.look_again()
             assert designer.place.banner_words.text() == "Kitchen.toml cannot be read: Input/output error"

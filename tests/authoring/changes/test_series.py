@@ -4,12 +4,12 @@ from typing import Any
 
 import pytest
 
-from study_app.app.designer.element_steps import make_series
-from study_app.authoring.changes.series import check_values, number_row, titles_with
-from study_app.authoring.edited_study import Study, read
-from study_app.authoring.writer.refused import Refused
+from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.series import check_values, number_row, titles_with
+from study_app.designer.document.writer.refused import Refused
+from study_app.designer.place.element_steps import make_series
+from study_app.designer.place.requests import MakeSeries
 from study_app.protocol.source.document import value_at
-from study_app.viewmodels.designer.requests import MakeSeries
 from tests.authoring.grown import PROTOCOLS
 
 REK = (PROTOCOLS / "rek2024.toml").read_text(encoding="utf-8")

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from study_app.analysis.planning.threshold_studies import Case, study_batch
-from study_app.authoring.edited_study import read
-from study_app.authoring.measures import observers
-from study_app.authoring.measures.observers import measurable, observe
-from study_app.authoring.new_study import template
-from study_app.authoring.writer.edits import Set
+from study_app.designer.document.edited_study import read
+from study_app.designer.document.writer.edits import Set
+from study_app.designer.measures import observers
+from study_app.designer.measures.measures_view import focus_of
+from study_app.designer.measures.observers import measurable, observe
+from study_app.designer.new_study.new_study import template
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
 from study_app.protocol.source.files import shipped_file
 from study_app.protocol.trials.presented_levels import LevelLimits, clipping
-from study_app.viewmodels.designer.measures.measures_view import focus_of
 
 CLIPPED = Set(("stimuli", "damping", "standards"), [32]), Set(("stimuli", "damping", "levels"), [0.02, 2.0])
 FULL = 53 / 32 - 1

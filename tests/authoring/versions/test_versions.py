@@ -9,20 +9,13 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.versions.contents import ChangedOutsideError, content_hash, kept_content, kept_versions, save
-from study_app.authoring.versions.runs import (
-    Run,
-    check_saving,
-    check_version,
-    keep_what_was_run,
-    next_version,
-    runs,
-    standing,
-)
-from study_app.authoring.writer.refused import Refused
+from study_app.designer.document.writer.refused import Refused
+from study_app.designer.versions.standing import check_saving, check_version, next_version, standing
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.receipt import without_conditions
+from study_app.store.study_runs import Run, keep_what_was_run, runs
+from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, kept_versions, save
 from study_app.user_folder import data_folder
 from tests.authoring.grown import PROTOCOLS
 
@@ -149,7 +142,7 @@ def test_lines_of_the_list_that_cannot_be_read_are_left_out(tmp_path: Path) -> N
 SAVING = """
 import sys
 from pathlib import Path
-from study_app.authoring.versions.contents import ChangedOutsideError, content_hash, kept_content, save
+from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, save
 from study_app.errors import StoreError
 file, name, saved = Path(sys.argv[1]), sys.argv[2], 0
 while saved < 20:

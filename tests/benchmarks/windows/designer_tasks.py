@@ -20,13 +20,13 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 
-from study_app.authoring.drafts import draft_of
-from study_app.authoring.edited_study import read
-from study_app.gui.designer.designer_header import DesignerHeader
-from study_app.gui.designer.problems import ProblemsCard
-from study_app.gui.designer.versions import DifferenceText
+from study_app.designer.document.edited_study import read
+from study_app.designer.place.designer_header import DesignerHeader
+from study_app.designer.problems.problems_card import ProblemsCard
+from study_app.designer.versions.versions_page import DifferenceText
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import shipped_file
+from study_app.store.drafts import draft_of
 from tests.app.designer.support.inputs import name_of, wait_until
 from tests.app.designer.support.made_studies import begin, participant, save
 from tests.app.designer.support.program import environment, use

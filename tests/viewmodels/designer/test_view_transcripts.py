@@ -6,25 +6,25 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.additions import additions_for
-from study_app.authoring.edited_study import Study, read
-from study_app.authoring.measures.observers import Asked, Measurable, Observed, Planted
-from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision, Simulated
-from study_app.authoring.outline import outline
-from study_app.authoring.repairs import repairs
-from study_app.authoring.study_facts import facts
+from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.study_facts import facts
+from study_app.designer.form.element_facts import brief, used_by
+from study_app.designer.form.form_rows import form, position_of
+from study_app.designer.measures.level_plots import Controls
+from study_app.designer.measures.measures_view import measures_view
+from study_app.designer.measures.observers import Asked, Measurable, Observed, Planted
+from study_app.designer.measures.planned import Detectable, Finding, GroupPrecision, Simulated
+from study_app.designer.outline.addable import addable, fields_to_go_to
+from study_app.designer.outline.additions import additions_for
+from study_app.designer.outline.elements import outline
+from study_app.designer.outline.outline_rows import outline_rows
+from study_app.designer.place.file_text import file_text
+from study_app.designer.place.prompt_facts import series_prompt, series_titles
+from study_app.designer.place.requests import MakeSeries
+from study_app.designer.problems.finding import found_fields
+from study_app.designer.problems.problem_rows import problem_rows
+from study_app.designer.problems.repairs import repairs
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.designer.addable import addable, fields_to_go_to
-from study_app.viewmodels.designer.element_facts import brief, used_by
-from study_app.viewmodels.designer.file_text import file_text
-from study_app.viewmodels.designer.finding import found_fields
-from study_app.viewmodels.designer.form.form_rows import form, position_of
-from study_app.viewmodels.designer.measures.level_plots import Controls
-from study_app.viewmodels.designer.measures.measures_view import measures_view
-from study_app.viewmodels.designer.outline_rows import outline_rows
-from study_app.viewmodels.designer.problem_rows import problem_rows
-from study_app.viewmodels.designer.prompts import series_prompt, series_titles
-from study_app.viewmodels.designer.requests import MakeSeries
 from tests.authoring.test_study_transcripts import elements, generic, studies
 from tests.golden import compare
 from tests.golden_values import changed, one_line, value_lines

@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 
-from study_app.app.designer.edit_steps import Steps
-from study_app.authoring.edited_study import read
+from study_app.designer.document.edited_study import read
+from study_app.designer.place.edit_steps import Steps
+from study_app.designer.place.requests import ChangeLanguage, RenameElement, SetText
 from study_app.protocol.source.document import value_at
-from study_app.viewmodels.designer.requests import ChangeLanguage, RenameElement, SetText
 from tests.authoring.grown import PROTOCOLS
 
 pytestmark = pytest.mark.slow

@@ -6,9 +6,9 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
-from study_app.authoring.writer.edits import Set
+from study_app.designer.document.writer.edits import Set
+from study_app.designer.place.requests import AddElement, AddNamed, RenameElement, SetText
 from study_app.protocol.source.document import value_at
-from study_app.viewmodels.designer.requests import AddElement, AddNamed, RenameElement, SetText
 
 pytestmark = pytest.mark.slow
 

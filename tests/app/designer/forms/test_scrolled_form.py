@@ -7,7 +7,7 @@ import shiboken6
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidgetItem
 
-from study_app.gui.designer.form.typed_fields import HAND_ON_MS, TypedSentence, TypedText
+from study_app.designer.form.typed_fields import HAND_ON_MS, TypedSentence, TypedText
 
 pytestmark = pytest.mark.slow
 

@@ -9,9 +9,9 @@ from PySide6.QtGui import QShortcut
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QWidget
 
-from study_app.gui.designer.tab_order import stops
-from study_app.viewmodels.designer.keys import KEYS
-from study_app.viewmodels.designer.requests import SetValue
+from study_app.designer.place.requests import SetValue
+from study_app.designer.place.tab_order import stops
+from study_app.gui.widgets.keys import KEYS
 
 pytestmark = pytest.mark.slow
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from study_app.app.designer.measures.simulation import Simulation
-from study_app.authoring.measures.observers import Asked, Measurable, Observed
-from study_app.authoring.measures.planned import Detectable, Finding, GroupPrecision, Simulated
+from study_app.designer.measures.observers import Asked, Measurable, Observed
+from study_app.designer.measures.planned import Detectable, Finding, GroupPrecision, Simulated
+from study_app.designer.measures.simulation import Simulation
 from study_app.protocol.checks.expected_precision import threshold_plan
 
 QUANTILES = (0.1, 0.15, 0.2, 0.25, 0.3)

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
-from study_app.authoring.kept_settings import kept_participants
+from study_app.store.study_settings import kept_participants
 from tests.app.designer.measures.conftest import Worker, jnd, shown
 
 pytestmark = pytest.mark.slow

@@ -9,28 +9,28 @@ import pytest
 from PySide6.QtCore import QSize, Qt
 
 from study_app.analysis.planning.threshold_studies import plans, sweep
-from study_app.app.designer.measures.page_fit import _pages
-from study_app.app.designer.measures.simulation import (
+from study_app.designer.document.edited_study import read
+from study_app.designer.document.writer.edits import Set, Unset
+from study_app.designer.measures.level_plots import Controls
+from study_app.designer.measures.measures_view import Focus, focus_of
+from study_app.designer.measures.number_cards import ANEW, FAILED, UNKNOWN
+from study_app.designer.measures.page_fit import _pages
+from study_app.designer.measures.planned import ENOUGH
+from study_app.designer.measures.simulation import (
     THRESHOLD_STUDIES,
     Simulation,
     carry_out,
     simulation_of,
     start_measure_worker,
 )
-from study_app.authoring.edited_study import read
-from study_app.authoring.measures.planned import ENOUGH
-from study_app.authoring.new_study import template
-from study_app.authoring.writer.edits import Set, Unset
+from study_app.designer.new_study.new_study import template
+from study_app.designer.place.requests import RetypeFile
 from study_app.gui.participant.page_widgets import parts_of
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped_file
 from study_app.protocol.wording.languages import words
-from study_app.viewmodels.designer.measures.level_plots import Controls
-from study_app.viewmodels.designer.measures.measures_view import Focus, focus_of
-from study_app.viewmodels.designer.measures.number_cards import ANEW, FAILED, UNKNOWN
-from study_app.viewmodels.designer.requests import RetypeFile
 from study_app.workers.server import Crashed, Stopped
 from tests.app.designer.measures.conftest import Worker, answer_to, jnd, shown
 

@@ -13,13 +13,13 @@ from PySide6.QtGui import QCursor, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from study_app.authoring.edited_study import read
-from study_app.authoring.kept_settings import kept_language
-from study_app.authoring.writer.edits import Set, Unset
+from study_app.designer.document.edited_study import read
+from study_app.designer.document.writer.edits import Set, Unset
+from study_app.designer.place.requests import ChangeLanguage, DuplicateElement, SetText
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage, TextPage
-from study_app.viewmodels.designer.requests import ChangeLanguage, DuplicateElement, SetText
+from study_app.store.study_settings import kept_language
 
 pytestmark = pytest.mark.slow
 
@@ -209,7 +209,7 @@ SCRIPT = """
 import sys
 from pathlib import Path
 from PySide6.QtWidgets import QApplication
-from study_app.app.designer.controller import DesignerController
+from study_app.designer.place.controller import DesignerController
 from study_app.gui.application import application_here
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.widgets.main_view import Place

@@ -13,11 +13,11 @@ from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton
 
-from study_app.app.designer.participant.shown_step import StepPosition
-from study_app.app.designer.play import playing
 from study_app.app.failures import Patience
+from study_app.app.session import playing
 from study_app.app.session.bridge import SessionBridge
-from study_app.authoring.new_study import template
+from study_app.designer.new_study.new_study import template
+from study_app.designer.participant.shown_step import StepPosition
 from study_app.errors import DeviceLost
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
@@ -97,7 +97,7 @@ def lines_of(study: Path) -> list[dict[str, Any]]:
 
 
 def play_to_the_end(qtbot: Any, designer: Any) -> Player:
-    player, pilots = Player(), designer.controller.playing
+    player, pilots = Player(), designer.playing
     press_f5(qtbot, designer)
     assert pilots.under_way, (designer.messages, designer.place.header.strip.state)
     qtbot.waitUntil(lambda: not pilots.under_way, timeout=SESSION_MS)
@@ -143,12 +143,12 @@ def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, 
     assert [line["trial"] for line in lines[resumed:] if line["event"] == "responses"] == [3, 4]
     assert lines[-1]["status"] == "completed"
     assert not list(folders.iterdir())
-    assert not likert.controller.playing.under_way
+    assert not likert.playing.under_way
     qtbot.waitUntil(lambda: {thread.name for thread in threading.enumerate()} <= threads | {"background"})
 
 
 def test_holding_escape_ends_at_zero_force_and_the_data_are_deleted(qtbot: Any, likert: Any, folders: Path) -> None:
-    pilots = likert.controller.playing
+    pilots = likert.playing
     likert.editing.select(("blocks", "liquids"))
     press_f5(qtbot, likert)
     qtbot.waitUntil(lambda: window(ParticipantWindow) is not None, timeout=SESSION_MS)
@@ -180,7 +180,7 @@ def stop_of(participant: ParticipantWindow) -> CompactStop:
 def test_stop_above_the_page_closing_the_window_a_failure_and_leaving_the_place_stop(
     qtbot: Any, likert: Any, folders: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    pilots = likert.controller.playing
+    pilots = likert.playing
     for leave in (
         lambda: qtbot.mousePress(stop_of(window(ParticipantWindow)), Qt.MouseButton.LeftButton),
         lambda: window(ParticipantWindow).close(),
@@ -210,7 +210,7 @@ def test_a_pilot_that_is_stopped_before_its_window_is_shown_has_not_begun(
     strip, start, stopped = likert.place.header.strip, SessionBridge.start, []
 
     def stop() -> None:
-        stopped.append((window(ParticipantWindow), likert.controller.playing.under_way))
+        stopped.append((window(ParticipantWindow), likert.playing.under_way))
         qtbot.mouseClick(strip.buttons["stop"], Qt.MouseButton.LeftButton)
 
     def start_and_stop(bridge: SessionBridge) -> None:
@@ -244,7 +244,7 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     qtbot.keyClick(header.strip.buttons["play"], Qt.Key.Key_Return)
     qtbot.waitUntil(lambda: bool(opened))
     assert (opened[0].device, opened[0].pilot, opened[0].windowed) == ("mouse", True, True)
-    likert.controller.playing.pilot.session.over.emit()
+    likert.playing.pilot.session.over.emit()
     likert.editing.select(("pages", "thanks"))
     likert.place.pane.show_tab("file")
     field = likert.place.file.editor
@@ -275,7 +275,7 @@ def test_an_adaptive_study_is_played_from_its_tenth_trial(qtbot: Any, designer: 
     designer.open()
     protocol = designer.study.protocol
     assert protocol is not None
-    designer.controller.playing.where = lambda: StepPosition("viscosity", trial=10, language="en", seed=5)
+    designer.playing.where = lambda: StepPosition("viscosity", trial=10, language="en", seed=5)
     player = play_to_the_end(qtbot, designer)
     trials = {trial.number: trial for trial in preview(protocol, 5).schedule.trials}
     played = [page.trial for page in player.pages if isinstance(page, TaskPage)]

@@ -7,8 +7,9 @@ from PySide6.QtCore import QEvent, QPoint, QSize, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.app.designer.controller import DesignerController
-from study_app.gui.designer.outline.rows import ROW_ROLE
+from study_app.app.session.playing import Playing
+from study_app.designer.outline.rows import ROW_ROLE
+from study_app.designer.place.controller import DesignerController
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.widgets.main_view import Place
 from study_app.protocol.source.document import value_at
@@ -34,6 +35,7 @@ class Designer(KeyUser):
         self.file.write_text(DEMO, encoding="utf-8")
         self.results = folder / "results"
         self.controller = DesignerController(self.results)
+        self.playing = Playing(self.controller)
         self.controller.measures.make = no_worker
         self.editing, self.saving = self.controller.editing, self.controller.saving
         self.place = self.controller.place

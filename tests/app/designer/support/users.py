@@ -19,10 +19,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.gui.designer.form.element_form import FormCard
-from study_app.gui.designer.outline.card import OutlineCard
-from study_app.gui.designer.outline.rows import ROW_ROLE
-from study_app.gui.designer.segments import Segments
+from study_app.designer.form.element_form import FormCard
+from study_app.designer.outline.card import OutlineCard
+from study_app.designer.outline.rows import ROW_ROLE
+from study_app.designer.place.segments import Segments
 from study_app.gui.participant.intervals.answer_page import ChoiceWidget
 from study_app.gui.participant.pages.page_widget import GoButton
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget

@@ -12,15 +12,15 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.designer.controller import DesignerController
 from study_app.app.main_controller import MainController
-from study_app.authoring.drafts import draft_of
-from study_app.authoring.kept_settings import keep_setting, kept_original, kept_participants
-from study_app.authoring.versions.contents import kept_content, kept_versions
+from study_app.designer.place.controller import DesignerController
+from study_app.designer.place.requests import SetText, SetValue
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash, shipped_file
+from study_app.store.drafts import draft_of
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.viewmodels.designer.requests import SetText, SetValue
+from study_app.store.study_settings import keep_setting, kept_original, kept_participants
+from study_app.store.study_versions import kept_content, kept_versions
 from study_app.viewmodels.sessions import SessionFacts
 from tests.app.designer.support.designer import Designer
 from tests.app.designer.versions.conftest import REPETITIONS, click, lines, run, version_of
@@ -104,7 +104,7 @@ def test_another_study_that_cannot_be_saved_keeps_its_edits_as_a_draft(
     def full(*_args: object) -> str:
         raise StoreError("the disk is full")
 
-    monkeypatch.setattr("study_app.app.designer.open_study.save", full)
+    monkeypatch.setattr("study_app.designer.place.open_study.save", full)
     keep_setting(ran.file.with_name("pantry.toml"), "participants", 7)  # of a study that was deleted
     ran.editing.ask(SetValue(REPETITIONS, 3))
     ran.saving.save_as_another("pantry")
@@ -214,9 +214,9 @@ OTHER = """
 import sys
 from pathlib import Path
 from PySide6.QtTest import QTest
-from study_app.app.designer.controller import DesignerController
+from study_app.designer.place.controller import DesignerController
 from study_app.gui.application import application_here
-from study_app.viewmodels.designer.requests import SetText
+from study_app.designer.place.requests import SetText
 application = application_here()
 designer = DesignerController(Path(sys.argv[1]))
 designer.open("kitchen")

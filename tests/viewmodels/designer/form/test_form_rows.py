@@ -5,12 +5,12 @@ from typing import Any
 
 import pytest
 
-from study_app.authoring.edited_study import Study, read
-from study_app.authoring.outline import outline
-from study_app.authoring.templates import FOLDER, templates
+from study_app.designer.document.edited_study import Study, read
+from study_app.designer.form.form_rows import form
+from study_app.designer.new_study.templates import FOLDER, templates
+from study_app.designer.outline.elements import outline
 from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import shipped, shipped_file
-from study_app.viewmodels.designer.form.form_rows import form
 
 FILES = [*(shipped_file(name) for name in shipped()), *(FOLDER / f"{name}.toml" for name in templates())]
 

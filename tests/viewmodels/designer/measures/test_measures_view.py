@@ -2,17 +2,17 @@
 
 import pytest
 
-from study_app.authoring.edited_study import Study, read
-from study_app.authoring.measures.observers import Measurable, Observed
-from study_app.authoring.measures.planned import GroupPrecision, Simulated
-from study_app.authoring.new_study import template
-from study_app.authoring.study_facts import facts
-from study_app.authoring.writer.edits import Set
+from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.study_facts import facts
+from study_app.designer.document.writer.edits import Set
+from study_app.designer.measures.level_plots import AS_ASKED, Controls
+from study_app.designer.measures.measures_view import measures_view
+from study_app.designer.measures.number_cards import UNKNOWN, LinesCard, MeasuresView, SessionCard
+from study_app.designer.measures.observers import Measurable, Observed
+from study_app.designer.measures.planned import GroupPrecision, Simulated
+from study_app.designer.new_study.new_study import template
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.files import shipped_file
-from study_app.viewmodels.designer.measures.level_plots import AS_ASKED, Controls
-from study_app.viewmodels.designer.measures.measures_view import measures_view
-from study_app.viewmodels.designer.measures.number_cards import UNKNOWN, LinesCard, MeasuresView, SessionCard
 
 
 def study_of(name: str) -> Study:

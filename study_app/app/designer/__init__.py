@@ -1,1 +1,0 @@
-"""The study designer: one open study, its steps, and what its place shows."""

@@ -1,1 +1,0 @@
-"""The designer's tab Measures: what the open study can find."""

@@ -1,1 +1,0 @@
-"""The participant's page in the designer."""

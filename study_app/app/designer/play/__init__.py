@@ -1,1 +1,0 @@
-"""Playing the study that is edited, from a step on."""

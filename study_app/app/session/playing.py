@@ -1,0 +1,274 @@
+"""Play from here: a pilot of the draft from the shown step on, with the simulated hand or a device."""
+
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QApplication
+
+from study_app.app.failures import Patience
+from study_app.app.lab.view_values import device_choices
+from study_app.app.session.live_session import BUG
+from study_app.app.session.played_session import PlayedSession
+from study_app.designer.participant import play as shown
+from study_app.designer.participant.play import PlayDevices, PlayState
+from study_app.designer.participant.playable import NotPlayableError, Playable, playable
+from study_app.designer.participant.shown_step import StepPosition
+from study_app.designer.place.controller import DesignerController
+from study_app.designer.problems.problem_rows import problem_rows
+from study_app.devices.registry import descriptor_of, title_of
+from study_app.errors import StoreError, StudyError
+from study_app.gui.kit.workstation import settings_here
+from study_app.gui.widgets.background import Background
+from study_app.session.simulated.answers_only import begin_at
+from study_app.session.start import NewSession, resumed
+from study_app.session.transitions.page_builder import PARTICIPANT
+from study_app.store.atomic import copy_folder, write_file
+from study_app.store.folders import kept_pilot_folder
+from study_app.store.sessions.begin import SessionStart
+from study_app.store.study_versions import keep_content
+
+SIMULATED: Final = "scripted"
+LOOK_S: Final = 0.01
+FOLDER: Final = "liquid-study-play-"
+OUTCOMES: Final = {"completed": "to the end", "aborted": "stopped", "withdrawn": "no consent", "broken": "it failed"}
+
+
+@dataclass(slots=True)
+class _Pilot:
+    """What is played: its temporary folder, and its session while there is one."""
+
+    what: Playable
+    device: str
+    folder: Path
+    choices: NewSession | None = None
+    session: PlayedSession | None = None
+
+
+class Playing(QObject):
+    """Plays the open study, one pilot at a time; ``kept`` carries the study folder of one that was kept.
+
+    ``where`` says where the preview is; None is the first step that shows the selected element.
+
+    Parameters
+    ----------
+    designer
+        Controller of the study designer, whose open study is played.
+    """
+
+    kept = Signal(object)
+
+    def __init__(self, designer: DesignerController) -> None:
+        editing, place = designer.editing, designer.place
+        super().__init__(editing)
+        self.editing, self.place = editing, place
+        self.where: Callable[[], StepPosition | None] = lambda: designer.preview.position
+        self.kept.connect(designer.runs.look)
+        self.device = SIMULATED
+        self.pilot: _Pilot | None = None
+        self._asked: Playable | None = None
+        self._left: list[PlayedSession] = []
+        self._preparing = Background(self)
+        self._preparing.done.connect(self._begin)
+        header = place.header
+        header.play.asked.connect(self.play)
+        header.play.device_chosen.connect(self.choose_device)
+        header.strip.asked.connect(self._answer)
+        place.left.connect(self.stop)
+        place.entered.connect(self._show_devices)
+        editing.opened_other.connect(self._forget)
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a pilot is prepared or played."""
+        return self._preparing.busy or (self.pilot is not None and self.pilot.session is not None)
+
+    # what is asked for
+
+    def choose_device(self, name: str) -> None:
+        """Play with another device from now on."""
+        self.device = name
+        self._show_devices()
+
+    def play(self) -> None:
+        """Play from here, unless something from here to the end is faulty; ask before a device is used."""
+        self.place.flush()
+        opened = self.editing.opened
+        if opened is None or self.under_way:
+            return
+        study = opened.study
+        try:
+            found = playable(study, opened.history.selected, self.where())
+        except NotPlayableError as refused:
+            names = {str(one): row.name for one, row in zip(study.problems, problem_rows(study), strict=True)}
+            named = (replace(one, place=names.get(str(one), one.place)) for one in refused.problems)
+            self._show(shown.refuses(tuple(map(str, named))))
+            return
+        self._asked = found
+        if self.device == SIMULATED:
+            self._prepare()
+        else:
+            has_force = descriptor_of(self.device).kind == "felt"
+            self._show(shown.asks_for_device(title_of(self.device), found.words, has_force=has_force))
+
+    def stop(self) -> None:
+        """Stop what is played: zero force first."""
+        if self.pilot is not None and self.pilot.session is not None:
+            self.pilot.session.stop()
+        elif self._preparing.busy:
+            self.pilot = None  # `_begin` deletes its folder once nothing is written there
+            self._show(None)
+        elif self.pilot is not None and self.pilot.choices is None:  # a bug ended its preparation
+            self._delete()
+            self._show(None)
+
+    def _answer(self, action: str) -> None:
+        if action == "play":
+            self._prepare()
+        elif action == "stop":
+            self.stop()
+        elif action == "keep":
+            self._keep()
+        else:
+            if action == "problems":
+                self.place.problems.show()
+            self._delete()
+            self._show(None)
+
+    # playing
+
+    def _prepare(self) -> None:
+        """Simulate the steps before the first one that is shown, in the background."""
+        self._delete()
+        found, self._asked = self._asked, None
+        if found is None:
+            return
+        try:
+            folder = Path(tempfile.mkdtemp(prefix=FOLDER))
+        except OSError as error:
+            self.place.message.emit("The study cannot be played", f"No temporary folder can be made: {error.strerror}.")
+            return
+        pilot = self.pilot = _Pilot(found, self.device, folder)
+        self._preparing.run(lambda: _prepared(pilot))
+        self._show(shown.under_way(found.words, title_of(pilot.device)))
+
+    def _begin(self, made: tuple[_Pilot, NewSession | StudyError]) -> None:
+        pilot, choices = made
+        if pilot is not self.pilot:  # it was stopped meanwhile
+            _remove(pilot.folder)
+            self.place.header.play.show_playing(self.under_way)
+            return
+        if isinstance(choices, StudyError):
+            self._delete()
+            self._show(None)
+            self.place.message.emit("The study cannot be played", f"{choices}.")
+            return
+        pilot.choices = choices
+        pilot.session = PlayedSession(choices, self.place.theme)
+        pilot.session.over.connect(self._end)
+        pilot.session.open()
+
+    def _end(self) -> None:
+        """Ask whether the data of a pilot that began are kept."""
+        pilot = self.pilot
+        if pilot is None or pilot.session is None:
+            return
+        session, pilot.session = pilot.session, None
+        self._left = [earlier for earlier in (*self._left, session) if earlier.opening]
+        if session.error is not None:
+            self.place.message.emit("Playing was stopped", f"{session.error}.")
+        elif session.code == BUG:
+            self.place.message.emit("A bug in the program stopped the pilot", "The terminal shows the details.")
+        if session.began:
+            self._show(shown.ended(pilot.what.words, OUTCOMES.get(session.status or "", "stopped")))
+        else:
+            self._delete()
+            self._show(None)
+
+    def _keep(self) -> None:
+        """Keep the pilot's data in a folder of its own among the results."""
+        pilot = self.pilot
+        if pilot is None or pilot.choices is None or pilot.session is not None:
+            return
+        to = kept_pilot_folder(self.editing.results, pilot.what.protocol.study.name)
+        try:
+            copy_folder(pilot.choices.results, to)
+        except StudyError as error:
+            self.place.message.emit("The pilot was not kept", f"{error}.")
+            return
+        with suppress(StoreError):  # only the tab Changes would miss it
+            keep_content(pilot.what.source)
+        self._delete()
+        self._show(shown.kept(to.name))
+        self.kept.emit(to)
+
+    def end_by_signal(self, number: int) -> None:
+        """End because the program is being ended from outside."""
+        if self.pilot is not None and self.pilot.session is not None:
+            self.pilot.session.end_by_signal(number)
+
+    def end(self, patience: Patience) -> None:
+        """Stop, wait for devices that are being opened, and delete what was played."""
+        self.stop()
+        while self._preparing.busy and patience.left_s > 0:
+            QApplication.processEvents()
+            time.sleep(LOOK_S)
+        for session in self._left:
+            session.wait(patience.left_s)
+        self._delete()
+
+    def _forget(self) -> None:
+        """Stop and delete what was played of the study before."""
+        self.stop()
+        self._delete()
+        self._asked = None
+        self._show(None)
+
+    def _delete(self) -> None:
+        pilot, self.pilot = self.pilot, None
+        if pilot is not None:
+            _remove(pilot.folder)
+
+    # what is shown
+
+    def _show(self, state: PlayState | None) -> None:
+        self.place.header.strip.show_state(state)
+        self.place.header.play.show_playing(self.under_way)
+
+    def _show_devices(self) -> None:
+        self.place.header.play.show_devices(PlayDevices(device_choices(), self.device))
+
+
+def _prepared(pilot: _Pilot) -> tuple[_Pilot, NewSession | StudyError]:
+    """Return the choices of a session that goes on where the pilot begins, or why there is none."""
+    found, study = pilot.what, pilot.what.protocol.study
+    file = pilot.folder / f"{study.name}.toml"
+    start = SessionStart(
+        PARTICIPANT,
+        seed=found.position.seed,
+        operator="",
+        language=found.position.language,
+        device={"name": pilot.device},
+        screens={"participant": "simulated", "steps": found.step},
+        simulated=True,
+        pilot=True,
+    )
+    try:
+        write_file(file, found.source, waits=False)
+        session = begin_at(pilot.folder / "results" / study.name, found.protocol, found.source, start, found.step)
+        options = descriptor_of(pilot.device).window_values(settings_here()[0].device_options)
+        choices = resumed(session, protocol=str(file), device=pilot.device, windowed=True, device_options=options)
+        return pilot, replace(choices, played=True, footage=found.folder)
+    except StudyError as error:
+        return pilot, error
+
+
+def _remove(folder: Path) -> None:
+    """Delete the data of a pilot."""
+    shutil.rmtree(folder, ignore_errors=True)

@@ -1,1 +1,0 @@
-"""Changes of several elements at once: moves, copies as text, languages."""

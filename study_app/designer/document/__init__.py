@@ -1,0 +1,1 @@
+"""A study as text and document: rows of its keys, edits that change only the affected bytes, undo. No Qt here."""

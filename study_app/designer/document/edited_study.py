@@ -1,0 +1,215 @@
+"""A study while it is edited: its text, its document, and its protocol or faults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path as File
+from typing import Any, Final
+
+from study_app.designer.document.writer.edits import Edit, Unset, WriterError, apply, check_encodable, meaning
+from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.writer.splices import Splice, Splices, applied
+from study_app.errors import Problem, ProtocolError
+from study_app.protocol.load import examined, located, read_document
+from study_app.protocol.model import Protocol
+from study_app.protocol.source.document import Path, Places, frozen
+from study_app.protocol.source.files import TABLE, with_liquid_files
+from study_app.protocol.source.problems import Fault
+
+_NOT_TOML: Final = "the file cannot be read: correct its text first"
+
+__all__ = ["Refused", "Study", "Trial", "WriterError", "read"]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study's text, from which all else is computed.
+
+    Attributes
+    ----------
+    text : str
+        The file's text, with its own line breaks.
+    folder : Path
+        Where the liquid files are that it names.
+    before : mapping
+        The document of the last text that was valid TOML, used while this one is not.
+    """
+
+    text: str
+    folder: File = File()
+    before: Mapping[str, Any] = field(default_factory=dict, compare=False)
+
+    @cached_property
+    def _source(self) -> bytes:
+        return with_liquid_files(self.text.encode(), self.folder)
+
+    @cached_property
+    def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
+        """The document with the files that it names and its line numbers; None and the reason if it is not TOML."""
+        try:
+            return *read_document(self._source, ""), ()
+        except ProtocolError as error:
+            return None, Places(""), error.problems
+
+    @cached_property
+    def _examined(self) -> tuple[Protocol | None, tuple[Fault, ...]]:
+        document, _, broken = self._read
+        if document is None:
+            return None, tuple(Fault((), problem.message, problem.hint) for problem in broken)
+        protocol, found = examined(document)
+        return protocol, tuple(found)
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        """The tables of the text, arrays as tuples; those of the last valid text if this one is not TOML."""
+        document = self._read[0]
+        if document is None:
+            return self.before
+        bundled = self._source != self.text.encode()
+        return {key: value for key, value in document.items() if key != TABLE} if bundled else document
+
+    @property
+    def protocol(self) -> Protocol | None:
+        """The protocol, None if there are faults."""
+        return None if self.faults else self.formed
+
+    @property
+    def formed(self) -> Protocol | None:
+        """The protocol, even if it has forces beyond a limit; None if there are other faults."""
+        return self._examined[0]
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The faults, by path."""
+        return self._examined[1]
+
+    @cached_property
+    def problems(self) -> tuple[Problem, ...]:
+        """The faults, as ``check`` prints them."""
+        _, places, broken = self._read
+        return broken or located(self.faults, places)
+
+    @property
+    def is_toml(self) -> bool:
+        """Whether the text is valid TOML; otherwise only the text can be edited."""
+        return self._read[0] is not None
+
+    @property
+    def unreadable(self) -> bool:
+        """Whether there is only a text: it cannot be read, and no text before it could be."""
+        return not self.is_toml and not self.before
+
+    def needs(self, place: Path) -> bool:
+        """Return whether a table of a section would be incomplete without one of its keys."""
+        after, _ = self.edited(Unset(place))
+        table = place[:2]
+        without = {fault for fault in after.faults if fault.path[: len(table)] == table}
+        return not without <= set(self.faults)
+
+    @property
+    def trial(self) -> Trial:
+        """The same study for trial edits.
+
+        Raises
+        ------
+        Refused
+            The text is not TOML.
+        """
+        if (document := self._read[0]) is None:
+            raise Refused(_NOT_TOML)
+        found = Trial("", self.folder, source=document)
+        if "_examined" in self.__dict__:
+            found.__dict__["_examined"] = self._examined
+        return found
+
+    def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
+        """Return the study after some edits, one after the other, and their splices.
+
+        Raises
+        ------
+        Refused
+            The text is not TOML, or an edit makes no sense.
+        """
+        if not self.is_toml:
+            raise Refused(_NOT_TOML)
+        text, steps = self.text, list[Splices]()
+        for edit in edits:
+            text, found = apply(text, edit)
+            steps += found
+        return self._with(text), tuple(steps)
+
+    def typed(self, text: str) -> tuple[Study, tuple[Splices, ...]]:
+        """Return the study with another text, and the one splice that makes it.
+
+        Raises
+        ------
+        Refused
+            The text cannot be written as UTF-8.
+        """
+        check_encodable(text)
+        old, shortest, first, last = self.text, min(len(self.text), len(text)), 0, 0
+        while first < shortest and old[first] == text[first]:
+            first += 1
+        while last < shortest - first and old[-1 - last] == text[-1 - last]:
+            last += 1
+        splice = Splice(first, old[first : len(old) - last], text[first : len(text) - last])
+        return (self, ()) if old == text else (self._with(text), ((splice,),))
+
+    def spliced(self, steps: tuple[Splices, ...]) -> Study:
+        """Return the study with splices applied in sequence."""
+        text = self.text
+        for step in steps:
+            text = applied(text, step)
+        return self._with(text)
+
+    def _with(self, text: str) -> Study:
+        return Study(text, self.folder, self.document)
+
+
+@dataclass(frozen=True)
+class Trial(Study):
+    """A study for trial edits: applies them to the document without the text, which takes far longer to write.
+
+    Files that only edits name are not read.
+    """
+
+    source: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
+        return dict(self.source), Places(""), ()
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        """The tables, arrays as tuples."""
+        return {key: value for key, value in self.source.items() if key != TABLE}
+
+    def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
+        """Return the study after some edits, one after the other, with no splices.
+
+        Raises
+        ------
+        Refused
+            An edit makes no sense.
+        """
+        document = dict(self.source)
+        for edit in edits:
+            document = meaning(document, edit)
+        return (replace(self, source=frozen(document)) if edits else self), ()
+
+
+def read(source: bytes, folder: File = File()) -> Study:
+    """Return the study from a file's bytes.
+
+    Raises
+    ------
+    Refused
+        They are not UTF-8 text.
+    """
+    try:
+        return Study(source.decode("utf-8"), folder)
+    except UnicodeDecodeError as error:
+        line = source.count(b"\n", 0, error.start) + 1
+        raise Refused(f"line {line} is not UTF-8 text: save the file as UTF-8") from error

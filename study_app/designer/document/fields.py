@@ -1,0 +1,290 @@
+"""Forms: the rows of a table of the study, generated from the models of the file format."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, TypeAlias
+
+from study_app.designer.document.names import choices_at, sections_at
+from study_app.designer.document.schema_nodes import OWN, Node, alternatives, node_at, table_of, tags
+from study_app.haptics.model.ranges import REASON
+from study_app.protocol.source.document import Path, value_at
+from study_app.protocol.source.problems import rule_of, shown
+from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
+
+Kind: TypeAlias = Literal[
+    "number", "whole number", "text", "paragraphs", "localised", "switch", "choice", "kind", "reference",
+    "numbers", "vector", "points", "texts", "choices", "references", "list", "table", "tables", "either", "unknown",
+]  # fmt: skip
+"""How a value is edited: "localised" has a text per language, "switch" is true or false, "choice" one of some words,
+"kind" a choice that decides the other rows, "vector" numbers of one point, "list" tables in an array, "tables" tables
+by name, "either" one of several other kinds; an "unknown" key does not belong to the table."""
+
+UNITS: Final = {
+    "mm": "mm", "m": "m", "s": "s", "ms": "ms", "n": "N", "hz": "Hz", "deg": "°", "percent": "%", "mps": "m/s",
+    "mps2": "m/s²", "m2ps": "m²/s", "nspm": "N·s/m", "pa": "Pa", "pa_s": "Pa·s", "pa_sn": "Pa·sⁿ", "kg_m3": "kg/m³",
+    "per_s": "1/s",
+}  # fmt: skip
+"""The unit of each ending of a key."""
+
+_OF_NUMBERS: Final = {
+    "minimum": "at least {}",
+    "exclusiveMinimum": "more than {}",
+    "maximum": "at most {}",
+    "exclusiveMaximum": "less than {}",
+}
+_HOLDS: Final = {
+    "minimum": operator.ge, "exclusiveMinimum": operator.gt, "maximum": operator.le, "exclusiveMaximum": operator.lt,
+}  # fmt: skip
+_OF_LENGTHS: Final = {
+    "minItems": "at least {} entries",
+    "maxItems": "at most {} entries",
+    "maxLength": "at most {} characters",
+}
+_WORDS: Final = {"design": "Trial design", "designs": "Trial designs"}
+"""Labels of keys whose names are unclear: a study has a design, too."""
+_SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |\.?\Z)")
+
+
+LABELS: Final = {
+    "between_s": "Between trials",
+    "feedback_s": "Feedback duration",
+    "level_error_ms": "Level error of delays",
+    "participants": "Participants planned",
+}
+"""Labels of keys whose names are unclear or ambiguous, without their unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One value that can be chosen, with its description ("" if the model has none); None omits the key."""
+
+    value: str | None
+    sentence: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One row of a form.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        The place in the document that it edits.
+    kind : str
+        How it is edited, see `Kind`.
+    label, unit, help : str
+        Its texts, "" if there are none.
+    value : object
+        The value in the file, None if the key is omitted.
+    default : object
+        The value if the key is omitted; None if there is no default.
+    required : bool
+        Whether the key cannot be omitted.
+    bounds : tuple of str
+        The permitted values as in messages: "at least 0", "at most 8".
+    reason : str
+        The reason of the bounds, "" if the model has none.
+    choices : tuple of Choice
+        The values that can be chosen, or named.
+    either : tuple of Row
+        Its alternatives, only of kind "either".
+    instead : str
+        The alternative key, exactly one of the two being given; "" if there is none.
+    model : str
+        The title of the model whose key it is, such as "Block".
+    sections : tuple of str
+        The sections whose tables are named, only of references.
+    """
+
+    path: Path
+    kind: Kind
+    label: str
+    unit: str = ""
+    help: str = ""
+    value: Any = None
+    default: Any = None
+    required: bool = False
+    bounds: tuple[str, ...] = ()
+    reason: str = ""
+    choices: tuple[Choice, ...] = ()
+    either: tuple[Row, ...] = ()
+    instead: str = ""
+    model: str = ""
+    sections: tuple[str, ...] = ()
+
+
+def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
+    """Return the rows of the table or array at ``path``: its keys in the order of its model, then unknown ones."""
+    nodes, value = node_at(document, path), value_at(document, path)
+    node = table_of(nodes, value)
+    if node is None:
+        return ()
+    if node.get("type") == "array":
+        length = len(node["prefixItems"]) if "prefixItems" in node else len(value) if isinstance(value, tuple) else 0
+        return tuple(row for index in range(length) for row in (row_at(document, (*path, index)),) if row)
+    properties = node.get("properties", {})
+    written = tuple(value) if isinstance(value, Mapping) else ()
+    keys = list(dict.fromkeys((*filter(None, [tags(nodes)[0]]), *properties, *written)))
+    found = (row_at(document, (*path, key)) for key in keys)
+    return tuple(row for row in found if row is not None)
+
+
+def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the sections that the model of a table declares: each heading with its keys; keys in none come last."""
+    node = table_of(node_at(document, path), value_at(document, path)) or {}
+    return tuple((heading, tuple(keys)) for heading, keys in node.get(SECTIONS, ()))
+
+
+def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
+    """Return the keys that do not belong to a table with its present values."""
+    table = value_at(document, path)
+    node = table_of(node_at(document, path), table) or {}
+    if not isinstance(table, Mapping):
+        return frozenset()
+    applies = (keys for given, keys in node.get(NOT_WITH, ()) if all(key in table for key in given))
+    return frozenset(next(applies, ()))
+
+
+def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
+    """Return the row of one place; None if it is not within a model."""
+    siblings, value = node_at(document, path[:-1]), value_at(document, path)
+    around = table_of(siblings, value_at(document, path[:-1]))
+    if around is None:
+        return None
+    key, named = tags(siblings)
+    if key and key == path[-1]:
+        options = tuple(Choice(tag, _first_sentence(node)) for tag, node in named.items())
+        part = around.get("properties", {}).get(key, {})
+        default = part.get("default", None if None in named else part.get("const"))
+        required = key in around.get("required", ())
+        return Row(
+            path, "kind", label_of(key), value=value, default=default, required=required, choices=options,
+            model=around.get("title", ""),
+        )  # fmt: skip
+    nodes = node_at(document, path)
+    if not nodes:
+        return None if value is None else Row(path, "unknown", label_of(path[-1]), value=value)
+    row = _row(document, path, nodes, value, required=path[-1] in around.get("required", ()))
+    pairs = [pair for pair in around.get(ALTERNATIVES, ()) if path[-1] in pair]
+    instead = next((key for pair in pairs for key in pair if key != path[-1]), "")
+    return replace(row, instead=instead, model=around.get("title", ""))
+
+
+def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value: Any, *, required: bool) -> Row:
+    first = nodes[0]
+    common: dict[str, Any] = {
+        "label": label_of(path[-1]),
+        "unit": unit_of(_last_key(path)),
+        "help": first.get("description", ""),
+        "value": value,
+        "default": first.get("default", first.get("const")),
+        "required": required,
+    }
+    if is_localised(nodes):
+        return Row(path, "paragraphs" if first.get("lines") == "several" else "localised", **common)
+    if len(nodes) > 1 and not tags(nodes)[0]:
+        either = tuple(_row(document, path, (node,), value, required=required) for node in nodes)
+        return Row(path, "either", **common, either=either)
+    named = (*path, 0) if first.get("type") == "array" else path
+    references = choices_at(document, named)
+    kind = _kind(first, isinstance(references, tuple))
+    words = first.get("items", first) if kind == "choices" else first
+    names = references if kind in {"reference", "references"} and references is not None else _enum(words)
+    sentences = _sentences(first.get("description", ""))
+    options = tuple(Choice(name, sentences.get(name, "")) for name in names)
+    limits = _numbers_in(first) if kind in {"vector", "numbers", "points"} else first
+    common["sections"] = sections_at(named) if kind in {"reference", "references"} else ()
+    return Row(path, kind, **common, choices=options, bounds=_bounds(first, limits), reason=limits.get(REASON, ""))
+
+
+def _kind(node: Node, references: bool) -> Kind:
+    kind = node.get("type")
+    if kind == "array":
+        if references:
+            return "references"
+        inner = next(alternatives(node["items"])) if "items" in node else node["prefixItems"][0]
+        if "prefixItems" in node:
+            return "vector"
+        if inner.get("type") == "object":
+            return "list"
+        if inner.get("type") == "array":
+            return "points" if "prefixItems" in inner else "list"
+        return "choices" if "enum" in inner else "texts" if inner.get("type") == "string" else "numbers"
+    if kind == "object":
+        return "table" if "properties" in node else "tables"
+    if kind == "string":
+        return "reference" if references else "choice" if _enum(node) else "text"
+    if "enum" in node or "const" in node:
+        return "choice"
+    return "switch" if kind == "boolean" else "whole number" if kind == "integer" else "number"
+
+
+def _enum(node: Node) -> tuple[Any, ...]:
+    return (node["const"],) if "const" in node else tuple(node.get("enum", ()))
+
+
+def is_localised(nodes: tuple[Node, ...]) -> bool:
+    """Return whether the value of such nodes is a text, or one for each language."""
+    if len(nodes) != 2 or nodes[0].get("type") != "string":
+        return False
+    return nodes[1].get("additionalProperties") == {"type": "string"}
+
+
+def _numbers_in(node: Node) -> Node:
+    """Return the schema of the numbers in an array."""
+    while node.get("type") == "array":
+        node = node["prefixItems"][0] if "prefixItems" in node else next(alternatives(node["items"]))
+    return node
+
+
+def _bounds(node: Node, numbers: Node) -> tuple[str, ...]:
+    words = [phrase.format(shown(numbers[key])) for key, phrase in _OF_NUMBERS.items() if key in numbers]
+    if "prefixItems" not in node:
+        words += [phrase.format(node[key]) for key, phrase in _OF_LENGTHS.items() if key in node]
+    return (*words, rule_of(node["pattern"])) if "pattern" in node else tuple(words)
+
+
+def why_not(document: Mapping[str, Any], row: Row, number: float) -> str:
+    """Return the bound that a number violates, such as "at most 8"; "" if it is permitted."""
+    node = node_at(document, row.path)[0]
+    if row.kind == "whole number" and not isinstance(number, int):
+        return "a whole number"
+    broken = (key for key, holds in _HOLDS.items() if key in node and not holds(number, node[key]))
+    return next((_OF_NUMBERS[key].format(shown(node[key])) for key in broken), "")
+
+
+def label_of(step: str | int) -> str:
+    """Return a key in words, without its unit: "Force limit" of ``force_limit_n``; of an entry its number."""
+    if isinstance(step, int):
+        return str(step + 1)
+    if step in LABELS:
+        return LABELS[step]
+    unit = _suffix(step)
+    plain = step.removesuffix(f"_{unit}") if unit else step
+    return _WORDS.get(plain) or plain.replace("_", " ").strip().capitalize()
+
+
+def unit_of(key: str) -> str:
+    """Return the unit at the end of a key, "" if it has none."""
+    return UNITS.get(_suffix(key), "")
+
+
+def _suffix(key: str) -> str:
+    return max((suffix for suffix in UNITS if key.endswith(f"_{suffix}")), key=len, default="")
+
+
+def _last_key(path: Path) -> str:
+    return next((step for step in reversed(path) if isinstance(step, str)), "")
+
+
+def _first_sentence(node: Node) -> str:
+    return " ".join(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0].split())
+
+
+def _sentences(description: str) -> dict[str, str]:
+    """Return the sentence of each value in a description such as "fixed: as written; shuffled: anew in every trial"."""
+    return {value: match[2].strip() for match in _SENTENCES.finditer(description) for value in match[1].split(", ")}

@@ -1,0 +1,222 @@
+"""A row of the form: its label, its editor, what is wrong with it, and the repairs of that."""
+
+from collections import Counter
+from collections.abc import Mapping
+from functools import cached_property
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from study_app.designer.form.form_head import LABEL_PX
+from study_app.designer.form.form_rows import FormRow
+from study_app.designer.form.languages_field import LanguagesField, stacked
+from study_app.designer.form.list_fields import field, structure
+from study_app.designer.form.special import EDITORS
+from study_app.designer.form.special_editor import SpecialEditor
+from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText, removes_key
+from study_app.designer.place.requests import RemoveKey, SwitchKey
+from study_app.designer.place.segments import Segments
+from study_app.designer.place.tab_order import lead_by_tab, stops
+from study_app.designer.problems.problem_rows import ProblemRow
+from study_app.designer.problems.repair_button import RepairButton
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import add_layout, hbox, insert_layout, vbox
+from study_app.gui.widgets.cards import Icon
+from study_app.gui.widgets.controls import IconButton
+from study_app.gui.widgets.keys import with_key
+from study_app.gui.widgets.labels import label
+
+MOST_REPAIRS = 3
+
+
+class FaultLine(QWidget):
+    """A sentence that says what is wrong, below an editor."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        icon = (Icon("warning", "bad", 16), 0, Qt.AlignmentFlag.AlignTop)
+        self.sentence = label("", "label", "bad", wraps=True)
+        hbox(icon, (self.sentence, 1), spacing=8, margins=(LABEL_PX + 8, 0, 0, 0), parent=self)
+
+
+class RowWidget(Themed, QWidget):
+    """A row: its label, its editor, a button that removes the key, and what is wrong with it.
+
+    ``repair_asked`` carries a problem and the words of one of its repairs.
+    """
+
+    repair_asked = Signal(object, str)
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__()
+        self.row = row
+        self.key = structure_of(row)
+        self.refusal = ""
+        special, wide = special_editor_of(row), is_wide(row)
+        bare = special is not None and not special.labelled
+        self.field = field(row) if special is None else special.make(row)
+        self.keys = Segments("Which of the two is given") if row.instead else None
+        self.words = label(row.row.label, "label", wraps=True)
+        if not wide:
+            self.words.setFixedWidth(LABEL_PX)
+        self.words.setMinimumHeight(FIELD_PX)
+        self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
+        self.words.setBuddy(self.field)
+        self.remove: IconButton | None = None
+        if row.removable:
+            removes = f"Remove {row.row.label} from the file"
+            self.remove = IconButton("cross", removes, with_key(removes, "remove"), size=FIELD_PX, role="plain")
+            self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # no stop of Tab at each field
+            self.remove.clicked.connect(self._remove)
+        across = hbox(spacing=8)
+        top = Qt.AlignmentFlag.AlignTop
+        if bare:
+            across.addWidget(self.field, 1)
+        else:
+            across.addWidget(self.words, int(wide), top)
+            across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
+        if self.remove is not None:
+            across.addWidget(self.remove, 0, top)
+        elif not bare:
+            across.addSpacing(FIELD_PX + across.spacing())
+        self.repairs: list[RepairButton] = []
+        self._offered: dict[ProblemRow, tuple[str, ...]] = {}
+        self._buttons = vbox(spacing=6, margins=(LABEL_PX + 32, 0, 0, 0))
+        column = vbox(spacing=4, margins=0, parent=self)
+        heads = wide and len(row.languages) > 1 and not stacked(row)
+        labelled = not bare and (row.removable or not heads)
+        if labelled or bare:
+            add_layout(column, across)
+        if not labelled:  # the names of the languages, or the editor, say what it is
+            self.words.setParent(self)
+            self.words.hide()
+        if self.keys is not None:
+            self.keys.show_values(row.instead, row.row.path[-1])
+            self.keys.chosen.connect(self._switch)
+            above = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else LABEL_PX + 8, 0, 0, 0))
+            insert_layout(column, 0, above)
+        if heads:
+            of = "" if labelled else f"{row.row.label}, "
+            add_layout(column, language_heads(tuple((code, f"{of}{language}") for code, language in row.languages)))
+        if wide and not bare:
+            column.addWidget(self.field)
+        add_layout(column, self._buttons)
+        self.show_row(row)
+
+    @cached_property
+    def wrong(self) -> FaultLine:
+        """What is wrong, below the editor; made when it is first needed."""
+        made = FaultLine()
+        column = self.layout()
+        assert isinstance(column, QVBoxLayout)  # noqa: S101 - made so
+        made.hide()
+        column.insertWidget(column.count() - 1, made)
+        apply_theme_within(made, self.theme)
+        return made
+
+    def _remove(self) -> None:
+        """Ask to remove the key; what is being typed is handed on before, else it would come back with that."""
+        for part in self.field.findChildren(QWidget):
+            if isinstance(part, TypedLine | TypedText):
+                part.flush()
+        self.field.asked.emit(RemoveKey(self.row.row.path))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if removes_key(event) and self.remove is not None and self.remove.isEnabled():
+            self._remove()
+        else:
+            super().keyPressEvent(event)
+
+    def _switch(self, key: object) -> None:
+        if key != self.row.row.path[-1]:
+            self.field.asked.emit(SwitchKey(self.row.row.path, str(key)))
+
+    def show_row(self, row: FormRow) -> None:
+        if row != self.row:
+            self.refusal = ""
+            self.row = row
+            self.field.show_row(row)
+        self.say()
+
+    def say(self) -> None:
+        """Show what is wrong."""
+        found = [sentence for sentence in (self.refusal, self.field.refusal, *self.row.faults) if sentence]
+        times = Counter(found)
+        if found or "wrong" in self.__dict__:
+            said = (one if count == 1 else f"{count} × {one}" for one, count in times.items())
+            self.wrong.sentence.setText("\n".join(said))
+            self.wrong.setVisible(bool(found))
+        row = self.row.row
+        sentences = filter(None, (row.help, self.row.bounds, *found))
+        self.field.setAccessibleDescription(" ".join(f"{one.rstrip('.')}." for one in sentences))
+        some_missing = isinstance(self.field, LanguagesField) and self.field.some_missing
+        for part in self.field.findChildren(QWidget):
+            if not isinstance(part, TypedLine | TypedText):
+                continue
+            part.setAccessibleDescription(self.field.accessibleDescription())
+            if not self.field.refusal:
+                blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
+                part.show_refused(bool(self.row.faults) and blamed)
+
+    def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
+        """Offer the repairs of the problems of this row, of each the first; none that reads like another one."""
+        path = self.row.row.path
+        offered = {one: words for one, words in known.items() if one.fault.path[: len(path)] == path and words}
+        if offered == self._offered:
+            return
+        self._offered = offered
+        before, self.repairs = self.repairs, []
+        held = next((button.text() for button in before if button.hasFocus()), None)
+        several = len(offered) > 1
+        asked = [(one, word) for one, words in offered.items() for word in words[: 1 if several else 2]]
+        times = Counter(word for _problem, word in asked)
+        for problem, word in [(one, word) for one, word in asked if times[word] == 1][:MOST_REPAIRS]:
+            made = RepairButton(problem, word)
+            made.clicked.connect(lambda _on=False, one=problem, word=word: self.repair_asked.emit(one, word))
+            apply_theme_within(made, self.theme)
+            self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
+            made.show()  # at once: Tab passes what a layout is still to show
+            self.repairs.append(made)
+        lead_by_tab([self.field, *stops(self.field)][-1], self.repairs)
+        if held is not None and not self.repairs:
+            self.field.take_keyboard()
+        elif held is not None:  # the same words again, where they are still offered
+            min(self.repairs, key=lambda one: one.text() != held).setFocus(Qt.FocusReason.OtherFocusReason)
+        for button in before:
+            remove_widget(button)
+
+    @property
+    def help(self) -> str:
+        """What the row edits: the description, or the sentence of what is chosen, and what is permitted."""
+        row = self.row.row
+        shown = row.default if row.value is None else row.value
+        sentence = next((choice.sentence for choice in row.choices if choice.value == shown), "")
+        reason = f" ({row.reason})" if row.reason else ""
+        permitted = f"Permitted: {self.row.bounds}{reason}." if self.row.bounds and not row.choices else ""
+        words = " ".join(filter(None, (sentence or row.help, permitted)))
+        words = " ".join(words.replace("`", "").split())
+        return f"{words[:1].upper()}{words[1:]}"
+
+
+def special_editor_of(row: FormRow) -> SpecialEditor | None:
+    """Return the special editor of a row, None where its kind's editor is used."""
+    return EDITORS.get((row.row.model, str(row.row.path[-1])))
+
+
+def is_wide(row: FormRow) -> bool:
+    """Return whether the editor of a row takes the width of the form."""
+    special = special_editor_of(row)
+    return row.row.kind == "paragraphs" if special is None else special.wide
+
+
+def structure_of(row: FormRow) -> object:
+    """Return what makes another editor of a row necessary."""
+    special = special_editor_of(row)
+    return structure(row), None if special is None else special.structure(row)
+
+
+def language_heads(languages: tuple[tuple[str, str], ...], inset: tuple[int, int] = (0, 0)) -> QHBoxLayout:
+    """Return the names of languages above the columns of their texts; ``inset`` is the room left and right [px]."""
+    heads = ((label(language, "small", "text2"), 1) for _code, language in languages)
+    return hbox(*heads, spacing=8, margins=(inset[0], 0, inset[1], 0))

@@ -1,0 +1,294 @@
+"""The tab Measures: instant numbers once the window is idle after an edit, simulated ones when the keyboard rests."""
+
+import logging
+from collections import OrderedDict
+from dataclasses import replace
+from typing import Final
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from study_app.designer.document.edited_study import Study
+from study_app.designer.document.study_facts import facts
+from study_app.designer.measures.level_plots import Controls
+from study_app.designer.measures.level_words import LevelWords
+from study_app.designer.measures.measures_view import Focus, focus_of, measures_view
+from study_app.designer.measures.number_cards import ANEW
+from study_app.designer.measures.page_fit import PageFit
+from study_app.designer.measures.planned import Simulated
+from study_app.designer.measures.simulation import (
+    LAPSES,
+    MeasureClient,
+    Simulation,
+    advises,
+    participants_of,
+    planned_of,
+    precision_of,
+    simulation_of,
+    start_measure_worker,
+    threshold_of,
+)
+from study_app.designer.measures.valid_part import valid_part
+from study_app.designer.place.editing import Editing
+from study_app.designer.place.view import DesignerPlace
+from study_app.designer.problems.problem_rows import ProblemRow, problem_rows
+from study_app.designer.problems.repair_search import RepairSearch
+from study_app.protocol.model import Protocol
+from study_app.protocol.source.document import Path
+from study_app.store.study_settings import keep_setting, kept_participants
+from study_app.workers.server import Crashed
+
+log = logging.getLogger(__name__)
+
+IDLE_MS: Final = 20
+REST_MS: Final = 800
+LOOK_MS: Final = 100
+KEPT: Final = 50
+MOST_PARTICIPANTS: Final = 500
+FAILED: Final = "the process of the simulations does not start"
+
+
+class MeasuresController(QObject):
+    """Shows what the open study can find.
+
+    Parameters
+    ----------
+    editing : Editing
+        The open study.
+    place : DesignerPlace
+        Where it is shown.
+    repairs : RepairSearch
+        Finds the repairs of problems.
+
+    ``warned`` is emitted when the warnings of ``check`` that take simulated observers are others.
+    """
+
+    warned = Signal()
+
+    def __init__(self, editing: Editing, place: DesignerPlace, repairs: RepairSearch) -> None:
+        super().__init__(editing)
+        self.warnings: tuple[str, ...] = ()
+        self._editing, self._place = editing, place
+        self.make = start_measure_worker
+        self._client: MeasureClient | None = None
+        self._ordered = 0
+        self._wanted: Simulation | None = None
+        self._found, self._failed = Simulated(), ""
+        self._answers: OrderedDict[Simulation, Simulated] = OrderedDict()
+        self._of_block: dict[str, Simulated] = {}
+        self.rest = QTimer(self)
+        self.rest.setSingleShot(True)
+        self.rest.setInterval(REST_MS)
+        self.rest.timeout.connect(self._order)
+        self._look = QTimer(self)
+        self._look.setInterval(LOOK_MS)
+        self._look.timeout.connect(self._take)
+        self.fit = PageFit(self)
+        self._sound: Study | None = None
+        self._participants: int | None = None
+        self._thresholds: dict[str, float] = {}
+        self._lapses = LAPSES
+        self._focus = Focus()
+        self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
+        self._idle = QTimer(self)
+        self._idle.setSingleShot(True)
+        self._idle.setInterval(IDLE_MS)
+        self._idle.timeout.connect(self.show)
+        editing.opened_other.connect(self._forget)
+        editing.changed.connect(self._idle.start)
+        repairs.found.connect(self._take_repairs)
+        self.fit.found.connect(self._idle.start)
+        place.pane.tab_shown.connect(self._idle.start)
+        place.entered.connect(self._idle.start)
+        place.left.connect(self.leave)
+        place.pane.facts.appeared.connect(self._idle.start)
+        measures = place.measures
+        measures.repair_asked.connect(place.repair_asked)
+        measures.controls.participants_asked.connect(self._take_participants)
+        measures.controls.threshold_asked.connect(self._take_threshold)
+        measures.controls.lapses_asked.connect(self._take_lapses)
+        for part in (measures, place.pane.facts):
+            part.open_asked.connect(editing.select)
+
+    def show(self) -> None:
+        """Show the numbers of the study as it is now, and order those that are not known."""
+        opened = self._editing.opened
+        if opened is None or not self._place.isVisible():
+            self._want(None)
+            return
+        path, problems = opened.history.selected, problem_rows(opened.study)
+        study = self._measured(opened.study, path)
+        valid = valid_part(study)
+        protocol = valid.protocol
+        self._focus = focus = focus_of(protocol, path)
+        controls = self._controls(opened.study, protocol, focus)
+        if protocol is not None:
+            measured = self._is_looked_at and (valid.forces or focus.plan is not None)
+            self._want(simulation_of(protocol, focus if measured else Focus(), controls))
+        else:
+            self._want(None)
+        if protocol is None or not advises(protocol):
+            self._warn(())
+        repairs = {row: self._repairs.get(row, ()) for row in problems}
+        parts = self.fit.parts(protocol, focus, path) if self._is_looked_at else None
+        view = measures_view(study, facts(study), path, controls, self._simulated(), repairs, parts)
+        view = replace(view, earlier=study is not opened.study)
+        self._place.measures.show_measures(view)
+        self._place.pane.facts.show_measures(view)
+
+    def _measured(self, study: Study, path: Path) -> Study:
+        """Return the study to measure: the last one without faults where what an element is measured by is broken."""
+        if study.formed is not None:
+            self._sound = study
+        now, before = (None if one is None else valid_part(one).protocol for one in (study, self._sound))
+        lost = now is None or (focus_of(now, path).block is None and focus_of(before, path).block is not None)
+        return study if self._sound is None or not lost else self._sound
+
+    def leave(self) -> None:
+        """End the process: a session that begins now must not share the processor with it."""
+        self._idle.stop()
+        self._want(None)
+        self._close()
+
+    @property
+    def _is_looked_at(self) -> bool:
+        pane = self._place.pane
+        return pane.isVisible() and (pane.tab == "measures" or pane.facts.isVisible())
+
+    def _forget(self) -> None:
+        opened = self._editing.opened
+        kept = None if opened is None else kept_participants(opened.file)
+        self._participants = None if kept is None else _permitted(kept)
+        self._lapses, self._sound = LAPSES, None
+        self._thresholds, self._of_block, self._repairs = {}, {}, {}
+        self._idle.start()
+
+    def _controls(self, study: Study, protocol: Protocol | None, focus: Focus) -> Controls:
+        participants = participants_of(study) if self._participants is None else self._participants
+        planned = planned_of(study)
+        if focus.plan is None or focus.block is None:
+            return Controls(participants, lapses=self._lapses, planned=planned)
+        asked = self._thresholds.get(focus.block.id)
+        low, high = focus.plan.stimulus.levels
+        threshold = asked if asked is not None and low <= asked <= high else threshold_of(focus.plan)
+        return Controls(participants, threshold, self._lapses, precision_of(protocol), planned)
+
+    # simulations
+
+    @property
+    def waits(self) -> bool:
+        """Whether a simulation is still to come."""
+        return self.rest.isActive() or self._look.isActive()
+
+    def _want(self, wanted: Simulation | None) -> None:
+        """Want this from now on; what is under way for another element or study is given up."""
+        if wanted == self._wanted:
+            return
+        self._wanted, self._found, self._failed = wanted, Simulated(), ""
+        self.rest.stop()
+        if self._look.isActive():
+            self._look.stop()
+            if self._client is not None:
+                self._client.stop()
+        if wanted is not None and wanted in self._answers:
+            self._warn(self._answers[wanted].warnings)
+        elif wanted is not None:
+            self.rest.start()
+
+    def _order(self) -> None:
+        if self._wanted is None:
+            return
+        if self._client is not None and not self._client.works:
+            self._close()
+        if self._client is None:
+            try:
+                self._client = self.make()
+            except OSError as error:  # no process to be had: the designer goes on without these numbers
+                log.info("the worker of simulations does not start: %s", error)
+                self._fail(FAILED)
+                return
+        self._ordered = self._client.order(self._wanted)
+        self._look.start()
+
+    def _take(self) -> None:
+        wanted = self._wanted
+        if self._client is None or wanted is None:
+            return
+        for number, answer in self._client.answers():
+            if number != self._ordered:
+                continue
+            if isinstance(answer, Simulated):
+                self._found = answer
+                known = self._of_block.get(wanted.block, Simulated())
+                parts = ("observed", "group", "measurable", "detectable")
+                newer = {part: value for part in parts if (value := getattr(answer, part)) is not None}
+                self._of_block[wanted.block] = replace(known, **newer)
+                self._idle.start()
+                continue
+            self._look.stop()
+            if answer is None:
+                self._answers[wanted] = self._of_block[wanted.block] = self._found
+                if len(self._answers) > KEPT:
+                    self._answers.popitem(last=False)
+                self._warn(self._found.warnings)
+                self._idle.start()
+            elif isinstance(answer, Crashed) or not answer.stopped:
+                self._fail(answer.sentence)
+
+    def _fail(self, sentence: str) -> None:
+        log.info("simulations failed: %s", sentence)
+        self._failed = f"{sentence[:1].upper()}{sentence[1:]}."
+        self._idle.start()
+
+    def _warn(self, warnings: tuple[str, ...]) -> None:
+        if warnings != self.warnings:
+            self.warnings = warnings
+            self.warned.emit()
+
+    def _simulated(self) -> Simulated:
+        """Return what is known of what is wanted; before that, what was known of the block."""
+        wanted = self._wanted
+        if wanted is None:
+            return Simulated()
+        if (known := self._answers.get(wanted)) is not None:
+            return known
+        if self._failed:
+            return replace(self._found, warnings=self.warnings, failed=self._failed)
+        return replace(self._of_block.get(wanted.block, Simulated()), warnings=self.warnings, waiting=ANEW)
+
+    def _close(self) -> None:
+        """End the process."""
+        self.rest.stop()
+        self._look.stop()
+        client, self._client = self._client, None
+        if client is not None:
+            client.close()
+
+    def _take_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
+        self._repairs[row] = words
+        self._idle.start()
+
+    def _take_participants(self, number: float) -> None:
+        """Simulate so many participants from now on, also when the study is opened again."""
+        opened = self._editing.opened
+        if opened is None:
+            return
+        asked = _permitted(number)
+        self._participants = None if asked == participants_of(opened.study) else asked
+        keep_setting(opened.file, "participants", self._participants)
+        self.show()
+
+    def _take_threshold(self, number: float) -> None:
+        if self._focus.plan is not None and self._focus.block is not None:
+            words = LevelWords(self._focus.plan.stimulus, self._focus.plan.design)
+            low, high = self._focus.plan.stimulus.levels
+            self._thresholds[self._focus.block.id] = min(high, max(low, number / words.factor))
+            self.show()
+
+    def _take_lapses(self, number: float) -> None:
+        self._lapses = min(0.2, max(0.0, number / 100))
+        self.show()
+
+
+def _permitted(number: float) -> int:
+    """Return the nearest number of participants that can be simulated."""
+    return min(MOST_PARTICIPANTS, max(2, round(number)))

@@ -1,0 +1,245 @@
+"""What a study can find, simulated in a process of its own; none of these numbers is computed in a window."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
+
+from study_app.designer.document.edited_study import Study
+from study_app.designer.measures.level_plots import Controls
+from study_app.designer.measures.measures_view import Focus, focus_of
+from study_app.designer.measures.observers import Check, measurable, observe
+from study_app.designer.measures.participant_texts import text_keys
+from study_app.designer.measures.planned import ENOUGH, Detectable, Finding, GroupPrecision, Simulated
+from study_app.protocol.checks.expected_precision import ThresholdPlan, imprecise, threshold_plan
+from study_app.protocol.model import Protocol
+from study_app.protocol.source.document import value_at
+from study_app.protocol.trials.presented_levels import clipping
+from study_app.workers.client import WorkerClient
+from study_app.workers.server import Send, Stop, Stopped
+
+if TYPE_CHECKING:
+    from study_app.analysis.planning import threshold_studies
+    from study_app.session.simulated.rehearsal import ConditionFeatures
+
+SEED: Final = 1
+"""That of ``power`` where none is given."""
+STUDIES: Final = 200
+THRESHOLD_STUDIES: Final = 60
+MORE: Final = 4 / 3
+MOST_PEOPLE: Final = 60
+"""Up to so many participants it is looked for how many are enough."""
+PLANNED: Final = ("analysis", "participants")
+PARTICIPANTS: Final = 12
+"""Simulated participants of a study without `analysis.participants`."""
+PRECISION: Final = 0.15
+JND: Final = 0.19
+"""People tell viscosities that differ by so much (Jones, Hunter & Lafontaine 1997)."""
+LAPSES: Final = 0.02
+ERRORS: Final = 2.0
+"""A threshold below so many times the largest error of a valid trial is not measured. [choice]"""
+USUAL_ERROR_PERCENT, USUAL_ERROR_MS = 2.0, 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """What is simulated of a block ("" for none) of a study: those that agree in ``depends`` have one answer."""
+
+    depends: str
+    block: str
+    controls: Controls
+    protocol: Protocol = field(compare=False, repr=False)
+
+
+def simulation_of(protocol: Protocol, focus: Focus, controls: Controls) -> Simulation | None:
+    """Return what is to be simulated for an element; None where nothing is."""
+    simulated = focus.block is not None and (focus.plan is not None or focus.compares)
+    if not simulated and not advises(protocol):
+        return None
+    block = focus.block.id if focus.block is not None and simulated else ""
+    return Simulation(_dependencies(protocol), block, controls if block else Controls(), protocol)
+
+
+def advises(protocol: Protocol) -> bool:
+    """Return whether ``check`` warns of the precision of this study's thresholds, for which it simulates observers."""
+    decided = protocol.analysis
+    planned = decided is not None and decided.precision is not None and decided.participants is not None
+    return planned and any(threshold_plan(protocol, block) is not None for block in protocol.main_blocks)
+
+
+def precision_of(protocol: Protocol | None) -> float:
+    """Return half the 95 % interval that is wanted, as a share of the mean."""
+    decided = None if protocol is None else protocol.analysis
+    return PRECISION if decided is None or decided.precision is None else decided.precision
+
+
+def participants_of(study: Study) -> int:
+    """Return how many participants are simulated unless another number is asked for: the planned ones."""
+    return planned_of(study) or PARTICIPANTS
+
+
+def planned_of(study: Study) -> int | None:
+    """Return how many participants the file plans, whatever else is wrong with it; None where it does not say."""
+    planned = value_at(study.document, PLANNED)
+    faulty = any(fault.path == PLANNED for fault in study.faults)
+    return planned if isinstance(planned, int) and not faulty else None
+
+
+def threshold_of(plan: ThresholdPlan) -> float:
+    """Return the threshold (a level) that is simulated first: that of viscosity, or one in the middle of the levels."""
+    stimulus = plan.stimulus
+    low, high = stimulus.levels
+    if stimulus.level_kind == "weber" and low < JND < high:
+        return JND
+    return float(f"{stimulus.level_of(sum(stimulus.domain) / 2):.2g}")
+
+
+def least_of(protocol: Protocol, plan: ThresholdPlan) -> float:
+    """Return the smallest level that an estimate can be of: twice the largest error of a valid trial."""
+    limits = protocol.limits
+    if plan.stimulus.vary.endswith("_ms"):
+        return ERRORS * (limits.level_error_ms or USUAL_ERROR_MS)
+    if plan.stimulus.level_kind == "weber":
+        return ERRORS * (limits.level_error_percent or USUAL_ERROR_PERCENT) / 100
+    return 0.0
+
+
+def _dependencies(protocol: Protocol) -> str:
+    """Return the parts of a study on which its simulations depend: all except pages and texts."""
+    whole = protocol.model_dump(mode="json", exclude={"pages"})
+    return json.dumps(_without_texts(whole), sort_keys=True)
+
+
+def _without_texts(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_texts(inner) for key, inner in value.items() if key not in text_keys()}
+    return [_without_texts(inner) for inner in value] if isinstance(value, list) else value
+
+
+MeasureClient: TypeAlias = WorkerClient[Simulation, Simulated | None]
+
+
+def start_measure_worker() -> MeasureClient:
+    """Start the worker process, at the lowest priority."""
+    return WorkerClient("study_app.designer.measures.simulation:carry_out", name="measures", background=True)
+
+
+def carry_out(order: Simulation, send: Send, stop: Stop) -> None:
+    """Answer with what is known so far, each time a part of it was simulated, the quickest first.
+
+    Raises
+    ------
+    Stopped
+        Another order came, or the client is gone.
+    """
+
+    def check() -> None:
+        if stop():
+            raise Stopped("the study was edited")
+
+    for found in _parts(order, check):
+        send(found)
+
+
+def _parts(order: Simulation, check: Check) -> Iterator[Simulated]:
+    protocol, controls, found = order.protocol, order.controls, Simulated()
+    focus = focus_of(protocol, ("blocks", order.block))
+    if (plan := focus.plan) is not None and focus.block is not None:
+        found = replace(found, observed=observe(plan, controls.threshold, controls.lapses, check))
+        yield found
+        found = replace(found, group=_group(plan, controls, check))
+        yield found
+        clips = plan.clipping or clipping(protocol, focus.block)
+        most = math.inf if clips is None else clips.highest(plan.stimulus)
+        found = replace(found, measurable=measurable(plan, controls.lapses, least_of(protocol, plan), check, most))
+        yield found
+    if focus.compares:
+        found = replace(found, detectable=_detectable(order, check))
+        yield found
+    if advises(protocol):
+        yield replace(found, warnings=_warnings(replace(order, block="", controls=Controls())))
+
+
+@lru_cache(maxsize=1)
+def _warnings(order: Simulation) -> tuple[str, ...]:
+    protocol = order.protocol
+    return tuple(sentence for block in protocol.main_blocks for sentence in imprecise(protocol, block))
+
+
+def _group(plan: ThresholdPlan, controls: Controls, check: Check) -> GroupPrecision:
+    people, precision = controls.participants, controls.precision
+    more = plan.with_trials(round(MORE * plan.trials))
+    shares = [_studies(one, (people,), check).within(0, precision) for one in (plan, more)]
+    enough = people if shares[0] >= ENOUGH else None
+    for sizes in _looked_for(people):
+        if enough is not None:
+            break
+        found = _studies(plan, sizes, check)
+        enough = next((size for place, size in enumerate(sizes) if found.within(place, precision) >= ENOUGH), None)
+    most = max(MOST_PEOPLE, people)
+    return GroupPrecision(
+        people, THRESHOLD_STUDIES, precision, plan.trials, shares[0], more.trials, shares[1], most, enough
+    )
+
+
+def _looked_for(people: int) -> list[range]:
+    """Return where it is looked for how many participants are enough: twice as many each time, up to `MOST_PEOPLE`."""
+    found, last = [], people
+    while last < MOST_PEOPLE:
+        found.append(range(last + 1, min(2 * last, MOST_PEOPLE) + 1))
+        last = found[-1][-1]
+    return found
+
+
+def _studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> threshold_studies.Found:
+    """Return what simulated studies of so many participants find, as ``power`` does."""
+    from study_app.analysis.planning import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
+
+    total = threshold_studies.Found()
+    for number in range(THRESHOLD_STUDIES // threshold_studies.BATCH):
+        check()
+        case = threshold_studies.Case("", plan, (SEED, 0, plan.trials, number))
+        total.halves += threshold_studies.study_batch(case, sizes).halves
+    return total
+
+
+def _detectable(order: Simulation, check: Check) -> Detectable | None:
+    from study_app.analysis.planning.power_curves import powers  # noqa: PLC0415 - loads scipy
+    from study_app.analysis.planning.simulated_studies import BATCH, HIGHEST, Counts, compares_statements, count, plan  # noqa: PLC0415 - loads scipy
+
+    if not compares_statements(order.protocol):
+        return None
+    planned = plan(order.protocol, _features(order, check))
+    people = order.controls.participants
+    counts = Counts()
+    for number in range(STUDIES // BATCH):
+        check()
+        found = count(planned, (people,), SEED, number, BATCH)
+        counts = {what: counts.get(what, 0) + one for what, one in found.items()}
+    curves = powers(planned, (people,), STUDIES, STUDIES, SEED, counts).curves
+    findings = [
+        Finding(one.item, None if one.detectable is None else one.detectable[0])
+        for one in curves
+        if one.block == order.block and one.item is not None and one.question in ("settings differ", "trend")
+        and one.item not in planned.unknown
+    ]  # fmt: skip
+    findings.sort(key=lambda one: (one.detectable is None, one.detectable or 0.0))
+    return Detectable(people, STUDIES, HIGHEST, tuple(findings))
+
+
+_features_of: dict[str, ConditionFeatures] = {}
+
+
+def _features(order: Simulation, check: Check) -> ConditionFeatures:
+    """Return the features of each condition, kept for the last study: rehearsing them takes most of the time."""
+    from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
+
+    if order.depends not in _features_of:
+        found = condition_features(order.protocol, seed=SEED, progress=lambda _words: check())
+        _features_of.clear()
+        _features_of[order.depends] = found
+    return _features_of[order.depends]

@@ -1,0 +1,284 @@
+"""A new study: what it can begin as at the left, the chosen one with its questions at the right."""
+
+from functools import partial
+from itertools import pairwise
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QGridLayout,
+    QHBoxLayout,
+    QLayout,
+    QLineEdit,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
+
+from study_app.designer.new_study.cards import RING, TemplateButton
+from study_app.designer.new_study.new_study_questions import Questions
+from study_app.designer.new_study.recovery_bar import RecoveryBar
+from study_app.designer.new_study.template_choices import TemplateChoice
+from study_app.designer.place.designer_view import StudyChoice
+from study_app.designer.place.tab_order import lead_by_tab
+from study_app.designer.problems.repair_button import NameRefusal
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
+from study_app.gui.widgets.controls import ActionButton, Check, IconButton
+from study_app.gui.widgets.dialogs import choose_protocol
+from study_app.gui.widgets.keys import key_cap, tip
+from study_app.gui.widgets.labels import Elided, figures, label
+from study_app.gui.widgets.main_view import last_focused
+
+SIDE_PX, SIDE_NARROW_PX, NARROW_BELOW = 400, 330, 1200
+LOW_BELOW = 880
+ACROSS, COPIES_ACROSS = 3, 4
+
+
+class NoStudyCard(Card):
+    """What is shown while no study is open: drafts to continue (``study_asked``), and the button ``new``."""
+
+    study_asked = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__(padding=28, gap=12)
+        self.drafts: list[ActionButton] = []
+        self.new = ActionButton("plus", "New study …", cap=key_cap("new"), role="primary")
+        self.new.setAccessibleName(tip("new"))
+        self.new.setToolTip(tip("new"))
+        parts = (
+            Icon("designer", "accent", 44),
+            label("No study is open", "card"),
+            label("Choose a study above, or begin a new one.", "body", "text2"),
+            self.new,
+        )
+        centred = ((part, 0, Qt.AlignmentFlag.AlignHCenter) for part in parts)
+        add_parts(self.column, (STRETCH, 2), *centred, (STRETCH, 3))
+
+    def show_studies(self, studies: tuple[StudyChoice, ...]) -> None:
+        """Offer to continue the studies with a draft that is not saved."""
+        for old in self.drafts:
+            remove_widget(old)
+        self.drafts = []
+        for study in (one for one in studies if one.drafted):
+            made = ActionButton("save", f"Continue {study.title} ({study.file}) with its unsaved changes")
+            made.clicked.connect(lambda _on=False, source=study.source: self.study_asked.emit(source))
+            apply_theme_within(made, self.theme)
+            self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignHCenter)
+            self.drafts.append(made)
+        self.new.raise_()  # the last of the children: so Tab goes to it last
+
+
+class ChosenCard(Card):
+    """The chosen template: description, session, known answer and questions."""
+
+    def __init__(self) -> None:
+        super().__init__(padding=20, gap=10)
+        self.questions = Questions()
+        self.title = label("", "card")
+        self.refusal = NameRefusal("Make")
+        self.make = ActionButton("plus", "Make study", cap="Enter", role="primary", height=44)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        inside = QWidget()
+        self.about, self.details, self.begin = QWidget(), QWidget(), QWidget()
+        _column(self.begin, label("Begin with", "strong"), self.questions)
+        parts = (self.about, self.details, self.begin, STRETCH)
+        self.inside = vbox(*parts, spacing=10, margins=(0, 0, 8, 0), parent=inside)
+        self.area.setWidget(inside)
+        foot = label("Nothing is written until you save it.", "small", "text2")
+        foot.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        add_parts(self.column, self.title, (self.area, 1), self.refusal, self.make, foot)
+
+    def show_choice(self, choice: TemplateChoice) -> None:
+        self.title.setText(choice.title)
+        before = (self.about, self.details)
+        self.about, self.details = QWidget(), QWidget()
+        tags = (Chip("neutral", icon, words, small=True) for icon, words in choice.tags)
+        described = label(choice.description, "label", "text2", wraps=True)
+        _column(self.about, described, hbox(*tags, STRETCH, spacing=8), Rule())
+        column = _column(self.details)
+        if choice.session:
+            column.addWidget(label("The session", "strong"))
+        for icon, title, time in choice.session:
+            add_layout(column, _step(icon, title, time))
+        if choice.session:
+            column.addWidget(Rule())
+        if choice.recovery is not None:
+            good = choice.recovery.recovered
+            state = ("ok", "check", "recovered") if good else ("warn", "warning", "not recovered")
+            chip = Chip(*state, small=True)  # type: ignore[arg-type]  # a tone
+            bar = RecoveryBar()
+            bar.show_recovery(choice.recovery)
+            head = hbox(label("Known answer", "strong"), STRETCH, chip)
+            add_parts(column, head, bar, label(choice.recovery.sentence, "small", "text2", wraps=True), Rule())
+        for old, new in zip(before, (self.about, self.details), strict=True):
+            apply_theme_within(new, self.theme)
+            at = self.inside.indexOf(old)
+            self.inside.removeWidget(old)
+            self.inside.insertWidget(at, new)
+            remove_widget(old)
+        self.questions.show_choice(choice)
+        asked = (*self.questions.languages.values(), *self.questions.own.values())
+        lead_by_tab(self.questions.name, (*asked, self.refusal.use, self.make))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.inside.removeWidget(self.begin)
+        self.inside.insertWidget(1 if self.height() < LOW_BELOW else 2, self.begin)
+
+
+def _column(of: QWidget, *parts: QWidget | QLayout) -> QVBoxLayout:
+    return vbox(*parts, spacing=8, margins=0, parent=of)
+
+
+def _step(icon: str, title: str, time: str) -> QHBoxLayout:
+    shown = Elided("label")
+    shown.show_text(title)
+    return hbox(Icon(icon, "text2", 16), (shown, 1), figures(time, "label", "text2"), spacing=10)
+
+
+class NewStudyPage(Themed, QWidget):
+    """Signals: ``begin_asked`` (source, name, answers), ``copy_asked`` (a file to copy), ``given_up``."""
+
+    begin_asked = Signal(str, str, object)
+    copy_asked = Signal(str)
+    given_up = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.buttons: list[TemplateButton] = []
+        self._choices: tuple[TemplateChoice, ...] = ()
+        self._group = QButtonGroup(self)
+        self.back = IconButton("chevron_left", "Back", role="plain")
+        self.back.clicked.connect(self.given_up)
+        aside = Elided("label", "text2")
+        aside.show_text("Choose what you want to find out. Everything can be changed afterwards.")
+        self.file = ActionButton("file", "From a file …")
+        self.file.clicked.connect(self._open_file)
+        parts = (self.back, label("New study", "title"), (aside, 1), self.file)
+        head = hbox(*parts, spacing=12, margins=(SHADOW, 0, SHADOW, 0))
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.card = ChosenCard()
+        vbox(head, (hbox((self.area, 1), self.card, spacing=12), 1), spacing=12, margins=0, parent=self)
+        self.card.make.clicked.connect(self._begin)
+        self.card.questions.entered.connect(self._begin)
+        self.card.refusal.chosen.connect(self._take_name)
+        self._group.buttonToggled.connect(lambda _button, on: self._show_choice() if on else None)
+
+    @property
+    def name(self) -> QLineEdit:
+        """The field of the short name."""
+        return self.card.questions.name
+
+    @property
+    def make(self) -> ActionButton:
+        """The button that begins the study."""
+        return self.card.make
+
+    @property
+    def refusal(self) -> NameRefusal:
+        """What is wrong."""
+        return self.card.refusal
+
+    def show_choices(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
+        self._choices = choices
+        inside = QWidget()
+        column = vbox(spacing=12, margins=(0, 0, 12 - RING, 0), parent=inside)
+        self.buttons = []
+        for heading, aside, copies, across in (
+            ("Templates", "", False, ACROSS),
+            ("Or a copy of a study", "with its comments; the original stays as it is", True, COPIES_ACROSS),
+        ):
+            words = label(heading, "card"), label(aside, "small", "text2")
+            add_layout(column, hbox(*words, STRETCH, spacing=10, margins=(RING, 0, 0, 0)))
+            grid = QGridLayout()
+            grid.setSpacing(14 - 2 * RING)
+            columns = across if self.width() >= NARROW_BELOW else 2
+            for at, choice in enumerate(one for one in choices if one.copy == copies):
+                made = TemplateButton(choice)
+                made.came.connect(partial(self._come, made))
+                made.passed.connect(partial(self._pass, made))
+                self._group.addButton(made)
+                grid.addWidget(made, at // columns, at % columns)
+                self.buttons.append(made)
+            for one in range(columns):
+                grid.setColumnStretch(one, 1)
+            add_layout(column, grid)
+        column.addStretch()
+        apply_theme_within(inside, self.theme)
+        replace_inside(self.area, inside)
+        for before, after in pairwise((self.file, *self.buttons)):  # as they are read: made later, they come last
+            QWidget.setTabOrder(before, after)
+        self.refuse("")
+        first = next((button for button in self.buttons if button.choice.source == chosen), self.buttons[0])
+        for button in self.buttons:  # Tab goes to the chosen one, and arrows to the others
+            button.setFocusPolicy(Qt.FocusPolicy.StrongFocus if button is first else Qt.FocusPolicy.ClickFocus)
+        first.setChecked(True)
+        QTimer.singleShot(0, first, lambda: self.area.ensureWidgetVisible(first))  # once it has its place
+
+    def _come(self, button: TemplateButton, by_mouse: bool) -> None:
+        """Show the card that the keyboard came to; after a click the keyboard stays in the questions."""
+        if by_mouse:
+            (last_focused(self.card) or self.card.questions.title).setFocus()
+        else:
+            self.area.ensureWidgetVisible(button)
+
+    def _pass(self, button: TemplateButton, by: int) -> None:
+        """Choose the card after another one, or before it."""
+        to = self.buttons.index(button) + by
+        if 0 <= to < len(self.buttons):
+            self.buttons[to].setChecked(True)
+            self.buttons[to].setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def refuse(self, sentence: str, free: str = "") -> None:
+        """Show why the study cannot be created, and offer a short name that is free."""
+        self.card.refusal.show_refusal(sentence, free)
+
+    def _take_name(self, name: str) -> None:
+        self.card.questions.name.setText(name)
+        self._begin()
+
+    def _open_file(self) -> None:
+        if chosen := choose_protocol(self, "Copy a study"):
+            self.copy_asked.emit(chosen)
+
+    def _show_choice(self) -> None:
+        chosen = self._chosen()
+        if chosen is not None:
+            self.refuse("")
+            self.card.show_choice(chosen)
+
+    def _chosen(self) -> TemplateChoice | None:
+        return next((button.choice for button in self.buttons if button.isChecked()), None)
+
+    def _begin(self) -> None:
+        chosen, answers = self._chosen(), self.card.questions.answers()
+        if isinstance(answers, str):
+            self.refuse(f"{answers}.")
+        elif chosen is not None:
+            self.begin_asked.emit(chosen.source, self.card.questions.short_name(), answers)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        begins = isinstance(self.focusWidget(), Check | TemplateButton)
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and begins:
+            self._begin()
+        elif event.key() == Qt.Key.Key_Escape:
+            self.given_up.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        narrow = self.width() < NARROW_BELOW
+        self.card.setFixedWidth(SIDE_NARROW_PX if narrow else SIDE_PX)
+        if self._choices and (event.oldSize().width() < NARROW_BELOW) != narrow:
+            chosen = self._chosen()
+            self.show_choices(self._choices, "" if chosen is None else chosen.source)

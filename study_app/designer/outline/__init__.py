@@ -1,0 +1,1 @@
+"""The outline: elements in their order, dragging them, and what can be added."""

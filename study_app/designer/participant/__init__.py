@@ -1,0 +1,1 @@
+"""The participant's page in the designer, and playing the study from a step on."""

@@ -1,0 +1,1 @@
+"""The window of the designer: header, arrangement, file, and the controller of the open study."""

@@ -1,0 +1,209 @@
+"""Where the parts of the designer are: side by side, and in small windows the outline as a drawer, then one column."""
+
+from PySide6.QtCore import QRect, QSize, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import QApplication, QSizePolicy, QWidget
+
+from study_app.designer.form.element_form import FormCard
+from study_app.designer.form.form_rows import Form
+from study_app.designer.outline.card import OutlineCard
+from study_app.designer.place.right_pane import RightPane
+from study_app.designer.place.segments import Segments
+from study_app.designer.place.tab_order import lead_by_tab
+from study_app.designer.problems.problems_card import ProblemsCard
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.cards import SHADOW, Icon
+from study_app.gui.widgets.controls import ActionButton, PressedByEnter
+from study_app.gui.widgets.keys import key_cap, tip
+
+OUTLINE_PX, DRAWER_PX = 284, 320
+DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
+GAP = 14 - 2 * SHADOW
+FORM_SHARE = 44
+"""Percent of the width that the form takes beside the views."""
+
+
+class Crumb(PressedByEnter):
+    """A step of the path; its words end in "…" where its room is too small."""
+
+    def __init__(self, words: str, least_px: int) -> None:
+        super().__init__(words)
+        self.whole, self._least_px = words, least_px
+        self.setAccessibleName(words)
+        self.setToolTip(words)
+        self.setProperty("role", "plain")
+        self.setProperty("dense", "true")
+        self.setFont(font("label"))
+        self.setFixedHeight(32)
+        self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+
+    def sizeHint(self) -> QSize:
+        return QSize(self.fontMetrics().horizontalAdvance(self.whole) + 24, 32)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(min(self._least_px, self.sizeHint().width()), 32)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        room = self.width() - 22
+        self.setText(self.fontMetrics().elidedText(self.whole, Qt.TextElideMode.ElideRight, room))
+
+
+class PathBar(QWidget):
+    """The way to the element of the form, where the outline is a drawer; ``open_asked`` carries a path."""
+
+    outline_asked = Signal()
+    open_asked = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Path of the element")
+        self.outline = ActionButton("layers", "Outline", cap=key_cap("outline"), height=40)
+        self.outline.setProperty("dense", "true")
+        self.outline.setAccessibleName(tip("outline"))
+        self.outline.setToolTip(tip("outline"))
+        self.outline.clicked.connect(self.outline_asked)
+        self.steps: list[Crumb] = []
+        self._parts: list[QWidget] = []
+        self._shown: object = None
+        self._steps = hbox(spacing=0)
+        self.row = hbox(self.outline, self._steps, STRETCH, spacing=4, margins=0, parent=self)
+
+    def show_form(self, form: Form) -> None:
+        if form.around == self._shown:
+            return
+        self._shown = form.around
+        for part in self._parts:
+            remove_widget(part)
+        self.steps, self._parts = [], []
+        for path, title in form.around:
+            sign = Icon("chevron", "text2", 14)
+            made = Crumb(title, 56 if path == form.path else 104)
+            made.clicked.connect(lambda _checked=False, path=path: self.open_asked.emit(path))
+            for part in (sign, made):
+                self._steps.addWidget(part)
+                apply_theme_within(part, self.outline.theme)
+            self.steps.append(made)
+            self._parts += [sign, made]
+        lead_by_tab(self.outline, self.steps)
+
+
+class Arrangement(QWidget):
+    """Places outline, form, pane and problems; ``used`` is that of the first three that had the keyboard last."""
+
+    def __init__(self, outline: OutlineCard, form: FormCard, pane: RightPane, problems: ProblemsCard) -> None:
+        super().__init__()
+        self.outline, self.form, self.pane, self.problems = outline, form, pane, problems
+        self.side = "form"
+        self.used: QWidget = form
+        self.drawer = False
+        self._width = DRAWER_BELOW
+        self.path = PathBar()
+        self.path.outline_asked.connect(self.toggle_drawer)
+        self.sides = Segments("Side")
+        self.sides.tips = {"form": tip("form"), "pane": tip("views")}
+        self.sides.chosen.connect(lambda side: self.show_side(str(side)))
+        self.prompts = vbox()
+        self.prompt: QWidget | None = None  # in that layout: its items outlive their widgets in Python
+        self._left = vbox((form, 1), spacing=12 - 2 * SHADOW)
+        self._across = hbox((self._left, FORM_SHARE), (pane, 100 - FORM_SHARE), spacing=GAP)
+        self.top = QWidget()
+        hbox((self.path, 1), self.sides, margins=(SHADOW, 0, SHADOW, 0), parent=self.top)
+        self._right = vbox(self.top, self.prompts, (self._across, 1), problems, spacing=12 - 2 * SHADOW)
+        self._whole = hbox(outline, (self._right, 1), spacing=GAP, margins=0, parent=self)
+        outline.setFixedWidth(OUTLINE_PX)
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)  # noqa: S101 - a window has one
+        application.focusChanged.connect(self._follow_focus)
+
+    @property
+    def in_order(self) -> list[QWidget]:
+        """The parts in the order in which Tab goes through them."""
+        beside = [self.form.head, self.form.inside, *self.pane.in_order, self.problems]
+        return [self.outline, self.top, *([] if self.prompt is None else [self.prompt]), *beside]
+
+    def show_side(self, side: str) -> None:
+        self.side = side
+        self.arrange(self._width)
+
+    def arrange(self, width: int) -> None:
+        """Place the parts for so wide a place."""
+        self._width = width
+        one, drawer = width < ONE_PANE_BELOW, width < DRAWER_BELOW
+        if drawer != self.drawer:
+            self.drawer = drawer
+            if drawer:
+                self._whole.removeWidget(self.outline)
+                self.outline.setFixedWidth(DRAWER_PX)
+                self.outline.hide()
+                self._place_drawer()
+            else:
+                self.outline.setFixedWidth(OUTLINE_PX)
+                self.outline.setMinimumHeight(0)
+                self._whole.insertWidget(0, self.outline)
+                self.outline.show()
+        self.path.setVisible(drawer)
+        self.top.setVisible(drawer)
+        (self._right if one else self._left).insertWidget(0, self.top)
+        self.sides.setVisible(one)
+        self.sides.show_values((("form", "Form"), ("pane", "Views")), self.side)
+        self.form.setVisible(not one or self.side == "form")
+        self._across.setStretch(0, FORM_SHARE if self.form.isVisibleTo(self) else 0)  # an empty layout would take room
+        self.pane.setVisible(not one or self.side == "pane")
+        self.pane.make_room()
+
+    def focus_outline(self) -> None:
+        """Give the keyboard to the outline; a drawer opens."""
+        if self.drawer:
+            self._place_drawer()
+            self.outline.show()
+            self.outline.raise_()
+        self.outline.tree.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def focus_find(self) -> None:
+        """Give the keyboard to the field that finds; a drawer opens."""
+        self.focus_outline()
+        self.outline.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def toggle_drawer(self) -> None:
+        """Open the drawer, or close it."""
+        if self.outline.isVisible():
+            self.close_drawer()
+        else:
+            self.focus_outline()
+
+    def close_drawer(self) -> None:
+        """Close the drawer, where there is one; the button that opens it takes the keyboard that it had."""
+        if self.drawer and self.outline.isVisible():
+            had = self.outline.isAncestorOf(self.window().focusWidget() or self)
+            self._hide_drawer()
+            if had:
+                self.path.outline.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
+        """Note which part has the keyboard; close the drawer when another part of the place takes it."""
+        parts = (self.outline, self.form, self.pane)
+        self.used = next((part for part in parts if now is not None and part.isAncestorOf(now)), self.used)
+        if self.drawer and now is not None and self.isAncestorOf(now) and not self.outline.isAncestorOf(now):
+            self._hide_drawer()
+
+    def _hide_drawer(self) -> None:
+        """Hide the drawer; it lists every element when it opens again."""
+        self.outline.hide()
+        self.outline.words.clear()
+
+    def _place_drawer(self) -> None:
+        self.outline.setGeometry(QRect(0, 46, DRAWER_PX, max(200, self.height() - 46)))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self.drawer:
+            self._place_drawer()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if self.drawer and self.outline.isVisible() and event.key() == Qt.Key.Key_Escape:
+            self.close_drawer()
+        else:
+            super().keyPressEvent(event)

@@ -1,0 +1,322 @@
+"""The study designer: its place, and one controller for each of its subjects.
+
+Each edit is shown in the form at once; the outline, the warnings and the repairs follow when the keyboard rests.
+"""
+
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import QObject, QTimer
+
+from study_app.designer.document.edited_study import read
+from study_app.designer.document.names import renamed
+from study_app.designer.document.study_facts import facts
+from study_app.designer.document.writer.refused import Refused, free_in
+from study_app.designer.form.form_rows import form
+from study_app.designer.measures.measures_controller import MeasuresController
+from study_app.designer.new_study.known_studies import header_state, new_choices, source_of, studies
+from study_app.designer.new_study.new_study import NO_ANSWERS, Answers, answered, template
+from study_app.designer.outline.addable import addable, fields_to_go_to
+from study_app.designer.outline.outline_rows import outline_rows
+from study_app.designer.participant.feeling import Feeling
+from study_app.designer.participant.preview import ParticipantPreview
+from study_app.designer.place.clipboard import Clipboard
+from study_app.designer.place.designer_view import DesignerView, HeaderState, StudyChoice
+from study_app.designer.place.editing import Editing
+from study_app.designer.place.element_steps import Step, delete_prompt
+from study_app.designer.place.file_text import file_text
+from study_app.designer.place.open_study import OpenStudy, open_file, open_new, open_unsaved
+from study_app.designer.place.prompt_facts import series_prompt, series_titles
+from study_app.designer.place.prompts import SeriesCard
+from study_app.designer.place.requests import AskSeries, DeleteElement, RenameElement, Request
+from study_app.designer.place.saving import Saving
+from study_app.designer.place.view import DesignerPlace
+from study_app.designer.problems.problem_rows import ProblemRow, problem_rows, warning_rows
+from study_app.designer.problems.repair_search import RepairSearch
+from study_app.designer.versions.changes_controller import ChangesController
+from study_app.designer.versions.known_runs import KnownRuns
+from study_app.designer.versions.renaming import Renaming
+from study_app.errors import StudyError
+from study_app.protocol.source.document import Path as Place
+from study_app.protocol.source.files import find
+from study_app.store.drafts import draft_of
+from study_app.store.study_settings import begin_settings
+
+REST_MS: Final = 200
+
+
+class DesignerController(QObject):
+    """Gives the designer's place what it shows, and opens studies.
+
+    Parameters
+    ----------
+    results
+        Folder that holds the studies' results folders: versions that were run are not overwritten.
+    """
+
+    def __init__(self, results: Path) -> None:
+        super().__init__()
+        self.place = place = DesignerPlace()
+        self.editing = editing = Editing(results, self)
+        self.runs = KnownRuns(editing)
+        self.saving = Saving(editing, place, self.runs)
+        self.changes = ChangesController(editing, place, self.runs)
+        self.feeling = Feeling(editing, place)
+        Clipboard(editing, place)
+        Renaming(editing, place, self.runs)
+        self._others: dict[Path, OpenStudy] = {}
+        self._warnings: tuple[str, ...] = ()
+        self._find = ""
+        self._choices: tuple[StudyChoice, ...] = ()
+        self._repairs = RepairSearch(self)
+        self._resting = QTimer(self)
+        self._resting.setInterval(REST_MS)
+        self._resting.setSingleShot(True)
+        self._resting.timeout.connect(self.show_outline)
+        place.destroyed.connect(self.deleteLater)  # else a timer or thread would show what is gone
+        place.entered.connect(self.enter)
+        place.asked.connect(editing.ask)
+        place.selected.connect(editing.select)
+        place.back_asked.connect(editing.go_back)
+        place.undo_asked.connect(editing.undo)
+        place.redo_asked.connect(editing.redo)
+        place.study_asked.connect(self.open)
+        place.new_asked.connect(self.ask_for_new)
+        place.begin_asked.connect(self.begin)
+        place.new_page.copy_asked.connect(self.ask_for_new)
+        place.delete_asked.connect(self.ask_to_delete)
+        place.series_asked.connect(self.ask_for_series)
+        place.repair_asked.connect(self.repair)
+        place.find_changed.connect(self.find)
+        place.add_asked.connect(self._show_addable)
+        place.adding.typed.connect(self._offer_fields)
+        place.id_typed.connect(self._judge_id)
+        editing.changed.connect(self.show)
+        self.preview = ParticipantPreview(editing, place)
+        editing.edited.connect(self._resting.start)
+        editing.refused.connect(self._refuse)
+        editing.made.connect(self._show_step)
+        self.saving.kept.connect(self._show_header)
+        self.saving.copy_asked.connect(self.ask_for_new)
+        self.saving.continued.connect(self._take)
+        self.saving.discarded.connect(self._close)
+        self.saving.compare_asked.connect(self.changes.compare_with)
+        self.runs.changed.connect(self._show_header)
+        self._repairs.found.connect(place.show_repairs)
+        place.problem_steps.repairs_wanted.connect(self._repairs.show)
+        self.measures = MeasuresController(editing, place, self._repairs)
+        self.measures.warned.connect(self._show_header)
+        self.measures.warned.connect(self._show_warnings)
+
+    # opening
+
+    def enter(self) -> None:
+        """Look again at what there is; a file that another program changed is taken in where nothing was edited."""
+        self._choices = studies(self.editing.opened)
+        self.saving.look_again()
+        self.runs.look()
+        self.show()
+
+    def open(self, source: str) -> None:
+        """Open a study of the workspace, one that ships, or a file; one that is open stays, with its steps."""
+        self.place.message_over.emit()
+        self.saving.leave()
+        try:
+            file = Path(source) if Path(source).suffix == ".toml" else find(source)
+            if self.editing.opened is not None and self.editing.opened.file.resolve() == file.resolve():
+                self.place.close_new()
+                if not self.editing.opened.base:
+                    self.saving.offer_to_discard()
+                self.enter()
+                return
+            opened = self._others.get(file.resolve())
+            if opened is None or not opened.edited:
+                draft = None if file.exists() else draft_of(file)
+                opened = open_file(file, self.editing.results) if draft is None else open_unsaved(file, draft)
+        except StudyError as error:
+            self.place.message.emit(f"{Path(source).stem}.toml cannot be opened", f"{error}.")
+            self._show_header()
+            return
+        self._take(opened)
+
+    def begin(self, source: str, name: str, answers: Answers = NO_ANSWERS) -> None:
+        """Begin a study under a name, as a copy of a template ("template:NAME") or of another study."""
+        try:
+            if source.startswith("template:"):
+                study, copy_of = template(source.removeprefix("template:")), ""
+            else:
+                file = find(source)
+                study, copy_of = read(file.read_bytes(), file.parent), file.stem
+            opened = open_new(answered(study, answers), name)
+        except StudyError as error:
+            self.place.refuse_new(f"{error}.", free_in(error))
+            return
+        self.saving.leave()
+        begin_settings(opened.file, copy_of)
+        opened.note_edit(0.0)
+        self._take(opened)
+        self.saving.leave()
+
+    def ask_for_new(self, source: str = "") -> None:
+        """Show the templates and the studies that can be copied, with one of them chosen."""
+        self.place.message_over.emit()
+        try:
+            choices = new_choices(source)
+        except (StudyError, OSError) as error:
+            self.place.message.emit("This study cannot be copied", f"{error}.")
+            return
+        self.place.show_new(choices, source)
+
+    def _take(self, opened: OpenStudy) -> None:
+        if (before := self.editing.opened) is not None:
+            self._others[before.file.resolve()] = before
+        self._choices = studies(opened)
+        self._warnings = ()
+        self.editing.open(opened)
+        self.place.begin_study()
+        self.place.close_new()
+        self.show()
+        self.show_outline()
+        if opened.study.unreadable:
+            self.place.show_tab("file")  # also where the fault has no line
+            self.place.problem_steps.open_next()
+        else:
+            self.place.areas.focus_element()
+
+    def _close(self) -> None:
+        """Close the study, of which nothing is left."""
+        if (closed := self.editing.opened) is not None:
+            self._others.pop(closed.file.resolve(), None)
+        self.editing.open(None)
+        self._choices = studies(None)
+        self.place.begin_study()
+        self.show()
+        self.place.nothing.new.setFocus()
+
+    # steps that ask first
+
+    def ask_to_delete(self, path: Place, also: tuple[Place, ...] = ()) -> None:
+        """Delete elements, or show what refers to them and ask what to do with that."""
+        opened = self.editing.writable
+        if opened is None or len(path) < 2:
+            return
+        prompt = delete_prompt(opened.study, (path, *also))
+        if prompt.references:
+            self.place.ask_to_delete(prompt)
+        else:
+            self.editing.ask(DeleteElement(path, also=also))
+
+    def ask_for_series(self, asked: AskSeries) -> None:
+        """Ask for the values of a series, or say why there can be none."""
+        if (opened := self.editing.opened) is None:
+            return
+        prompt = series_prompt(opened.study, asked.path)
+        if prompt is None or opened.read_only:
+            why = opened.read_only or "This element has no numeric field."
+            self.place.message.emit("There can be no series of this element", why)
+            return
+        self.editing.select(prompt.path)
+        study = opened.study
+        card = SeriesCard(prompt, lambda asked: series_titles(study, asked))
+        card.answered.connect(self.editing.ask)
+        self.place.show_prompt(card, card.first)
+
+    def repair(self, row: ProblemRow, words: str) -> None:
+        """Make a repair, as one step."""
+        offered = self._repairs.repair(row, words)
+        if offered is None:
+            return
+        try:
+            self.editing.make(words, *offered.edits, select=row.element or None)
+        except Refused as refusal:
+            self.place.message.emit("This repair cannot be made", f"{refusal}.")
+
+    def _refuse(self, path: Place, sentence: str, asked: Request) -> None:
+        if isinstance(asked, RenameElement):
+            self._judge_id(path, asked.name)
+        else:
+            self.place.refuse(path, sentence)
+
+    def _show_addable(self) -> None:
+        if (opened := self.editing.writable) is not None:
+            self.place.show_addable(addable(opened.study, opened.history.selected))
+
+    def _offer_fields(self, words: str) -> None:
+        """Offer the fields that have the words typed in the list of what can be added."""
+        if (opened := self.editing.opened) is not None:
+            self.place.adding.offer_fields(fields_to_go_to(opened.study, words, opened.history.selected))
+
+    def _judge_id(self, path: Place, name: str) -> None:
+        """Say at once why an id cannot be taken, and which one could be."""
+        opened, why, free = self.editing.writable, "", ""
+        if opened is None:
+            return
+        try:
+            if name != str(path[-1]):
+                renamed(opened.study.document, path, name, self.editing.recorded(path))
+        except Refused as refusal:
+            why, free = f"{refusal}.", refusal.free
+        self.place.form.head.refuse(why, free)
+
+    def _show_step(self, step: Step) -> None:
+        if step.several or step.fresh or step.said:
+            self.show_outline()
+        self.place.show_step(step.several, step.said, fresh=step.fresh)
+
+    # what is shown
+
+    def show(self) -> None:
+        """Show the open study: header, form, file and problems now, the outline when the keyboard rests."""
+        opened = self.editing.opened
+        if opened is None:
+            self.place.show_view(DesignerView(self._header()))
+            return
+        study, selected = opened.study, opened.history.selected
+        problems = problem_rows(study)
+        self.place.show_view(
+            DesignerView(
+                self._header(),
+                form(study, selected),
+                file_text(study, opened.file.name, selected),
+                problems,
+                self.saving.banner,
+            )
+        )
+        self._repairs.begin(study, () if opened.read_only else problems)
+
+    def find(self, words: str) -> None:
+        """Show only the elements that hold these words."""
+        self._find = words
+        self.show_outline()
+
+    def show_outline(self) -> None:
+        """Show the elements as the study is now, and the warnings that changed."""
+        if self.editing.opened is None:
+            return
+        study = self.editing.opened.study
+        known = facts(study)
+        rows = outline_rows(study, known.steps_s, self._find)
+        self.place.show_outline(rows, self.editing.selected)
+        if known.warnings != self._warnings:
+            self._warnings = known.warnings
+            self._show_header()
+        self._show_warnings()
+
+    def _show_warnings(self) -> None:
+        """List the warnings after the problems."""
+        if (opened := self.editing.opened) is not None:
+            warned = (*self._warnings, *self.measures.warnings)
+            self.place.problem_steps.show_warnings(warning_rows(opened.study, warned))
+
+    def _header(self) -> HeaderState:
+        warnings = len({*self._warnings, *self.measures.warnings})
+        opened = self.editing.opened
+        if opened is not None:
+            source = source_of(opened.file)
+            known = next((choice.title for choice in self._choices if choice.source == source), None)
+            if known != (opened.title or opened.file.stem):  # another title, or a file saved for the first time
+                self._choices = studies(opened)
+        return header_state(opened, self._choices, warnings, self.runs.chip)
+
+    def _show_header(self) -> None:
+        self.place.show_header(self._header())

@@ -1,0 +1,183 @@
+"""Questions as cards in the place: deleting what is named elsewhere, discarding a study, the values of a series."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QFrame, QHeaderView, QScrollArea, QTableWidget, QTableWidgetItem, QWidget
+
+from study_app.designer.place.prompt_facts import DeletePrompt, SeriesPrompt
+from study_app.designer.place.requests import DeleteElement, MakeSeries
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.controls import ActionButton, Choice
+from study_app.gui.widgets.labels import label
+from study_app.number_text import typed_numbers
+
+HIGHEST = 560
+PLACES_PX = 200
+TABLE_PX = 190
+
+
+class Prompt(Card):
+    """A question with a way back; ``answered`` carries what was chosen, ``given_up`` comes at Cancel and Esc."""
+
+    answered = Signal(object)
+    given_up = Signal()
+
+    def __init__(self, title: str, explanation: str) -> None:
+        super().__init__(title, padding=20, gap=10)
+        self.setAccessibleName(title)
+        self.setMaximumHeight(HIGHEST)
+        said = label(explanation, "body", "text2", wraps=True)
+        self.column.addWidget(said)
+        self.cancel = ActionButton("", "Cancel", height=40)
+        self.cancel.clicked.connect(self.given_up)
+        self.buttons = hbox(self.cancel, STRETCH, spacing=10)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.given_up.emit()
+        else:
+            super().keyPressEvent(event)
+
+
+class DeleteCard(Prompt):
+    """What names an element that is to be deleted, and what becomes of it."""
+
+    def __init__(self, asked: DeletePrompt) -> None:
+        count = len(asked.references)
+        places = "It is used in 1 place:" if count == 1 else f"It is used in {count} places:"
+        super().__init__(f"Delete {asked.title}?", places)
+        inside = QWidget()
+        vbox(*(label(words, "label") for words in asked.references), margins=0, parent=inside)
+        area = QScrollArea()
+        area.setWidgetResizable(True)
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        area.setWidget(inside)
+        area.setFixedHeight(min(PLACES_PX, inside.sizeHint().height()))
+        self.column.addWidget(area)
+        if asked.together:
+            self.column.addWidget(label(f"Also deletes: {', '.join(asked.together)}.", "label", wraps=True))
+        self.all = ActionButton("trash", "Delete them too", role="danger", height=40)
+        self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(asked.path, "all", also=asked.also)))
+        self.gaps = ActionButton("", "Leave the gaps", height=40)
+        self.gaps.clicked.connect(lambda: self.answered.emit(DeleteElement(asked.path, "gaps", also=asked.also)))
+        self.other = Choice()
+        self.other.setFont(font("label"))
+        self.other.setAccessibleName("Use another one in its place")
+        self.other.setPlaceholderText("Use another …")
+        self.other.setMinimumWidth(180)
+        for name, title in asked.others:
+            self.other.addItem(f"{title} ({name})", name)
+        self.other.setCurrentIndex(-1)
+        self.other.activated.connect(
+            lambda at: self.answered.emit(DeleteElement(asked.path, "other", self.other.itemData(at)))
+        )
+        add_parts(self.buttons, self.gaps, self.other, self.all)
+        add_layout(self.column, self.buttons)
+        self.other.setVisible(bool(asked.others))
+        self.first: QWidget = self.all
+
+
+class DiscardCard(Prompt):
+    """Whether a study that was never saved is discarded; ``answered`` comes where it is."""
+
+    def __init__(self, title: str, file: str) -> None:
+        super().__init__(
+            f"Discard “{title}”?",
+            f"{file} was never saved: without its draft nothing of this study is left. This cannot be undone.",
+        )
+        self.go_on = ActionButton("trash", "Discard the draft", role="danger", height=40)
+        self.go_on.clicked.connect(lambda: self.answered.emit(file))
+        self.buttons.addWidget(self.go_on)
+        add_layout(self.column, self.buttons)
+        self.first: QWidget = self.cancel
+
+
+class SeriesCard(Prompt):
+    """Which number of an element differs in its copies, and a table with a line for each copy, filled in by the user.
+
+    A value in the last line adds a line; several values in one cell fill the lines below. ``titles`` returns the
+    titles of the copies, or none and why there can be none.
+    """
+
+    def __init__(self, asked: SeriesPrompt, titles: Callable[[MakeSeries], tuple[tuple[str, ...], str]]) -> None:
+        super().__init__(
+            f"Series of {asked.title}",
+            f"Type a value for each copy of {asked.title}; copies are listed in the blocks that list the original.",
+        )
+        self.asked, self._titles = asked, titles
+        self.number = Choice()
+        self.number.setFont(font("label"))
+        self.number.setAccessibleName("Number that differs")
+        self.number.addItems([words for _, words in asked.fields])
+        self.table = QTableWidget(1, 2)
+        self.table.setFont(font("label"))
+        self.table.setAccessibleName("Values of the copies")
+        self.table.setFixedHeight(TABLE_PX)
+        self.table.setTabKeyNavigation(False)
+        self.table.setEditTriggers(QTableWidget.EditTrigger.AllEditTriggers)
+        self.table.setFrameShape(QFrame.Shape.StyledPanel)
+        self.table.setShowGrid(True)
+        self.table.verticalHeader().hide()
+        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        add_layout(self.column, hbox(self.number, STRETCH, spacing=10))
+        self.column.addWidget(self.table)
+        self.refusal = label("", "label", "bad", wraps=True)
+        self.column.addWidget(self.refusal)
+        self.make = ActionButton("bars", "Make the copies", role="primary", height=40)
+        self.make.clicked.connect(lambda: self.answered.emit(self._request()))
+        self.buttons.addWidget(self.make)
+        add_layout(self.column, self.buttons)
+        self.table.cellChanged.connect(self._fill_in)
+        self.number.activated.connect(lambda _at: self._show())
+        self.first: QWidget = self.table
+        self._show()
+        QTimer.singleShot(0, self.table, lambda: self.table.setCurrentCell(0, 0))  # opens its editor
+
+    def _cell(self, row: int) -> str:
+        item = self.table.item(row, 0)
+        return "" if item is None else item.text().strip()
+
+    def _fill_in(self, row: int, _column: int) -> None:
+        """Put several values into lines of their own, and go to the next line."""
+        try:
+            several = [words for words, _ in typed_numbers(self._cell(row))] or [""]
+        except ValueError:
+            several = [self._cell(row)]
+        with QSignalBlocker(self.table):
+            self.table.setRowCount(max(self.table.rowCount(), row + len(several)))
+            for at, words in enumerate(several):
+                self.table.setItem(row + at, 0, QTableWidgetItem(words))
+        self._show()
+        self.table.setCurrentCell(min(row + len(several), self.table.rowCount() - 1), 0)
+
+    def _request(self) -> MakeSeries:
+        """Return what is asked for; a cell that is not a number is a `ValueError`."""
+        cells = filter(None, map(self._cell, range(self.table.rowCount())))
+        values = tuple(value for words in cells for _, value in typed_numbers(words))
+        return MakeSeries(self.asked.path, self.asked.fields[self.number.currentIndex()][0], values)
+
+    def _show(self) -> None:
+        """Show the titles of the copies, or why there can be none."""
+        titles: tuple[str, ...] = ()
+        why, filled = "", [row for row in range(self.table.rowCount()) if self._cell(row)]
+        try:
+            if filled:
+                titles, why = self._titles(self._request())
+        except ValueError as unclear:
+            why = f"{unclear}."
+        with QSignalBlocker(self.table):
+            if len(filled) == self.table.rowCount():
+                self.table.insertRow(len(filled))
+            self.table.setHorizontalHeaderLabels([self.number.currentText(), "Copy"])
+            shown = dict(zip(filled, titles, strict=True)) if titles else {}
+            for row in range(self.table.rowCount()):
+                title = QTableWidgetItem(shown.get(row, ""))
+                title.setFlags(Qt.ItemFlag.ItemIsEnabled)
+                self.table.setItem(row, 1, title)
+        self.refusal.setText(why)
+        self.table.setAccessibleDescription(why)
+        self.make.setEnabled(bool(titles))

@@ -1,0 +1,314 @@
+"""Drafts, saving, and the banner of a study that is read-only or was changed by another program."""
+
+import time
+from collections.abc import Callable
+from typing import Final
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from study_app.designer.document.writer.refused import Refused, free_in
+from study_app.designer.new_study.known_studies import source_of
+from study_app.designer.place.designer_view import Banner, BannerAction
+from study_app.designer.place.editing import Editing
+from study_app.designer.place.open_study import OpenStudy, why_read_only
+from study_app.designer.place.prompts import DiscardCard
+from study_app.designer.place.view import DesignerPlace
+from study_app.designer.versions.changes_controller import compare, newest, version_of
+from study_app.designer.versions.file_watch import FileWatch
+from study_app.designer.versions.known_runs import KnownRuns
+from study_app.designer.versions.standing import Standing, check_version
+from study_app.designer.versions.version_rows import FILE, Comparison, save_prompt
+from study_app.designer.versions.versions_page import SaveCard
+from study_app.errors import StudyError
+from study_app.number_text import counted
+from study_app.store.drafts import draft_of
+from study_app.store.study_settings import begin_settings
+from study_app.store.study_versions import ChangedOutsideError, kept_versions
+from study_app.viewmodels.home import time_words
+
+DRAFT_MS: Final = 50
+RETRY_MS: Final = 2_000
+
+
+class Saving(QObject):
+    """Keeps the draft of the open study and writes its file.
+
+    ``kept`` is emitted when a draft was written or the banner changed, ``saved`` carries the file that was written,
+    ``copy_asked`` the study of which a copy is to be made, ``compare_asked`` the version to compare with (its hash, or
+    "file"), ``continued`` the study under another name that is open from now on; ``discarded`` is emitted when nothing
+    is left of the study, which was never saved.
+    """
+
+    kept = Signal()
+    saved = Signal(object)
+    copy_asked = Signal(str)
+    compare_asked = Signal(str)
+    continued = Signal(object)
+    discarded = Signal()
+
+    def __init__(self, editing: Editing, place: DesignerPlace, runs: KnownRuns) -> None:
+        super().__init__(editing)
+        self.editing, self.place, self.runs = editing, place, runs
+        self.banner: Banner | None = None
+        self._notice: Banner | None = None
+        self._lasts: bool | None = None  # while the study is edited (True), until it is (False), until it is closed
+        self.card: SaveCard | None = None
+        self._others, self._trouble = 0, ""
+        self._drafting = QTimer(self)
+        self._drafting.setInterval(DRAFT_MS)
+        self._drafting.timeout.connect(self.write_draft)
+        self._watch = FileWatch(editing)
+        self._watch.touched.connect(self._look_while_shown)
+        editing.opened_other.connect(self._begin)
+        editing.edited.connect(self._end_notice)
+        place.left.connect(self.leave)
+        place.save_asked.connect(self.save)
+        place.banner_asked.connect(self.answer_banner)
+
+    # the banner
+
+    def _begin(self) -> None:
+        self._note(None)
+        self.banner, opened = None, self.editing.opened
+        if opened is None:
+            return
+        self._drafting.start(DRAFT_MS)
+        self._others, self._trouble = opened.keeper.others, ""
+        self.offer_to_discard()
+        self.banner = _banner(opened) or self._notice
+
+    def offer_to_discard(self) -> None:
+        """Say of when the draft is that was found, of a study that was never saved each time it is opened."""
+        opened = self.editing.opened
+        draft = None if opened is None else opened.draft if opened.base else draft_of(opened.file)
+        if opened is not None and draft is not None and opened.edited:
+            words = f"Draft of {time_words(draft.kept_at)}, {'not' if opened.base else 'never'} saved"
+            self._note(words, ("discard", "Discard the draft"), lasts=True)
+
+    def _note(self, words: str | None, *actions: tuple[BannerAction, str], lasts: bool | None = None) -> None:
+        """Show a line that needs no answer where no other one is needed, None for none; ``lasts`` says for how long."""
+        self._notice, self._lasts = None if words is None else Banner(words, actions, closes=True), lasts
+
+    def _end_notice(self) -> None:
+        """Take back what is true no longer: that the draft differs from the file, or that the file has problems."""
+        opened = self.editing.opened
+        if opened is not None and self._notice is not None and self._lasts is (not opened.edited):
+            self._close_notice(opened)
+
+    def _close_notice(self, opened: OpenStudy) -> None:
+        self._note(None)
+        opened.draft = None  # it is not announced again
+        self.banner = _banner(opened)
+        self.place.banner.show_banner(self.banner)
+
+    def look_again(self) -> None:
+        """Look whether the study may be changed, and whether another program changed its file.
+
+        Where it was not edited here, the file's content is taken in as a step; else it is asked which is to be kept.
+        """
+        opened = self.editing.opened
+        if opened is None:
+            return
+        before = opened.read_only, self.banner
+        opened.read_only = why_read_only(opened, self.editing.results)
+        if not opened.edited and opened.file.exists() and _changed_outside(opened):
+            self._try(opened, opened.take_outside)
+        self.banner = _banner(opened) or self._notice
+        if before != (opened.read_only, self.banner):
+            self.editing.announce()
+
+    def _look_while_shown(self) -> None:
+        if self.place.isVisible():
+            self.place.flush()
+            self.look_again()
+
+    def answer_banner(self, action: str) -> None:
+        """Carry out what a button of the banner asks for."""
+        opened = self.editing.opened
+        if opened is None:
+            return
+        if action == "copy":
+            self.copy_asked.emit(source_of(opened.file))
+            return
+        if action == "problems":
+            self.place.areas.focus_problems()
+            return
+        if action == "compare":
+            drafts = [one.hash for one in kept_versions(opened.file) if one.origin == "draft"]
+            self.compare_asked.emit(FILE if _changed_outside(opened) or not drafts else drafts[-1])
+            return
+        if action == "close":
+            self._close_notice(opened)
+            return
+        if action == "discard" and not opened.base:
+            card = DiscardCard(opened.title or opened.file.stem, opened.file.name)
+            card.answered.connect(self.give_up)
+            self.place.show_prompt(card, card.first)
+            return
+        self._note(None)
+        if action == "keep":
+            self._try(opened, lambda: opened.keep_mine(time.monotonic()))
+        elif action == "take":
+            self._try(opened, opened.take_outside)
+        else:
+            self._try(opened, opened.discard_draft)
+
+    def give_up(self) -> None:
+        """Discard the draft of a study that was never saved: nothing of it is left."""
+        self.place.flush()
+        opened = self.editing.opened
+        if opened is None or opened.base:
+            return
+        try:
+            opened.give_up()
+        except StudyError as error:
+            self.place.message.emit("The draft was not discarded", f"{error}.")
+            return
+        self.discarded.emit()
+
+    # saving
+
+    def save(self) -> None:
+        """Write the file; ask where sessions were run with other content, or another program changed the file."""
+        opened = self.editing.writable
+        if opened is None or (opened.base and not opened.edited):
+            return
+        opened.read_only = why_read_only(opened, self.editing.results)
+        if opened.read_only:
+            self._show_banner(opened)
+            return
+        known = self.runs.read()
+        standing = opened.standing(known)
+        if standing.asks and not _changed_outside(opened):
+            self._ask(opened, standing)
+        else:
+            self._write(opened)
+
+    def _ask(self, opened: OpenStudy, standing: Standing) -> None:
+        """Show what differs from what was run, and ask under which version or name the study is saved."""
+        run = newest(self.runs.known)
+        found = Comparison() if run is None else compare(version_of(opened, run), opened.study)
+        problems = len(opened.study.faults)
+        self.card = card = SaveCard(save_prompt(standing, self.runs.known, found, problems))
+        card.save_asked.connect(self.save_as_version)
+        card.another_asked.connect(self.save_as_another)
+        card.changes_asked.connect(self.place.close_prompt)
+        card.changes_asked.connect(lambda: self.compare_asked.emit("" if run is None else run.hash))
+        self.place.show_prompt(card, card.first)
+
+    def save_as_version(self, version: str) -> None:
+        """Give the study another version and save it; the card says why where that cannot be."""
+        opened = self.editing.writable
+        if opened is None:
+            return
+        try:
+            check_version(version, self.runs.read())
+            opened.set_version(version)
+        except Refused as refusal:
+            if self.card is not None:
+                self.card.refuse(f"{refusal}.")
+            return
+        self.place.close_prompt()
+        self._write(opened)
+
+    def save_as_another(self, name: str) -> None:
+        """Save the study with its edits under another name; the file of this one stays as it is."""
+        opened = self.editing.writable
+        if opened is None:
+            return
+        try:
+            made = opened.saved_as(name)
+        except StudyError as refusal:
+            if self.card is not None:
+                self.card.refuse(f"{refusal}.", free_in(refusal))
+            return
+        self.write_draft(at_once=True)
+        self.place.close_prompt()
+        begin_settings(made.file, opened.file.stem)
+        self.continued.emit(made)
+        self._write(made)
+
+    def _write(self, opened: OpenStudy) -> None:
+        try:
+            opened.save(self.runs.read())
+        except ChangedOutsideError:
+            self._show_banner(opened)
+            return
+        except StudyError as error:
+            self.place.message.emit("The study was not saved", f"{error}.")
+            self.editing.announce()
+            return
+        count = len(opened.study.faults)
+        said = f"Saved. It cannot be run yet: {counted(count, 'problem')}" if count else None
+        self._note(said, ("problems", "Show the list"), lasts=False)
+        self._show_banner(opened)
+        self.saved.emit(opened.file)
+
+    # drafts
+
+    def leave(self) -> None:
+        """Hand on what is being typed, and write the draft at once."""
+        self.place.flush()
+        self.write_draft(at_once=True)
+
+    def write_draft(self, *, at_once: bool = False) -> None:
+        """Write the draft if it is due; what fails is tried again, and said once."""
+        opened = self.editing.opened
+        if opened is None:
+            return
+        try:
+            written = opened.write_draft(None if at_once else time.monotonic())
+        except StudyError as error:
+            self._drafting.setInterval(RETRY_MS)
+            if self._trouble != str(error):
+                self._trouble = str(error)
+                self.place.message.emit("The draft is not up to date", f"{error}.")
+            return
+        if self._trouble:
+            self._trouble = ""
+            self._drafting.setInterval(DRAFT_MS)
+        if opened.keeper.others > self._others:
+            self._others = opened.keeper.others
+            said = "Another window of the program edits this study, too: its unsaved edits are kept as a version"
+            self._note(said, ("compare", "Compare"))
+            self._show_banner(opened)
+        if written:
+            self.kept.emit()
+
+    def _try(self, opened: OpenStudy, act: Callable[[], object]) -> None:
+        try:
+            act()
+        except StudyError as error:
+            self.place.message.emit("This was not done", f"{error}.")
+        self._show_banner(opened)
+
+    def _show_banner(self, opened: OpenStudy) -> None:
+        self.banner = _banner(opened) or self._notice
+        self.editing.announce()
+
+
+def _banner(opened: OpenStudy) -> Banner | None:
+    """Return why a study is read-only, or what another program did to its file; None where there is neither."""
+    if opened.read_only:
+        return Banner(opened.read_only, (("copy", "Make a copy …"),))
+    try:
+        changed = opened.changed_outside()
+    except StudyError as error:
+        return Banner(f"{str(error)[:1].upper()}{str(error)[1:]}")
+    if not changed:
+        return None
+    if not opened.file.exists():
+        return Banner("Another program deleted or moved this file", (("keep", "Keep mine"),))
+    too = ", and it was edited here, too" if opened.edited else ""
+    return Banner(
+        f"Another program changed this file{too}",
+        (("keep", "Keep mine"), ("take", "Take the file's"), ("compare", "Compare")),
+    )
+
+
+def _changed_outside(opened: OpenStudy) -> bool:
+    """Return whether the file can be read and has another content than the one that is edited."""
+    try:
+        return opened.changed_outside()
+    except StudyError:
+        return False

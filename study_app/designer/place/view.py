@@ -1,0 +1,378 @@
+"""The study designer's place: header, outline, form, file and problems."""
+
+from functools import partial
+from typing import Any
+
+from PySide6.QtCore import Qt, Signal, SignalInstance
+from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import QStackedWidget, QWidget
+
+from study_app.designer.form.element_form import FormCard
+from study_app.designer.measures.measures_page import MeasuresPage
+from study_app.designer.new_study import NewStudyPage, NoStudyCard
+from study_app.designer.new_study.template_choices import TemplateChoice
+from study_app.designer.outline.add_list import AddList
+from study_app.designer.outline.addable import Addable
+from study_app.designer.outline.card import OutlineCard
+from study_app.designer.outline.outline_rows import ElementPath, OutlineRow
+from study_app.designer.place.arrangement import Arrangement
+from study_app.designer.place.banner import BannerCard
+from study_app.designer.place.designer_header import DesignerHeader
+from study_app.designer.place.designer_view import DesignerView, HeaderState
+from study_app.designer.place.file_editor import FileCard
+from study_app.designer.place.focus_areas import FocusAreas
+from study_app.designer.place.keys_card import KeysCard
+from study_app.designer.place.prompt_facts import DeletePrompt
+from study_app.designer.place.prompts import DeleteCard, Prompt
+from study_app.designer.place.requests import (
+    AskSeries,
+    GoTo,
+    LeaveText,
+    MoveTo,
+    RetypeFile,
+    SetText,
+    SetValue,
+    with_path,
+)
+from study_app.designer.place.right_pane import PanePage, RightPane
+from study_app.designer.place.selected_elements import SelectedElements
+from study_app.designer.place.tab_order import go_on
+from study_app.designer.problems.problem_rows import ProblemRow
+from study_app.designer.problems.problem_steps import ProblemSteps
+from study_app.designer.problems.problems_card import ProblemsCard
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.widgets.accessible import say
+from study_app.gui.widgets.boxes import vbox
+from study_app.gui.widgets.keys import tip
+from study_app.gui.widgets.main_view import Place, make_shortcuts
+
+
+class DesignerPlace(Place):
+    """Draws a `DesignerView` and says what is asked for.
+
+    Signals: ``entered``, ``left``; ``asked`` (a request); ``selected`` (path) and ``back_asked``; ``study_asked``
+    (source), ``new_asked``, ``begin_asked`` (source, name, answers); ``undo_asked``, ``redo_asked``, ``save_asked``;
+    ``add_asked``, ``series_asked``, ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``;
+    ``repair_asked`` (row, words); ``find_changed``; ``banner_asked`` (action); ``id_typed`` (path, id).
+    """
+
+    entered = Signal()
+    left = Signal()
+    asked = Signal(object)
+    selected = Signal(object)
+    back_asked = Signal()
+    study_asked = Signal(str)
+    new_asked = Signal()
+    begin_asked = Signal(str, str, object)
+    undo_asked = Signal()
+    redo_asked = Signal()
+    save_asked = Signal()
+    delete_asked = Signal(object, object)
+    add_asked = Signal()
+    series_asked = Signal(object)
+    copy_asked = Signal(object)
+    paste_asked = Signal()
+    repair_asked = Signal(object, str)
+    find_changed = Signal(str)
+    banner_asked = Signal(str)
+    id_typed = Signal(object, str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.view = DesignerView()
+        self.prompt: Prompt | None = None
+        self.header, self.banner = DesignerHeader(), BannerCard()
+        self.banner_words = self.banner.words
+        self.form, self.file, self.problems = FormCard(), FileCard(), ProblemsCard()
+        self.outline, self.new_page = OutlineCard(), NewStudyPage()
+        self.pane = RightPane()
+        self.measures = MeasuresPage()
+        self.pane.add_page(PanePage("measures", "Measures", self.measures, self.measures.controls, with_facts=False))
+        self.pane.add_page(PanePage("file", "File", self.file, self.file.aside, tip=tip("file")))
+        self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
+        self.sides = self.parts.sides
+        self.areas = FocusAreas(self.header, self.parts, self.file, self.problems)
+        self.problem_steps = ProblemSteps(self.problems, self.form, self.file, self.areas)
+        self.adding, self.nothing, self.keys = AddList(self), NoStudyCard(), KeysCard(self)
+        self._steps = [partial(self._ask, asked) for asked in (self.undo_asked, self.redo_asked, self.save_asked)]
+        self.elements = SelectedElements(self.outline, self.form, lambda: self.view)
+        self._lay_out()
+        self._connect()
+        self._take_keys()
+        self.problems.hide()
+        self.show_view(DesignerView())
+
+    def _lay_out(self) -> None:
+        main = QWidget()
+        column = vbox(spacing=10, margins=0, parent=main)
+        column.addWidget(self.nothing, 1)  # first in the order of Tab
+        column.insertWidget(0, self.header)
+        column.insertWidget(1, self.banner)
+        column.addWidget(self.parts, 1)
+        self.stack = QStackedWidget()
+        self.stack.addWidget(main)
+        self.stack.addWidget(self.new_page)
+        vbox(self.stack, margins=(20, 14, 20, 14), parent=self)
+
+    def _connect(self) -> None:
+        undo, redo, save = self._steps
+        header, outline, form = self.header, self.outline, self.form
+        header.study_asked.connect(self.study_asked)
+        header.new_asked.connect(self.new_asked)
+        header.problems_asked.connect(lambda: self.problems.setVisible(not self.problems.isVisible()))
+        header.undo_asked.connect(undo)
+        header.redo_asked.connect(redo)
+        header.save_asked.connect(save)
+        header.keys_asked.connect(self.keys.switch)
+        header.strip.changed.connect(lambda shown: self.banner.make_room(other=shown))
+        self.nothing.new.clicked.connect(self.new_asked)
+        self.nothing.study_asked.connect(self.study_asked)
+        self.nothing.study_asked.connect(self.areas.focus_form)
+        self.banner.asked.connect(self.banner_asked)
+        self.banner.keyboard_left.connect(self.areas.return_keyboard)
+        outline.chosen.connect(self._select)
+        outline.find_changed.connect(self.find_changed)
+        outline.field_asked.connect(self.areas.focus_field)
+        outline.form_asked.connect(self.areas.focus_form)
+        outline.element_clicked.connect(self.areas.leave_drawer)
+        outline.add_asked.connect(self.ask_to_add)
+        outline.duplicate_asked.connect(self.elements.duplicate)
+        outline.delete_asked.connect(self.elements.delete)
+        outline.copy_asked.connect(lambda: self.copy_asked.emit(outline.selected))
+        outline.paste_asked.connect(self.paste_asked)
+        outline.rename_asked.connect(self._rename)
+        outline.move_asked.connect(self.elements.move_by)
+        outline.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
+        self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
+        self.parts.path.open_asked.connect(self._select)
+        form.asked.connect(self._take_asked)
+        form.open_asked.connect(self._select)
+        form.join_asked.connect(self.elements.join)
+        form.head.up.clicked.connect(lambda: self.elements.move_by(-1))
+        form.head.down.clicked.connect(lambda: self.elements.move_by(1))
+        form.head.copy.clicked.connect(self.elements.duplicate)
+        form.head.delete.clicked.connect(self.elements.delete)
+        form.head.series.clicked.connect(self.elements.make_series)
+        outline.several_changed.connect(lambda: form.show_selected(outline.selected))
+        form.head.id_typed.connect(self.id_typed)
+        form.copy_asked.connect(self.copy_asked)
+        self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
+        self.elements.typed.connect(self.flush)
+        self.elements.asked.connect(self.asked)
+        self.elements.delete_asked.connect(self.delete_asked)
+        self.elements.series_asked.connect(self.series_asked)
+        self.elements.selected.connect(self._select)
+        self.problem_steps.selected.connect(self._select)
+        self.problem_steps.repair_asked.connect(self._ask_for_repair)
+        self.problems.close_asked.connect(self.areas.return_keyboard)  # first, else Qt hands it to the page
+        self.problems.close_asked.connect(self.problems.hide)
+        self.new_page.begin_asked.connect(self.begin_asked)
+        self.new_page.given_up.connect(self.close_new)
+
+    def _take_keys(self) -> None:
+        undo, redo, save = self._steps
+        areas = self.areas
+        make_shortcuts(
+            self,
+            {
+                "outline": self.parts.focus_outline, "form": areas.focus_form, "views": areas.focus_pane,
+                "problems": areas.focus_problems, "header": areas.focus_header,
+                "next part": lambda: areas.cycle(1), "part before": lambda: areas.cycle(-1),
+                "find": self.parts.focus_find, "next problem": self._next_problem, "file": areas.switch_to_file,
+                "back": self.back_asked.emit, "add": self.ask_to_add, "duplicate": self.elements.duplicate,
+                "series": self.elements.make_series, "rename": self._rename,
+                "up": lambda: self.elements.move_by(-1), "down": lambda: self.elements.move_by(1),
+                "new": lambda: None if self.stack.currentIndex() else self._ask(self.new_asked),
+                "open": self.header.open_file, "save": save, "undo": undo, "redo": redo, "keys": self.keys.switch,
+            },
+        )  # fmt: skip
+
+    # what is shown
+
+    def show_view(self, view: DesignerView) -> None:
+        """Show a study; only what has changed is made anew."""
+        before, self.view = self.view, view
+        self.show_header(view.header)
+        self.nothing.setVisible(view.form is None)
+        self.parts.setVisible(view.form is not None)
+        self.banner.show_banner(view.banner)
+        if view.form is None:
+            self.nothing.show_studies(view.header.studies)
+            return
+        elsewhere = before.form is None or before.form.path != view.form.path
+        if elsewhere:
+            self.close_prompt(elsewhere=True)
+        self.parts.path.show_form(view.form)
+        self.form.show_form(view.form, read_only=view.header.read_only)
+        self.file.show_file(view.file, scroll=elsewhere, read_only=view.header.read_only)
+        self.problem_steps.show_problems(view.problems, view.form.path)
+        self.outline.duplicate.setEnabled(self.form.head.copy.isEnabled())
+        self.outline.add.setEnabled(not view.header.read_only and not view.form.unreadable)
+        self.outline.tree.rows.movable = not view.header.read_only
+        if self.outline.rows:
+            self.outline.mark(view.form.path)
+
+    def begin_study(self) -> None:
+        """Show the next view at the top: it is of another study."""
+        self.view, self.form.form = DesignerView(), None
+        self.outline.begin()
+        self.problem_steps.begin()
+        self.measures.area.verticalScrollBar().setValue(0)
+
+    def show_header(self, state: HeaderState) -> None:
+        self.header.show_state(state)
+
+    def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
+        self.outline.show_outline(rows, selected)
+
+    def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
+        """Offer the repairs of a problem."""
+        self.problem_steps.show_repairs(row, words)
+
+    def show_new(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
+        self.new_page.card.questions.clear()
+        self.new_page.show_choices(choices, chosen)
+        self.stack.setCurrentWidget(self.new_page)
+        self.new_page.card.questions.title.setFocus()
+
+    def close_new(self) -> None:
+        """Go back to the study."""
+        if self.stack.currentIndex():
+            self.stack.setCurrentIndex(0)
+            self.areas.focus_element()
+
+    def refuse_new(self, sentence: str, free: str = "") -> None:
+        """Say why a study cannot begin so, and offer a short name that is free."""
+        self.new_page.refuse(sentence, free)
+
+    def refuse(self, path: tuple[str | int, ...], sentence: str) -> None:
+        """Say at its field why something was not done."""
+        self.form.refuse(path, sentence)
+
+    def ask_to_delete(self, asked: DeletePrompt) -> None:
+        """Show what names an element, and ask what becomes of it."""
+        made = DeleteCard(asked)
+        made.answered.connect(self.asked)
+        self.show_prompt(made, made.first)
+
+    def show_prompt(self, prompt: Prompt, first: QWidget) -> None:
+        """Show a question in the place; ``first`` takes the keyboard."""
+        self.close_prompt()
+        self.prompt = prompt
+        prompt.answered.connect(lambda _answer: self.close_prompt())
+        prompt.given_up.connect(self.close_prompt)
+        apply_theme_within(prompt, self.theme)
+        self.parts.prompts.addWidget(prompt)
+        self.parts.prompt = prompt
+        first.setFocus()
+
+    def close_prompt(self, *, elsewhere: bool = False) -> None:
+        """Close a question that is open; ``elsewhere`` says that another element is selected from now on."""
+        if self.prompt is not None:
+            closing = self.prompt
+            self.prompt = self.parts.prompt = None
+            held = closing.isAncestorOf(self.focusWidget())
+            remove_widget(closing)
+            if held:  # else Qt hands the keyboard to the rail
+                self.areas.focus_element() if elsewhere else self.areas.return_keyboard()
+
+    def flush(self) -> None:
+        """Hand on what is being typed."""
+        self.form.flush()
+        self.file.editor.flush()
+
+    def _select(self, path: ElementPath) -> None:
+        """Select an element, after what is being typed."""
+        self.selected.emit(self._after_typing(path))
+
+    def _after_typing(self, asked: Any) -> Any:
+        """Hand on what is being typed; return a path or request with the id that the form's element has then."""
+        before = () if self.form.form is None else self.form.form.path
+        self.flush()
+        after = () if self.form.form is None else self.form.form.path
+        return asked if before == after else with_path(asked, before, after)
+
+    def _ask(self, asked: SignalInstance) -> None:
+        self.flush()
+        asked.emit()
+
+    def ask_to_add(self) -> None:
+        """Ask what can be added."""
+        if self.view.form is not None and self.outline.add.isEnabled() and not self.stack.currentIndex():
+            self.flush()
+            self.add_asked.emit()
+
+    def show_addable(self, every: tuple[Addable, ...]) -> None:
+        button = self.outline.add if self.outline.add.isVisible() else self.header
+        self.adding.open(every, button.mapToGlobal(button.rect().topLeft()))
+
+    def _take_asked(self, asked: object) -> None:
+        """Hand on a request, after what is being typed; those of the place itself are done here."""
+        if not (isinstance(asked, SetText | LeaveText) or (isinstance(asked, SetValue) and asked.typing)):
+            asked = self._after_typing(asked)
+        if isinstance(asked, AskSeries):
+            self.series_asked.emit(asked)
+        elif isinstance(asked, GoTo):
+            self._go_to(asked.element, asked.field)
+        else:
+            self.asked.emit(asked)
+
+    def _go_to(self, element: ElementPath, field: ElementPath) -> None:
+        """Select an element and give the keyboard to one of its fields."""
+        self._select(element)
+        self.areas.focus_field(field)
+
+    def show_step(self, several: tuple[ElementPath, ...], said: str, *, fresh: bool) -> None:
+        """Select the elements of a step together, say what it did, and lead to the first text of a new one."""
+        if len(several) > 1:
+            self.outline.select_several(several)
+        if said:
+            say(self, said)
+        beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
+        if fresh and not (several and beside):  # after a copy in an open outline, the keyboard stays there
+            self.parts.show_side("form")
+            self.form.focus_first_text(filled=bool(several))  # a copy has its texts
+
+    def _ask_for_repair(self, row: ProblemRow, words: str) -> None:
+        self.flush()
+        self.repair_asked.emit(row, words)
+
+    def _next_problem(self) -> None:
+        if self.view.form is not None:
+            self.flush()
+            self.problem_steps.open_next()
+
+    def _rename(self) -> None:
+        if self.form.head.id.isVisible() and not self.view.header.read_only:
+            self.form.head.edit_id()
+
+    def show_tab(self, name: str) -> None:
+        """Show a page of the right pane, and give it the keyboard."""
+        self.areas.show_tab(name)
+
+    def enter(self) -> None:
+        """Look again at what there is."""
+        self.entered.emit()
+
+    def leave(self) -> None:
+        """Hand on what is being typed; the draft is written at once."""
+        self.flush()
+        self.left.emit()
+
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        self.flush()
+        parts = [self.nothing, self.header, self.banner, *self.parts.in_order]
+        return go_on(parts, super().focusNextPrevChild, forward=forward)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() != Qt.Key.Key_Escape or not self.banner.close_by_key():
+            super().keyPressEvent(event)
+
+    def wants_narrow_rail(self) -> bool:
+        """Return that form and file need the width."""
+        return True
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.parts.arrange(self.width())
+        self.keys.make_room()

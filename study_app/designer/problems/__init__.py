@@ -1,0 +1,1 @@
+"""Problems and warnings of the open study, and their repairs."""

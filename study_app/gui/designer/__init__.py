@@ -1,1 +1,0 @@
-"""The study designer's place: header, outline, form, file and problems."""

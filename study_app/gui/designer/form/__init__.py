@@ -1,1 +1,0 @@
-"""The form of one element: its rows, and the fields that they are edited in."""

@@ -1,1 +1,0 @@
-"""The tab Measures, and the cards below the other tabs."""

@@ -1,1 +1,0 @@
-"""The outline: its rows, dragging them, and the list of what can be added."""

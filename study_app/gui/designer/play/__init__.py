@@ -1,1 +1,0 @@
-"""Playing from the designer: the buttons of the header, and the line below it."""

@@ -1,0 +1,186 @@
+"""Drafts: unsaved edits, stored within a second.
+
+A draft is one file in the user's data folder, written atomically. If two programs edit one study, each stores the
+other's draft as a version before it writes its own.
+"""
+
+import json
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+from study_app.errors import StoreError
+from study_app.store.atomic import parse_json
+from study_app.store.study_versions import file_key, keep_version, write_whole
+from study_app.user_folder import data_folder
+
+REST_S: Final = 0.25
+"""Time from the first unsaved edit to the writing of a draft [s]."""
+Selection: TypeAlias = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A study's text that is not saved.
+
+    Attributes
+    ----------
+    text : str
+        The text.
+    base : str
+        `content_hash` of the file that was edited; "" if there was none.
+    selected : tuple of str or int
+        The path that was selected.
+    kept_at : str
+        When it was written, as ISO 8601 with the time zone.
+    """
+
+    text: str
+    base: str
+    selected: Selection = ()
+    kept_at: str = ""
+
+
+class Keeper:
+    """Writes the draft of one study at most `REST_S` after an edit, even if edits continue.
+
+    ``others`` counts the drafts of other programs that were stored as versions.
+    """
+
+    def __init__(self, file: Path, base: str) -> None:
+        self.base = base
+        self.others = 0
+        self._file = file
+        self._own: str | None = None
+        self._pending: Draft | None = None
+        self._obsolete = False
+        self._due_s = 0.0
+
+    def take(self, draft: Draft) -> None:
+        """Continue with an existing draft."""
+        self._own = draft.text
+
+    def edited(self, text: str, selected: Selection, now_s: float) -> None:
+        """Note an edit at a time of a monotonic clock [s]."""
+        if self._pending is None:
+            self._due_s = now_s + REST_S
+        self._pending = Draft(text, self.base, selected)
+
+    def write_if_due(self, now_s: float) -> bool:
+        """Write the draft if it is due, or delete one that could not be deleted; return whether it was written.
+
+        Raises
+        ------
+        StoreError
+            It cannot be written or deleted; it stays due.
+        """
+        return (self._pending is None or now_s >= self._due_s) and self.write()
+
+    def write(self) -> bool:
+        """Write a pending draft at once, such as on leaving the view; return whether there was one.
+
+        Raises
+        ------
+        StoreError
+            It cannot be written or deleted; it stays due.
+        """
+        if self._pending is None:
+            if self._obsolete:
+                self._delete()
+            return False
+        other = draft_of(self._file)
+        if other is not None and other.text not in {self._own, self._pending.text}:
+            keep_version(self._file, other.text.encode(), "draft")
+            self.others += 1
+        keep(self._file, self._pending)
+        self._own, self._pending, self._obsolete = self._pending.text, None, False
+        return True
+
+    def saved(self, base: str) -> None:
+        """Delete the draft, whose text was saved. If it cannot be deleted it stays due; `write` reports why.
+
+        The draft of another program stays.
+        """
+        self.base, self._pending, self._obsolete = base, None, True
+        with suppress(StoreError):
+            self._delete()
+
+    def _delete(self) -> None:
+        other = draft_of(self._file)
+        if other is None or other.text == self._own:
+            discard(self._file)
+        self._own, self._obsolete = None, False
+
+
+def keep(file: Path, draft: Draft) -> None:
+    """Write the draft of a study's file.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    path = _draft_file(file)
+    kept = {
+        "file": str(file.resolve()),
+        "base": draft.base,
+        "selected": list(draft.selected),
+        "kept_at": datetime.now(UTC).astimezone().isoformat(timespec="seconds"),
+        "text": draft.text,
+    }
+    write_whole(path, json.dumps(kept, ensure_ascii=False).encode())
+
+
+def draft_of(file: Path) -> Draft | None:
+    """Return the draft of a study's file; None if there is no readable one."""
+    try:
+        kept: Any = parse_json(_draft_file(file).read_bytes())
+        selected = tuple(step for step in kept["selected"] if isinstance(step, str | int))
+        draft = Draft(kept["text"], kept["base"], selected, kept["kept_at"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return draft if all(isinstance(one, str) for one in (draft.text, draft.base, draft.kept_at)) else None
+
+
+def drafted_files() -> tuple[Path, ...]:
+    """Return the files that have a readable draft, sorted."""
+    found: list[Path] = []
+    for kept in draft_files():
+        try:
+            file = Path(parse_json(kept.read_bytes())["file"])
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+        if draft_of(file) is not None:
+            found.append(file)
+    return tuple(sorted(found))
+
+
+def draft_files() -> tuple[Path, ...]:
+    """Return the files of drafts."""
+    return tuple((data_folder() / "drafts").glob("*.json"))
+
+
+def unsaved_files(folder: Path) -> tuple[Path, ...]:
+    """Return the files in a folder that have a draft and were never saved."""
+    whole = folder.resolve()
+    return tuple(file for file in drafted_files() if file.parent == whole and not file.exists())
+
+
+def discard(file: Path) -> None:
+    """Delete the draft of a study's file.
+
+    Raises
+    ------
+    StoreError
+        It cannot be deleted.
+    """
+    try:
+        _draft_file(file).unlink(missing_ok=True)
+    except OSError as error:
+        raise StoreError(f"the draft of {file} cannot be deleted: {error.strerror}") from error
+
+
+def _draft_file(file: Path) -> Path:
+    return data_folder() / "drafts" / f"{file_key(file)}.json"

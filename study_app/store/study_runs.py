@@ -1,0 +1,134 @@
+"""Which contents of a study were run, and by how many sessions."""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+from study_app.errors import StoreError
+from study_app.protocol.source.files import with_liquid_files
+from study_app.store import receipt
+from study_app.store.folders import StudyFolder
+from study_app.store.study_versions import content_hash, keep_content, kept_content
+
+_NAME: Final = re.compile(r"[a-z][a-z0-9]*")
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """The sessions that were run with one content of a study's file, counted by what they were.
+
+    Attributes
+    ----------
+    hash : str
+        ``protocol_hash`` of the content.
+    version : str
+        Its version.
+    sessions, pilots, rehearsals : int
+        How many there are; pilots are marked as such, also those that were played in the study designer and kept;
+        rehearsals are the other sessions on simulated devices.
+    last : str
+        When the newest began, as ISO 8601.
+    receipt : Path or None
+        A receipt that holds the protocol, without its conditions.
+    """
+
+    hash: str
+    version: str
+    sessions: int = 0
+    pilots: int = 0
+    rehearsals: int = 0
+    last: str = ""
+    receipt: Path | None = None
+
+    @property
+    def protocol(self) -> Mapping[str, Any] | None:
+        """The protocol of the receipt; None where it cannot be read any more."""
+        try:
+            held = None if self.receipt is None else receipt.read(self.receipt).get("protocol")
+        except StoreError:
+            return None
+        return held if isinstance(held, dict) else None
+
+
+def runs(results: Path, study: str) -> tuple[Run, ...]:
+    """Return every content of a study that sessions were run with, the newest last.
+
+    Nothing is read but receipts; no sealed key. A receipt that cannot be read is left out (`verify` reports it).
+
+    Parameters
+    ----------
+    results : Path
+        The folder with the studies' folders.
+    study : str
+        The study's name; its pilots and rehearsals are in folders of their own. No session has a name that `check`
+        refuses.
+    """
+    if not _NAME.fullmatch(study):
+        return ()
+    found: dict[str, Run] = {}
+    others = (folder for kind in ("pilot", "rehearsal") for folder in sorted(results.glob(f"{study}-{kind}-*")))
+    for folder in (results / study, results / f"{study}-pilot", *others):
+        for session in StudyFolder(folder).sessions():
+            if (one := run_of(session.receipt)) is not None:
+                run = found.get(one.hash, replace(one, sessions=0, pilots=0, rehearsals=0))
+                found[one.hash] = replace(
+                    run,
+                    sessions=run.sessions + one.sessions,
+                    pilots=run.pilots + one.pilots,
+                    rehearsals=run.rehearsals + one.rehearsals,
+                    last=max(run.last, one.last),
+                )
+    return tuple(sorted(found.values(), key=lambda run: run.last))
+
+
+def run_of(path: Path) -> Run | None:
+    """Return the content that the session of a receipt was run with; None where the receipt cannot be read."""
+    try:
+        return _run(path, path.stat().st_mtime_ns)
+    except (StoreError, OSError):
+        return None
+
+
+@lru_cache(maxsize=4096)
+def _run(path: Path, _changed_ns: int) -> Run:
+    held = receipt.read(path)
+    version = str(held.get("protocol", {}).get("study", {}).get("version", ""))
+    simulated, pilot = bool(held.get("simulated")), bool(held.get("pilot"))
+    counted = (int(not simulated and not pilot), int(pilot), int(simulated and not pilot))
+    return Run(str(held.get("protocol_hash")), version, *counted, str(receipt.began_at(held) or ""), path)
+
+
+def recorded_items(known: Iterable[Run]) -> dict[tuple[str, str], int]:
+    """Return how many sessions of participants were asked each item, by its questionnaire and id."""
+    found: dict[tuple[str, str], int] = {}
+    for run in known:
+        held = run.protocol if run.sessions else None
+        for name, questionnaire in (held or {}).get("questionnaires", {}).items():
+            for item in questionnaire.get("items", ()):
+                found[name, item["id"]] = found.get((name, item["id"]), 0) + run.sessions
+    return found
+
+
+def source_of(run: Run) -> str | None:
+    """Return the text of a content that was run, with its liquid files; None where no copy is kept."""
+    content = kept_content(run.hash)
+    return None if content is None else content.decode("utf-8", "replace")
+
+
+def keep_what_was_run(file: Path, known: Iterable[Run]) -> None:
+    """Keep the file's content where sessions were run with it, before another program can change it.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    try:
+        source = with_liquid_files(file.read_bytes(), file.parent)
+    except OSError:
+        return
+    if any(run.hash == content_hash(source) for run in known):
+        keep_content(source)

@@ -1,1 +1,0 @@
-"""What the study designer shows, as values. No Qt here."""

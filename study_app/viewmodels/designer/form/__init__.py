@@ -1,1 +1,0 @@
-"""The form of an element: its rows, their facts, and how one form differs from the next. No Qt here."""

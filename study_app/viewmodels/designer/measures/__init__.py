@@ -1,1 +1,0 @@
-"""What the tab Measures shows, and the cards below the other tabs."""
