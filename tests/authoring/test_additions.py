@@ -2,11 +2,11 @@
 
 import pytest
 
+from study_app.designer.document.additions import added
 from study_app.designer.document.conversions import left_by, switched
 from study_app.designer.document.edited_study import Study, read
 from study_app.designer.document.initial_values import initial
 from study_app.designer.new_study.new_study import template
-from study_app.designer.outline.additions import added
 from tests.authoring.grown import PROTOCOLS
 
 

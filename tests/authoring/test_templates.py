@@ -8,8 +8,8 @@ from click.testing import CliRunner, Result
 from study_app.cli import commands
 from study_app.designer.document.edited_study import read
 from study_app.designer.document.fields import row_at
-from study_app.designer.document.known_answers import known_answers, simulated
 from study_app.designer.document.writer.refused import Refused
+from study_app.designer.new_study.known_answers import known_answers, simulated
 from study_app.designer.new_study.new_study import Answers, answered, copy_of, template
 from study_app.designer.new_study.templates import FOLDER, QUESTIONS, templates
 from study_app.errors import StudyError
@@ -133,7 +133,7 @@ def test_new_refuses_what_it_cannot_make(words: tuple[str, ...], sentence: str, 
 
 def test_copy_of_a_shipped_study_keeps_its_comments() -> None:
     original = load("rek2024")
-    text = (FOLDER.parents[2] / "protocols" / "rek2024.toml").read_text(encoding="utf-8")
+    text = (FOLDER.parents[3] / "protocols" / "rek2024.toml").read_text(encoding="utf-8")
     copied = copy_of(read(text.encode()), "ours")
     assert copied.protocol is not None
     assert copied.protocol.liquids == original.liquids

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from study_app.designer.document.additions import added
 from study_app.designer.document.edited_study import Study
 from study_app.designer.document.fields import label_of, row_at
 from study_app.designer.document.names import references_to, renamed
@@ -16,7 +17,6 @@ from study_app.designer.document.writer.refused import Refused
 from study_app.designer.document.writer.spans import spans_of
 from study_app.designer.document.writer.splices import Editor, applied
 from study_app.designer.document.writer.values import tables
-from study_app.designer.outline.additions import added
 from study_app.ids import MAX_FROM_TEXT, free_id, id_of
 from study_app.protocol.source.document import Path, entries, frozen, names, value_at
 

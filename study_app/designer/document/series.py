@@ -5,12 +5,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
+from study_app.designer.document.additions import duplicated
 from study_app.designer.document.edited_study import Study
 from study_app.designer.document.fields import Row, refused_at, row_at, rows, why_not
 from study_app.designer.document.names import references_to
 from study_app.designer.document.writer.edits import Edit, Insert, Set
 from study_app.designer.document.writer.refused import Refused
-from study_app.designer.outline.additions import duplicated
 from study_app.ids import MAX_ID, free_id
 from study_app.number_text import MINUS, exact_text, number_of
 from study_app.protocol.source.document import Path, names, value_at

@@ -4,10 +4,10 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Final
 
+from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.initial_values import counted_elements, singular
 from study_app.designer.document.names import ITEMS, uses
-from study_app.designer.outline.elements import title_of
 from study_app.number_text import counted
 from study_app.protocol.source.document import Path, value_at
 from study_app.viewmodels.number_words import exact_duration

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
 from study_app.designer.document.initial_values import singular
 from study_app.designer.document.languages import is_copied
@@ -14,7 +15,6 @@ from study_app.designer.form.element_facts import brief, kind_of, place_words, u
 from study_app.designer.form.facts import FACTS
 from study_app.designer.form.facts.questions import QuestionLines, question_lines
 from study_app.designer.measures.participant_texts import copied_texts, texts_by_language
-from study_app.designer.outline.elements import title_of
 from study_app.designer.outline.outline_rows import FIRST, icon_of
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, Places, entries, places_of, value_at

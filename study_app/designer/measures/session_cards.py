@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.languages import languages_of
 from study_app.designer.document.names import blocks_using
@@ -27,7 +28,6 @@ from study_app.designer.measures.number_cards import (
 from study_app.designer.measures.participant_texts import copied_texts, own_texts, revealing, texts_by_language
 from study_app.designer.measures.planned import Simulated
 from study_app.designer.measures.valid_part import valid_part
-from study_app.designer.outline.elements import title_of
 from study_app.haptics.model.gate import calls_for
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.number_text import counted

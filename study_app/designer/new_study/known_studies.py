@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from study_app.designer.document.edited_study import read
+from study_app.designer.document.elements import study_title
 from study_app.designer.document.fields import row_at
 from study_app.designer.document.names import Document
 from study_app.designer.new_study.new_study import taken_names, template
@@ -17,7 +18,6 @@ from study_app.designer.new_study.template_choices import (
     template_choice,
 )
 from study_app.designer.new_study.templates import templates
-from study_app.designer.outline.elements import study_title
 from study_app.designer.outline.outline_rows import FIRST
 from study_app.designer.place.designer_view import HeaderState, StudyChoice, problems_chip
 from study_app.designer.place.open_study import OpenStudy

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import study_title, title_of
 from study_app.designer.document.fields import row_at, unit_of
-from study_app.designer.document.known_answers import KnownAnswer, known_answers
 from study_app.designer.document.names import Document
+from study_app.designer.new_study.known_answers import KnownAnswer, known_answers
 from study_app.designer.new_study.new_study import Answers
 from study_app.designer.new_study.templates import QUESTIONS
-from study_app.designer.outline.elements import study_title, title_of
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.number_text import counted

@@ -6,13 +6,13 @@ from functools import cache
 from typing import Final
 
 from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import Row, label_of, row_at, rows
 from study_app.designer.document.initial_values import singular
 from study_app.designer.document.languages import languages_of
 from study_app.designer.document.names import named_at
 from study_app.designer.document.schema_nodes import node_at, tags
 from study_app.designer.document.series import number_rows
-from study_app.designer.outline.elements import title_of
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.designer.place.requests import AddElement, AddInstrument, AskSeries, ChangeLanguage, GoTo
 from study_app.designer.problems.finding import found_fields

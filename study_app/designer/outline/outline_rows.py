@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
 
 from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import Element, found, outline, title_of
 from study_app.designer.document.initial_values import singular
 from study_app.designer.form.element_facts import brief
-from study_app.designer.outline.elements import Element, found, outline, title_of
 from study_app.designer.problems.finding import LABEL, FoundField, found_in_elements
 from study_app.number_text import counted
 from study_app.protocol.source.document import Path, entries, names, value_at

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from PySide6.QtCore import QObject, Signal
 
+from study_app.designer.document.elements import title_of
 from study_app.designer.document.writer.edits import Edit, Set, Unset
 from study_app.designer.document.writer.refused import Refused
-from study_app.designer.outline.elements import title_of
 from study_app.designer.participant.playable import NotPlayableError, playable
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.view import DesignerPlace

@@ -7,8 +7,8 @@ from typing import Final
 from PySide6.QtCore import QObject, Qt, QTimer
 
 from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import title_of
 from study_app.designer.measures.valid_part import valid_part
-from study_app.designer.outline.elements import title_of
 from study_app.designer.participant.participant_page import SIZES, ParticipantView, ScreenSize, moment_words, step_words
 from study_app.designer.participant.participant_tab import ParticipantTab
 from study_app.designer.participant.shown_step import (

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
+from study_app.designer.document.additions import added
 from study_app.designer.document.conversions import left_by, switched
 from study_app.designer.document.edited_study import Study
 from study_app.designer.document.fields import label_of, row_at, rows
@@ -12,7 +13,6 @@ from study_app.designer.document.names import renamed
 from study_app.designer.document.short_texts import followed
 from study_app.designer.document.writer.edits import Edit, Insert, Set, Unset
 from study_app.designer.document.writer.refused import Refused
-from study_app.designer.outline.additions import added
 from study_app.designer.place.element_steps import (
     Step,
     add,

@@ -4,7 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from study_app.designer.document.additions import added, duplicated, fitted
 from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import label_of, row_at
 from study_app.designer.document.fragments import pasted
 from study_app.designer.document.initial_values import counted_elements, singular
@@ -23,8 +25,6 @@ from study_app.designer.document.writer.edits import Edit, Insert, Move, Set
 from study_app.designer.document.writer.refused import Refused
 from study_app.designer.form.element_facts import kind_and_title
 from study_app.designer.form.form_rows import step_of
-from study_app.designer.outline.additions import added, duplicated, fitted
-from study_app.designer.outline.elements import title_of
 from study_app.designer.place.prompt_facts import DeletePrompt
 from study_app.designer.place.requests import (
     AddElement,

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Final
 
 from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.elements import study_title
 from study_app.designer.document.undo_stack import History
 from study_app.designer.document.writer.edits import Set
 from study_app.designer.document.writer.refused import Refused
 from study_app.designer.form.form_rows import first_element
 from study_app.designer.new_study.new_study import check_free, copy_of
-from study_app.designer.outline.elements import study_title
 from study_app.designer.outline.outline_rows import FIRST
 from study_app.designer.versions.standing import Standing, check_saving, standing
 from study_app.errors import StoreError

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import Row, label_of
 from study_app.designer.document.series import check_values, number_row, number_rows, titles_with
 from study_app.designer.document.writer.refused import Refused
-from study_app.designer.outline.elements import title_of
 from study_app.designer.place.requests import MakeSeries
 from study_app.number_text import exact_text
 from study_app.protocol.source.document import Path

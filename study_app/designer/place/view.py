@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from study_app.designer.form.element_form import FormCard
 from study_app.designer.measures.measures_page import MeasuresPage
-from study_app.designer.new_study import NewStudyPage, NoStudyCard
+from study_app.designer.new_study.new_study_page import NewStudyPage, NoStudyCard
 from study_app.designer.new_study.template_choices import TemplateChoice
 from study_app.designer.outline.add_list import AddList
 from study_app.designer.outline.addable import Addable

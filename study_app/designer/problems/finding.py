@@ -6,8 +6,8 @@ from functools import lru_cache
 from typing import Final
 
 from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import outline
 from study_app.designer.document.fields import Row, label_of, refused_at, rows
-from study_app.designer.outline.elements import outline
 from study_app.protocol.source.document import Path
 
 SHORTEST: Final = 3

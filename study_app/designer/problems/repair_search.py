@@ -4,8 +4,8 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from study_app.designer.document.additions import additions_for
 from study_app.designer.document.edited_study import Study
-from study_app.designer.outline.additions import additions_for
 from study_app.designer.problems.problem_rows import ProblemRow
 from study_app.designer.problems.repairs import Repair, repairs
 

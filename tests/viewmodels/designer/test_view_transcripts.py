@@ -6,7 +6,9 @@ from typing import Any
 
 import pytest
 
+from study_app.designer.document.additions import additions_for
 from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.elements import outline
 from study_app.designer.document.study_facts import facts
 from study_app.designer.form.element_facts import brief, used_by
 from study_app.designer.form.form_rows import form, position_of
@@ -15,8 +17,6 @@ from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.observers import Asked, Measurable, Observed, Planted
 from study_app.designer.measures.planned import Detectable, Finding, GroupPrecision, Simulated
 from study_app.designer.outline.addable import addable, fields_to_go_to
-from study_app.designer.outline.additions import additions_for
-from study_app.designer.outline.elements import outline
 from study_app.designer.outline.outline_rows import outline_rows
 from study_app.designer.place.file_text import file_text
 from study_app.designer.place.prompt_facts import series_prompt, series_titles

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import Row
 from study_app.designer.form.row_facts import RowFacts
 from study_app.designer.measures.number_cards import UNKNOWN
 from study_app.designer.measures.valid_part import valid_part
-from study_app.designer.outline.elements import title_of
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.protocol.source.document import Path
 
