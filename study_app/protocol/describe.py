@@ -185,7 +185,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         return
     stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
     standards = [one for one in standards_of(protocol, block) if one is not None]
-    levels = sorted(method.asked(stimulus))
+    levels = sorted(method.levels_of(stimulus))
     against = f", standard {', '.join(f'{one:g}' for one in standards)}" if standards else ""
     yield "Design", f"{kind} of {stimulus.vary}{against}: {intervals}"
     name = LEVELS[stimulus.level_kind]

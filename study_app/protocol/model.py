@@ -29,7 +29,7 @@ from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
 from study_app.protocol.table import Body as PageBody
 from study_app.protocol.table import Brief, Description, Id, Language, Localised, Printable, Table, invalid, text_in
-from study_app.protocol.trials.designs import AnyDesign, asked, default_design
+from study_app.protocol.trials.designs import AnyDesign, default_design, question_of
 from study_app.protocol.trials.methods import AnyMethod
 from study_app.protocol.trials.stimuli import Condition, Stimulus
 from study_app.protocol.trials.tasks import Explore, Follow, Reach, Seconds, Task
@@ -422,7 +422,7 @@ class Protocol(Table):
             for block in self.blocks.values()
             if block.design is not None
         }
-        return {name: asked(design, self.study.languages) for name, design in designs.items()}
+        return {name: question_of(design, self.study.languages) for name, design in designs.items()}
 
     def compared_in(self, block_id: str) -> Compared | None:
         """Return what a main block compares, as it says or as follows from its conditions; of other blocks None."""

@@ -47,30 +47,30 @@ class Score(Table):
 
 
 def score(
-    asked: Score, answers: Mapping[str, float | str], bounds: Mapping[str, tuple[float, float] | None]
+    rule: Score, answers: Mapping[str, float | str], bounds: Mapping[str, tuple[float, float] | None]
 ) -> float | None:
     """Return a score; None where an answer that it needs is missing.
 
     ``answers`` are by item the number it was answered with, or the option that was chosen; ``bounds`` its smallest and
     largest answer, for reversed items.
     """
-    if any(name not in answers for name in (*asked.items, *asked.weights_from)):
+    if any(name not in answers for name in (*rule.items, *rule.weights_from)):
         return None
-    chosen = [answers[name] for name in asked.weights_from]
+    chosen = [answers[name] for name in rule.weights_from]
     total = weight_sum = 0.0
-    for name in asked.items:
+    for name in rule.items:
         value = float(answers[name])
-        if name in asked.reverse:
+        if name in rule.reverse:
             ends = bounds.get(name)
             value = -value if ends is None else ends[0] + ends[1] - value
-        weight = float(chosen.count(name)) if asked.weights_from else asked.weights.get(name, 1.0)
+        weight = float(chosen.count(name)) if rule.weights_from else rule.weights.get(name, 1.0)
         total += weight * value
         weight_sum += weight
-    if asked.combine == "mean":
+    if rule.combine == "mean":
         if weight_sum == 0:
             return None
         total /= weight_sum
-    return asked.factor * total + asked.offset
+    return rule.factor * total + rule.offset
 
 
 class Questionnaire(Table):

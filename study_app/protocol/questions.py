@@ -80,8 +80,8 @@ def shown(items: Iterable[Question | ItemView], answers: Mapping[str, Value]) ->
     """
     found: list[str] = []
     for item in items:
-        asked = item.show_if
-        if asked is None or (asked.item in found and asked.item in answers and asked.holds(answers[asked.item])):
+        rule = item.show_if
+        if rule is None or (rule.item in found and rule.item in answers and rule.holds(answers[rule.item])):
             found.append(item.id)
     return tuple(found)
 

@@ -31,8 +31,8 @@ from study_app.protocol.orders.schedule import build_schedule, draw_key
 from study_app.protocol.questions import POINTS
 from study_app.protocol.streams import Draw, Key, draw_secret, stream
 from study_app.protocol.trials.designs import Design, Rated
-from study_app.protocol.trials.methods import Heard
-from study_app.protocol.trials.presentation import arrangement_text, heard_of, next_level
+from study_app.protocol.trials.methods import TrialResult
+from study_app.protocol.trials.presentation import arrangement_text, next_level, trial_result
 from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK, Stimulated
 from study_app.protocol.trials.tracks import design_of, stimulus_of
 from study_app.psychophysics.families import Floats
@@ -108,22 +108,22 @@ def rater(draw: Draw) -> Rater:
     )
 
 
-def rate(items: Iterable[str], felt: TrialFeatures, person: Rater, draw: Draw) -> dict[str, int]:
+def rate(items: Iterable[str], trial: TrialFeatures, person: Rater, draw: Draw) -> dict[str, int]:
     """Return an answer from 1 to 7 for each item id, in the order given."""
-    judged = judgements(items, felt, person, draw)
+    judged = judgements(items, trial, person, draw)
     return {item: min(POINTS, max(1, math.floor(points + 0.5))) for item, points in judged.items()}
 
 
-def judgements(items: Iterable[str], felt: TrialFeatures, person: Rater, draw: Draw) -> dict[str, float]:
+def judgements(items: Iterable[str], trial: TrialFeatures, person: Rater, draw: Draw) -> dict[str, float]:
     """Return what a person would answer to each item id, in the order given: from 1 to 7, or a little beyond."""
     asked = tuple(items)
-    thought = zip(asked, opinions(asked, felt, person), strict=True)
+    thought = zip(asked, opinions(asked, trial, person), strict=True)
     return {item: opinion + person.leaning + person.noise * normal(draw) for item, opinion in thought}
 
 
-def opinions(items: Iterable[str], felt: TrialFeatures, person: Rater) -> list[float]:
+def opinions(items: Iterable[str], trial: TrialFeatures, person: Rater) -> list[float]:
     """Return what a person thinks of each item, from 1 to 7, before leaning and noise make an answer of it."""
-    impression = _impression(felt, person)
+    impression = _impression(trial, person)
     return [OPINIONS[item](impression) if item in OPINIONS else NO_OPINION for item in items]
 
 
@@ -148,46 +148,46 @@ def _rise(value: float, middle: float, width: float) -> float:
     return 0.5 + 0.5 * x / math.sqrt(1 + x * x)
 
 
-def _impression(felt: TrialFeatures, person: Rater) -> _Impression:
-    force = felt.force_mean_n * person.strength
-    resistance = force / max(felt.speed_rms_mps, LEAST_SPEED_MPS) ** 2  # quadratic drag: the same however fast the hand
-    peak = felt.force_peak_n / max(felt.force_mean_n, 0.05)
+def _impression(trial: TrialFeatures, person: Rater) -> _Impression:
+    force = trial.force_mean_n * person.strength
+    resistance = force / max(trial.speed_rms_mps, LEAST_SPEED_MPS) ** 2  # quadratic drag: the same at any speed
+    peak = trial.force_peak_n / max(trial.force_mean_n, 0.05)
     return _Impression(
         present=_rise(force, 0.15, 0.1),
         resisting=_rise(resistance, 25.0, 10.0),
         thick=_rise(resistance, 98.0, 14.0),
-        carried=_rise(felt.push_share, 0.08, 0.04),
+        carried=_rise(trial.push_share, 0.08, 0.04),
         abrupt=_rise(peak, 8.0, 2.0),
-        rough=_rise(felt.roughness_n, 0.15, 0.05),
-        noticed=_rise(felt.delay_s, person.threshold_s, 0.015),
-        bothered=_rise(felt.delay_s, person.threshold_s + 0.03, 0.03),
-        lost=_rise(felt.delay_s, person.threshold_s + 0.08, 0.04),
+        rough=_rise(trial.roughness_n, 0.15, 0.05),
+        noticed=_rise(trial.delay_s, person.threshold_s, 0.015),
+        bothered=_rise(trial.delay_s, person.threshold_s + 0.03, 0.03),
+        lost=_rise(trial.delay_s, person.threshold_s + 0.08, 0.04),
     )
 
 
 OPINIONS: Final[dict[str, Callable[[_Impression], float]]] = {
     # what was felt
-    "feels_liquid": lambda felt: 2.0 + 3.8 * felt.present - 1.5 * felt.rough,
-    "immersive": lambda felt: 3.0 + 2.4 * felt.present - 1.5 * felt.rough,
-    "strength": lambda felt: 2.5 + 3.0 * felt.present - 0.8 * felt.abrupt - 0.5 * felt.rough,
-    "expected": lambda felt: 2.8 + 2.6 * felt.present - 1.2 * felt.abrupt - felt.rough,
-    "like_honey": lambda felt: 1.6 + 4.2 * felt.thick * (1 - felt.carried),
-    "like_water": lambda felt: 1.6 + 4.2 * felt.resisting * (1 - felt.thick) * (1 - 0.4 * felt.carried),
-    "like_slime": lambda felt: 2.2 + 1.8 * felt.thick,
-    "like_oil": lambda felt: 2.6 + 1.2 * (1 - felt.thick),
-    "like_tar": lambda felt: 1.4 + 3.4 * felt.thick * (1 - felt.carried),
+    "feels_liquid": lambda trial: 2.0 + 3.8 * trial.present - 1.5 * trial.rough,
+    "immersive": lambda trial: 3.0 + 2.4 * trial.present - 1.5 * trial.rough,
+    "strength": lambda trial: 2.5 + 3.0 * trial.present - 0.8 * trial.abrupt - 0.5 * trial.rough,
+    "expected": lambda trial: 2.8 + 2.6 * trial.present - 1.2 * trial.abrupt - trial.rough,
+    "like_honey": lambda trial: 1.6 + 4.2 * trial.thick * (1 - trial.carried),
+    "like_water": lambda trial: 1.6 + 4.2 * trial.resisting * (1 - trial.thick) * (1 - 0.4 * trial.carried),
+    "like_slime": lambda trial: 2.2 + 1.8 * trial.thick,
+    "like_oil": lambda trial: 2.6 + 1.2 * (1 - trial.thick),
+    "like_tar": lambda trial: 1.4 + 3.4 * trial.thick * (1 - trial.carried),
     # what was seen
-    "different": lambda felt: 1.8 + 4.4 * felt.noticed,
-    "harder": lambda felt: 1.7 + 3.8 * felt.bothered,
-    "detracts": lambda felt: 1.7 + 3.2 * felt.bothered,
-    "unusable": lambda felt: 1.4 + 2.6 * felt.lost,
-    "comfortable": lambda felt: 6.0 - 1.4 * felt.lost - 0.4 * felt.bothered,
+    "different": lambda trial: 1.8 + 4.4 * trial.noticed,
+    "harder": lambda trial: 1.7 + 3.8 * trial.bothered,
+    "detracts": lambda trial: 1.7 + 3.2 * trial.bothered,
+    "unusable": lambda trial: 1.4 + 2.6 * trial.lost,
+    "comfortable": lambda trial: 6.0 - 1.4 * trial.lost - 0.4 * trial.bothered,
 }
 """Item id → the opinion from 1 to 7; statements that people add get `NO_OPINION`."""
 
 
 def simulate_ratings(
-    items: Sequence[str], felt: Sequence[Sequence[TrialFeatures]], repetitions: int, person: Rater, random: Generator
+    items: Sequence[str], trials: Sequence[Sequence[TrialFeatures]], repetitions: int, person: Rater, random: Generator
 ) -> tuple[Floats, Floats]:
     """Return what one person thinks of each item in a block, and what else is in the answers.
 
@@ -195,7 +195,7 @@ def simulate_ratings(
     ----------
     items : sequence of str
         Ids of the statements.
-    felt : sequence of sequence of TrialFeatures
+    trials : sequence of sequence of TrialFeatures
         What was felt in each condition, of which one trial is drawn each time.
     repetitions : int
         Of each condition.
@@ -209,12 +209,12 @@ def simulate_ratings(
     tuple of array
         Opinions, and leaning with noise, both (repetitions, conditions, items) [points].
     """
-    drawn = random.random((repetitions, len(felt))).tolist()
+    drawn = random.random((repetitions, len(trials))).tolist()
     thought = [
-        [opinions(items, known[int(len(known) * part)], person) for known, part in zip(felt, parts, strict=True)]
+        [opinions(items, known[int(len(known) * part)], person) for known, part in zip(trials, parts, strict=True)]
         for parts in drawn
     ]
-    noise = random.random((repetitions, len(felt), len(items), UNIFORM)).sum(axis=-1) - UNIFORM / 2
+    noise = random.random((repetitions, len(trials), len(items), UNIFORM)).sum(axis=-1) - UNIFORM / 2
     return np.array(thought), person.leaning + person.noise * noise
 
 
@@ -275,13 +275,13 @@ class Comparison:
         delays = {protocol.conditions[name].delay_ms for name in block.conditions}
         return cls(len(delays) > 1, smallest=False, observer=observer)
 
-    def sensed(self, felt: TrialFeatures) -> float:
+    def sensed(self, trial: TrialFeatures) -> float:
         """Return what is attended to: a delay [s], a roughness [N], or a resistance [N·s/m]."""
         if self.vary == FORCE_DELAY:
-            return felt.force_delay_s
+            return trial.force_delay_s
         if self.vary in OF_LINK:
-            return felt.roughness_n
-        return felt.delay_s if self.delays else felt.force_mean_n / max(felt.speed_rms_mps, LEAST_SPEED_MPS)
+            return trial.roughness_n
+        return trial.delay_s if self.delays else trial.force_mean_n / max(trial.speed_rms_mps, LEAST_SPEED_MPS)
 
     def noisy(self, sensed: float, draw: Draw) -> float:
         """Return what the observer takes it for."""
@@ -379,7 +379,7 @@ def simulate_study(
     key = Key(draw_key(protocol, random), draw_secret(random))
     for person, observer in people.items():
         schedule = build_schedule(protocol, person, seed)
-        heard: dict[str, list[Heard]] = {}
+        heard: dict[str, list[TrialResult]] = {}
         sensed_in: dict[str, list[float]] = {}
         for trial in schedule.trials:
             block = protocol.blocks[trial.block]
@@ -393,7 +393,7 @@ def simulate_study(
             given = Comparison.of(protocol, block, observer).answer(protocol, design, sensed, before, draw)
             before += sensed
             what = (trial.number, trial.code, due.level, due.arrangement, str(given))
-            answered.append(heard_of(protocol, block, *what, catch=due.catch))
+            answered.append(trial_result(protocol, block, *what, catch=due.catch))
             yield SimulatedTrial(
                 person, block.id, trial.code, key.codes[block.id][trial.code], trial.number, due.catch,
                 arrangement_text(design, due.arrangement), due.standard, due.level, given, answered[-1].success,

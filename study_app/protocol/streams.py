@@ -74,7 +74,7 @@ def sub_key(secret: bytes, name: str) -> bytes:
     return hmac.digest(secret, name.encode(), "sha256")
 
 
-def keyed_stream(secret: bytes, name: str) -> random.Random:
+def secret_stream(secret: bytes, name: str) -> random.Random:
     """Return the stream of that name; use only its ``.random()``."""
     return random.Random(int.from_bytes(sub_key(sub_key(secret, "levels"), name), "big"))  # noqa: S311 - seeded by a MAC
 
@@ -87,4 +87,4 @@ def group_of(shares: Mapping[str, int], secret: bytes, entry: int) -> str:
     """
     groups = [name for name in sorted(shares) for _ in range(shares[name])]
     block, place = divmod(entry - 1, len(groups))
-    return shuffle(groups, keyed_stream(secret, f"groups/{block + 1}").random)[place]
+    return shuffle(groups, secret_stream(secret, f"groups/{block + 1}").random)[place]

@@ -67,7 +67,7 @@ class Screen:
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class Measurements:
     """What was measured.
 
     ``fresh_share`` is the share of the servo's ticks in which the device had a new sample, ``sample_age_s`` how old the
@@ -133,7 +133,7 @@ class Check:
         return f"{self.verdict:<8} {self.name:<15} {self.said}"
 
 
-def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
+def checks(facts: Measurements, protocol: Protocol) -> tuple[Check, ...]:
     """Return what is to be said of ``facts``, for a session of ``protocol``."""
     return tuple(check for of in (_servo, _levels, _surroundings, _outlets, _costs) for check in of(facts, protocol))
 
@@ -148,7 +148,7 @@ def _warned(name: str, value: str, about: str, advice: str, *, well: bool, share
     return Check(name, "ok" if well else "warning", value, about, "" if well else advice, share)
 
 
-def _servo(facts: Facts, protocol: Protocol) -> Iterator[Check]:
+def _servo(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Say how the device responds, how late its force acts, and how the servo keeps its rate."""
     share = f"{100 * facts.fresh_share:.0f} %"
     about = f"{facts.device}, a new sample on {share} of ticks"
@@ -192,7 +192,7 @@ def _servo(facts: Facts, protocol: Protocol) -> Iterator[Check]:
     yield Check("Priority", verdict, grant.level, f"{grant.how}{memory}", f"{advice}." if advice else "")
 
 
-def _levels(facts: Facts, protocol: Protocol) -> Iterator[Check]:
+def _levels(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Say whether every level can be delivered with the device's delay: the highest one, of blocks with a damper."""
     blocks = [block for block in protocol.blocks_in_order if block.stimulus is not None]
     highest_nspm = max((highest_damping(protocol, block) for block in blocks), default=0.0)
@@ -205,7 +205,7 @@ def _levels(facts: Facts, protocol: Protocol) -> Iterator[Check]:
     yield Check("Levels", "ok" if beyond is None else "failure", value, about, advice)
 
 
-def _surroundings(facts: Facts, protocol: Protocol) -> Iterator[Check]:
+def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Say what of screen, disk, key and videos would make trials invalid, or refuses the session."""
     limit_ms, screen = protocol.limits.delay_error_ms, facts.screen
     seen_ms = (facts.sample_age_s + 1 / max(screen.refresh_hz, 1.0)) * 1e3  # the age of a sample, and a frame
@@ -246,7 +246,7 @@ def _surroundings(facts: Facts, protocol: Protocol) -> Iterator[Check]:
         yield Check("Video", "failure" if fault else "ok", value, facts.video.about, fault)
 
 
-def _outlets(facts: Facts, _protocol: Protocol) -> Iterator[Check]:
+def _outlets(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
     """Say of each outlet who listens, why it does not work, or why a double-blind study has none."""
     for one in facts.outlets:
         if one.withheld:
@@ -265,7 +265,7 @@ def _outlets(facts: Facts, _protocol: Protocol) -> Iterator[Check]:
             yield Check(one.title, "ok", "ready" if one.listens is None else "listener", about)
 
 
-def _costs(facts: Facts, protocol: Protocol) -> Iterator[Check]:
+def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Say what the scenes cost, what is not known of the device, what is withheld, and the row of a square."""
     if facts.tick_s is not None:
         share = facts.tick_s * protocol.device.rate_hz

@@ -14,7 +14,7 @@ from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.offline import law_along
 from study_app.haptics.runtime.telemetry import timing
 from study_app.session.ports import ServoPort
-from study_app.session.preflight import Facts, Screen
+from study_app.session.preflight import Measurements, Screen
 from study_app.store.atomic import probe
 from study_app.store.blinded.blinding import sealed_hash
 
@@ -42,7 +42,7 @@ def measure(
     recordings: bool,
     lasts_s: float,
     sleep: Callable[[float], object] = time.sleep,
-) -> Facts:
+) -> Measurements:
     """Look at a running servo for ``lasts_s`` and at the disk of the study folder ``results``, leaving no trace."""
     law_along(Scene(), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))  # compiled here, not at the end of a trial
     reader = servo.telemetry.reader()
@@ -60,7 +60,7 @@ def measure(
         probe_s = time.perf_counter() - began
     except StoreError as error:
         fault = str(error)
-    return Facts(
+    return Measurements(
         device=device,
         fresh_share=float((samples["fresh"] != 0).mean()) if len(samples) else 0.0,
         timing=timing(samples, servo.rate_hz),

@@ -11,10 +11,10 @@ from study_app.errors import ProtocolError, SessionError
 from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial, build_schedule
-from study_app.protocol.trials.methods import Heard
+from study_app.protocol.trials.methods import TrialResult
 from study_app.store.blinded.blinding import Key, opened
 from study_app.store.journals.journal_events import Event, SessionStarted
-from study_app.store.progress import Progress, heard_in, progress_of
+from study_app.store.progress import Progress, progress_of, trial_results
 from study_app.store.sessions.recovery import sealed_source
 from study_app.store.workstation import recent_protocols
 
@@ -31,7 +31,7 @@ class Start:
 
     step: int = 0
     presented: Mapping[int, int] = field(default_factory=dict)
-    heard: tuple[Heard, ...] = field(default=(), repr=False)
+    heard: tuple[TrialResult, ...] = field(default=(), repr=False)
     invalid: int = 0
 
 
@@ -54,7 +54,7 @@ def resume_at(
     lines = list(lines)
     progress = progress_of(lines)
     step = reached = _next_step(protocol, schedule, progress)
-    heard = () if key is None else heard_in(protocol, opened(lines, key))
+    heard = () if key is None else trial_results(protocol, opened(lines, key))
     if protocol.study.resume == "block" and not exactly:
         within = _within(schedule.steps, step)
         if within is not None:  # to the first trial of its block

@@ -152,7 +152,7 @@ class Runner:
             self._follow(samples)
         running = self._running
         if running is not None and running.frozen:
-            self.post(events.PauseAsked(self._ports.clock(), "program"))
+            self.post(events.PauseRequested(self._ports.clock(), "program"))
         elif running is not None and (outcome := running.outcome()) is not None:
             self.post(self._done(running, outcome))
         elif self._state.phase in {Phase.RESTING, Phase.FEEDBACK} and now_s >= (self._state.until_s or 0.0):
@@ -186,7 +186,7 @@ class Runner:
     def _take(self, event: events.Event) -> None:
         if isinstance(event, events.Stepped) and not self._where()[1]:
             return  # before its first frame and after its end an interval cannot be adjusted
-        if isinstance(event, events.WriteRetried | events.EndAsked) and self._state.stall is not None:
+        if isinstance(event, events.WriteRetried | events.EndRequested) and self._state.stall is not None:
             self._write_again(self._state.stall)
             if isinstance(event, events.WriteRetried):
                 return
@@ -199,7 +199,7 @@ class Runner:
             self._recording.forget()
         if self._carry_out_all(commands, event.at_s):
             self._tell()
-        if isinstance(event, events.EndAsked) and stall is not None:
+        if isinstance(event, events.EndRequested) and stall is not None:
             raise StoreError(
                 f"{stall.reason}; the session's end is not written either: resume it later, or end it then"
             )

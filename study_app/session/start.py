@@ -20,7 +20,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, stream
 from study_app.protocol.orders.sequences import enrolment
 from study_app.protocol.source.files import find
-from study_app.session.preflight import Facts, Masking, Screen
+from study_app.session.preflight import Masking, Measurements, Screen
 from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store import workstation
 from study_app.store.blinded.allocation import check_session
@@ -178,12 +178,12 @@ class Ready:
     """
 
     rig: Rig
-    facts: Facts
+    facts: Measurements
     masking: Masking | None = None
     outlets: Outlets | None = None
     videos: Videos | None = None
 
-    def facts_with(self, refresh_hz: float, scaling: float) -> Facts:
+    def facts_with(self, refresh_hz: float, scaling: float) -> Measurements:
         """Return the facts with those of the outlets and of the screen: its refresh rate and scaling of its pixels."""
         screen = Screen(refresh_hz=refresh_hz, scaling=scaling)
         return replace(self.facts, screen=screen, outlets=self.outlet_statuses)
@@ -223,7 +223,7 @@ def videos_of(chosen: NewSession, study: Protocol, camera: str, rig: Rig) -> Vid
 
 def measured(
     rig: Rig, chosen: NewSession, videos: Videos | None = None, *, sleep: Callable[[float], object] = time.sleep
-) -> Facts:
+) -> Measurements:
     """Return what the pre-flight judges, but for the screen; a ``sleep`` that does not wait cuts it short.
 
     ``videos`` that are not open yet, or failed, are opened.

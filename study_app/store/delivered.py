@@ -13,7 +13,7 @@ import numpy as np
 
 from study_app.haptics.model.layout import FORCE_STEP_N, LIMITER_GLITCH, LIMITER_NORM, LIMITER_SATURATED, SAMPLE
 from study_app.protocol.model import Limits, Protocol
-from study_app.protocol.trials.presentation import Due, presented_condition
+from study_app.protocol.trials.presentation import Presentation, presented_condition
 from study_app.protocol.trials.stimuli import DELAY, DELAYS, FORCE_DELAY, OF_CONDITION, Stimulated
 from study_app.protocol.trials.tasks import AnyTask, Follow
 from study_app.psychophysics.delivery import Times, Vectors, at, damping, difference, lag, motion, share
@@ -93,7 +93,7 @@ def delivered(
     adjusted : bool
         Whether the participant set the varied number meanwhile: then no single value was delivered.
     """
-    samples = _believed(samples)
+    samples = _plausible(samples)
     times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9
     fade_s = protocol.scene.fade_s
     period_s, link = 1 / protocol.device.rate_hz, presented_condition(protocol, presented).link()
@@ -144,7 +144,7 @@ def delivered_error(
     law_n : callable
         Gives the law's forces (m, 3) [N] at times (m,) [s] of positions and velocities (m, 3) of the hand [m, m/s].
     """
-    samples = _believed(samples)
+    samples = _plausible(samples)
     times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9
     moved = motion(times_s, samples["position_m"], 1 / rate_hz, TRUE_HALF_S)
     counted = moved.times_s > fade_s + SETTLED_S
@@ -168,7 +168,7 @@ def _lag_s(times_s: Times, sent_n: Vectors, model_n: Vectors, from_s: float, per
     return None if rows is None else rows * period_s
 
 
-def _believed(samples: Any) -> Any:
+def _plausible(samples: Any) -> Any:
     """Return samples without rejected positions."""
     glitches = samples["limiters"] & LIMITER_GLITCH != 0
     return samples[~glitches] if glitches.any() else samples
@@ -211,7 +211,7 @@ def undelivered(
 
 
 def missed(
-    limits: Limits, due: Due, holds: Sequence[bool], errors_ms: Sequence[float | None], rate_hz: float
+    limits: Limits, due: Presentation, holds: Sequence[bool], errors_ms: Sequence[float | None], rate_hz: float
 ) -> Iterator[str]:
     """Yield the key of the limit that a whole trial breaks: the delays of its intervals do not differ as requested.
 
@@ -219,7 +219,7 @@ def missed(
     ----------
     limits : Limits
         Those of the study.
-    due : Due
+    due : Presentation
         What the trial presented.
     holds : sequence of bool
         Its arrangement: of each interval whether it presented the comparison.

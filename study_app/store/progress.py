@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.methods import Heard
-from study_app.protocol.trials.presentation import arrangement_of, heard_of
+from study_app.protocol.trials.methods import TrialResult
+from study_app.protocol.trials.presentation import arrangement_of, trial_result
 from study_app.protocol.trials.tracks import design_of
 from study_app.store.delivered import Broken, beyond_limits
 from study_app.store.journals import journal_events as events
@@ -250,13 +250,13 @@ def progress_of(lines: Sequence[events.Event]) -> Progress:
     return now
 
 
-def heard_in(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[Heard, ...]:
+def trial_results(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[TrialResult, ...]:
     """Return the answered trials, each at the level that was presented, by number; the last answer counts.
 
     Lines that do not fit the study, or whose sealed fields are not opened, raise KeyError or ValueError.
     """
     started: dict[tuple[int, int], events.TrialStarted] = {}
-    found: dict[int, Heard] = {}
+    found: dict[int, TrialResult] = {}
     for line in lines:
         if isinstance(line, events.TrialStarted):
             started[line.trial, line.attempt] = line
@@ -270,7 +270,7 @@ def heard_in(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[Heard, 
             arrangement = arrangement_of(design_of(protocol, block), start.arrangement)
             answer: Any = line.items[0].value
             of_trial = line.trial, start.code, start.level, arrangement
-            found[line.trial] = heard_of(protocol, block, *of_trial, answer, catch=bool(start.catch))
+            found[line.trial] = trial_result(protocol, block, *of_trial, answer, catch=bool(start.catch))
     return tuple(found[number] for number in sorted(found))
 
 

@@ -30,12 +30,12 @@ UNFINISHED = "unfinished"
 _LIBRARIES = ("numpy", "numba", "pydantic", "PySide6-Essentials", "pyqtgraph", "pyarrow")
 
 # Fields of every receipt; the first lines are also fields of the journal.
-FACTS = (
+COPIED_FIELDS = (
     "participant", "session", "study", "seed", "language", "operator", "simulated", "pilot", "recordings",
     "key_hash", "protocol_hash", "version",
 )  # fmt: skip
 FIELDS = (
-    "format", "status", "reason", "started_at", "ended_at", "resumed", *FACTS, "generator", "versions",
+    "format", "status", "reason", "started_at", "ended_at", "resumed", *COPIED_FIELDS, "generator", "versions",
     "device", "screens", "clock", "protocol",
 )  # fmt: skip
 

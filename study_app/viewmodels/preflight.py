@@ -18,7 +18,7 @@ from study_app.protocol.describe import spread
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.session.preflight import Check, Facts, checks
+from study_app.session.preflight import Check, Measurements, checks
 from study_app.session.resume import resume_at
 from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of
@@ -71,7 +71,7 @@ class PreflightView:
 
 def preflight_view(
     protocol: Protocol,
-    facts: Facts,
+    facts: Measurements,
     found: tuple[Check, ...],
     who: str,
     *,
@@ -150,7 +150,7 @@ RECOMPILES: Final = "Every start compiles again, for up to a minute: set NUMBA_C
 
 
 def computer_checks(
-    facts: Facts, protocol: Protocol, devices: Sequence[Backend], *, cache: Path | None, compiled: int
+    facts: Measurements, protocol: Protocol, devices: Sequence[Backend], *, cache: Path | None, compiled: int
 ) -> tuple[Check, ...]:
     """Return what is to be said of a computer.
 

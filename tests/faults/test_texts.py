@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.study_tables import load_study
-from study_app.session.transitions.events import EndAsked, Note, RepeatAsked
+from study_app.session.transitions.events import EndRequested, Note, RepeatRequested
 from study_app.session.transitions.state import Phase
 from study_app.store.exclusions import exclude, exclusions
 from study_app.store.journals import journal
@@ -37,8 +37,8 @@ def test_a_free_text_survives_journal_tables_and_readers(tmp_path: Path, text: s
     world.start()
     world.until(Phase.TASK)
     world.runner.post(Note(world.clock(), "note", text))
-    world.runner.post(RepeatAsked(world.clock(), f"again: {text}"))
-    world.runner.post(EndAsked(world.clock(), "withdrawn", text))
+    world.runner.post(RepeatRequested(world.clock(), f"again: {text}"))
+    world.runner.post(EndRequested(world.clock(), "withdrawn", text))
     lines = raw(journal.read(world.store.folder.journal))
     assert [line["text"] for line in lines if line["event"] == "note"] == [text]
     assert lines[-1]["reason"] == text

@@ -30,7 +30,7 @@ from study_app.gui.widgets.main_view import Place
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
-from study_app.session.preflight import Facts, Screen, checks
+from study_app.session.preflight import Measurements, Screen, checks
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.viewmodels.devices import devices_shown
 from study_app.viewmodels.home import study_facts
@@ -51,7 +51,7 @@ SCREENS = (
     ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0),
     ScreenShown(2, "DP-1", 1920, 1080, 144.0, 1.0, 527.0, 296.0),
 )
-WELL = Facts(
+WELL = Measurements(
     device="mouse",
     fresh_share=1.0,
     timing=Timing(2000, 1000.0, 6.2e-5, 2e-3, 0),
@@ -110,14 +110,14 @@ def two_screens(monkeypatch: Any) -> None:
     monkeypatch.setattr(settings_view, "screens_shown", lambda: SCREENS)
 
 
-def checked(facts: Facts, **more: Any) -> PreflightView:
+def checked(facts: Measurements, **more: Any) -> PreflightView:
     protocol = load("rek2024")
     now = datetime(2026, 3, 2, 14, 20)
     return preflight_view(protocol, facts, checks(facts, protocol), "Participant P007", now=now, **more)
 
 
 def preflight(
-    qtbot: Any, facts: Facts = WELL, goes_on: tuple[tuple[str, str], ...] = (), **more: Any
+    qtbot: Any, facts: Measurements = WELL, goes_on: tuple[tuple[str, str], ...] = (), **more: Any
 ) -> PreflightWindow:
     made = PreflightWindow(1000.0, **more)
     qtbot.addWidget(made)

@@ -10,7 +10,7 @@ from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
-from study_app.session.preflight import Facts, Screen
+from study_app.session.preflight import Measurements, Screen
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
@@ -20,7 +20,7 @@ from tests.protocol.edited_studies import text_of
 ODD_DELAY_MS = 137.0
 ODD_DENSITY = 1013.7
 
-WELL = Facts(
+WELL = Measurements(
     device="mouse",
     fresh_share=1.0,
     timing=Timing(2000, 1000.0, 1e-4, 2e-3, 0),

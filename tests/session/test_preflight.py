@@ -17,7 +17,7 @@ from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.session import preflight_measurements
-from study_app.session.preflight import Facts, Screen, checks, refused
+from study_app.session.preflight import Measurements, Screen, checks, refused
 from study_app.session.preflight_measurements import measure
 from tests.compiled import needs_servo
 from tests.golden import compare
@@ -110,7 +110,7 @@ def test_both_sides_of_each_limit(pytestconfig: pytest.Config) -> None:
     compare(Path(__file__).parent / "golden" / "preflight.txt", lines, pytestconfig)
 
 
-def measured(results: Path) -> Facts:
+def measured(results: Path) -> Measurements:
     device = ScriptedDevice()
     with device, Servo(device, clock=VirtualClock(), elements=10) as servo:
         return measure(

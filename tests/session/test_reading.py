@@ -21,7 +21,7 @@ from study_app.session.transitions.events import (
     Command,
     ItemShown,
     Reconnected,
-    ResumeAsked,
+    ResumeRequested,
     ShowPage,
     Submitted,
     TaskDone,
@@ -160,7 +160,7 @@ def test_the_rows_of_the_trial_and_of_its_repetition_say_that_the_device_failed(
     world.servo.fault = None
     world.runner.post(AGAIN)
     assert not world.servo.force_is_on
-    world.runner.post(ResumeAsked(world.clock(), "operator"))
+    world.runner.post(ResumeRequested(world.clock(), "operator"))
     assert world.servo.force_is_on
     world.until(Phase.ANSWERING)
     first, again = [row for row in session_tables.trials(world.store.lines) if row["trial"] == number]

@@ -17,7 +17,7 @@ from study_app.protocol.orders.schedule import PageStep, Schedule, Trial, build_
 from study_app.session.pages import PausePage
 from study_app.session.resume import REHEARSED_SCREENS, begun_schedule, find_protocol, is_rehearsal, resume_at
 from study_app.session.start import NewSession, check, open_store, resumed
-from study_app.session.transitions.events import Begin, FadeIn, ResumeAsked, ShowPage, StartTrial, Write
+from study_app.session.transitions.events import Begin, FadeIn, ResumeRequested, ShowPage, StartTrial, Write
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.journals import journal
@@ -65,7 +65,7 @@ def opened_again(resume: str, lines: list[dict[str, Any]]) -> tuple[SessionState
 def begun(resume: str, lines: list[dict[str, Any]]) -> tuple[SessionState, tuple[Any, ...]]:
     """Resume, begin, and be ready where a trial waits for that; return the state and the commands since."""
     state, commands = opened_again(resume, lines)
-    return advance(state, ResumeAsked(101.0, "participant")) if state.phase is Phase.PAUSED else (state, commands)
+    return advance(state, ResumeRequested(101.0, "participant")) if state.phase is Phase.PAUSED else (state, commands)
 
 
 @pytest.mark.parametrize("resume", ["trial", "block"])

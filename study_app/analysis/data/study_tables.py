@@ -60,7 +60,7 @@ from study_app.store.sessions.open_session import Place
 from study_app.store.sites.merged import DASH, Merged, read_merged
 from study_app.store.tables.columns import INTERVALS, SEALED
 from study_app.store.tables.study_files import has_intervals
-from study_app.store.verification.verify_session import Doubt, doubts
+from study_app.store.verification.verify_session import Discrepancy, doubts
 from study_app.store.withdrawals import tombstones
 
 Settings: TypeAlias = Mapping[tuple[str, str], Setting]
@@ -170,7 +170,7 @@ class Study:
     trials: pd.DataFrame
     participants: pd.DataFrame
     exclusions: tuple[Exclusion, ...]
-    doubts: tuple[Doubt, ...] = ()
+    doubts: tuple[Discrepancy, ...] = ()
     decided: Decided = NOTHING_DECIDED
     others: AskedQuestions = NO_QUESTIONS
     answered: pd.DataFrame = field(default_factory=pd.DataFrame)

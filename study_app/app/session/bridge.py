@@ -25,7 +25,15 @@ from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.simulated.observers import Hand
-from study_app.session.transitions.events import Begin, Continue, Event, ForceStopped, PauseAsked, Reconnected, broken
+from study_app.session.transitions.events import (
+    Begin,
+    Continue,
+    Event,
+    ForceStopped,
+    PauseRequested,
+    Reconnected,
+    broken,
+)
 from study_app.store.program_log import DEVICE_FAILED
 from study_app.viewmodels.operator import OperatorView
 
@@ -167,14 +175,14 @@ class SessionBridge(QObject):
         participant, operator = self.participant, self.operator
         shared = participant.screen().name() == operator.screen().name()
         if shared and self.strip is None and participant.isFullScreen() and not (self._gone or self.runner.finished):
-            self._post(PauseAsked(self._now(), "program"))
+            self._post(PauseRequested(self._now(), "program"))
             operator.come_forward()
             operator.show_message(*SCREEN_REMOVED)
 
     @guarded_session_slot
     def _break_off(self) -> None:
         """Pause, so that a trial under way is journalled as interrupted."""
-        self._post(PauseAsked(self._now(), "program"))
+        self._post(PauseRequested(self._now(), "program"))
 
     def fail(self, error: BaseException) -> None:
         """Zero force, then say what failed: to the journal, if it still takes it, and to the operator.

@@ -19,7 +19,14 @@ from study_app.session.pages import Page
 from study_app.session.ports import JournalPort
 from study_app.session.resume import FIRST, Start
 from study_app.session.runner import Runner
-from study_app.session.transitions.events import EndAsked, ForceStopped, Note, PauseAsked, RepeatAsked, ResumeAsked
+from study_app.session.transitions.events import (
+    EndRequested,
+    ForceStopped,
+    Note,
+    PauseRequested,
+    RepeatRequested,
+    ResumeRequested,
+)
 from study_app.store.journals.journal_events import Event, SessionEnded
 from study_app.store.progress import Progress
 from study_app.video.sources import Videos
@@ -241,17 +248,17 @@ class OperatorRequests(QObject):
 
     @guarded_session_slot
     def _resume(self) -> None:
-        self._runner.post(ResumeAsked(self._parts.clock(), "operator"))
+        self._runner.post(ResumeRequested(self._parts.clock(), "operator"))
         if self._strip is not None:
             self._participant.come_forward()
 
     @guarded_session_slot
     def _pause(self) -> None:
-        self._runner.post(PauseAsked(self._parts.clock(), "operator"))
+        self._runner.post(PauseRequested(self._parts.clock(), "operator"))
 
     @guarded_session_slot
     def _repeat(self, reason: str) -> None:
-        self._runner.post(RepeatAsked(self._parts.clock(), reason))
+        self._runner.post(RepeatRequested(self._parts.clock(), reason))
 
     @guarded_session_slot
     def _note(self, text: str) -> None:
@@ -276,7 +283,9 @@ class OperatorRequests(QObject):
 
     @guarded_session_slot
     def _end(self, status: str, reason: str) -> None:
-        self._runner.post(EndAsked(self._parts.clock(), "withdrawn" if status == "withdrawn" else "aborted", reason))
+        self._runner.post(
+            EndRequested(self._parts.clock(), "withdrawn" if status == "withdrawn" else "aborted", reason)
+        )
 
 
 PATIENCE_S = 20.0

@@ -13,7 +13,7 @@ from PySide6.QtCore import QEvent, QObject, QTimer
 
 from study_app.app.session.live_session import LiveSession
 from study_app.errors import StudyError
-from study_app.session.transitions.events import EndAsked, Event, ForceStopped, ResumeAsked
+from study_app.session.transitions.events import EndRequested, Event, ForceStopped, ResumeRequested
 from study_app.session.transitions.state import Phase, SessionState
 
 END_SHOWN_MS: Final = 2500
@@ -45,7 +45,7 @@ class PlayedSession(LiveSession):
         runner.on_change(self._follow)
         self._follow(runner.state)
         if runner.state.phase is Phase.PAUSED and runner.state.held is None:
-            runner.post(ResumeAsked(self.bridge.parts.clock(), "participant"))
+            runner.post(ResumeRequested(self.bridge.parts.clock(), "participant"))
 
     @property
     def status(self) -> str | None:
@@ -63,7 +63,7 @@ class PlayedSession(LiveSession):
         bridge.parts.servo.stop_force()
         try:
             if not bridge.runner.finished:
-                bridge.runner.post(EndAsked(bridge.parts.clock(), "aborted", STOPPED))
+                bridge.runner.post(EndRequested(bridge.parts.clock(), "aborted", STOPPED))
         except StudyError as error:  # it stays unfinished
             log.warning("the played session has no end: %s", error)
         finally:

@@ -19,7 +19,7 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.tasks import Stroke
-from study_app.session.preflight import Facts, checks
+from study_app.session.preflight import Measurements, checks
 from study_app.session.start import NewSession, Ready, measured
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.folders import StudyFolder, locate
@@ -41,7 +41,7 @@ class Asked(NamedTuple):
 class Appraisal:
     """Cost of the most expensive scene of a study, and error of the least accurate; asked one scene after another.
 
-    ``velocity_errors`` are those of `Facts`, None if all is known of the device.
+    ``velocity_errors`` are those of `Measurements`, None if all is known of the device.
     ``withheld`` is the share of each liquid's force that is withheld in the fastest stroke on a device of these
     ``dynamics``, once all are known.
     """
@@ -154,7 +154,7 @@ class Preflight(QObject):
         self.deleteLater()
 
     @property
-    def _facts(self) -> Facts:
+    def _facts(self) -> Measurements:
         found, shown_on = self.appraisal, self._screen()
         return replace(
             self._ready.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()),
@@ -219,7 +219,7 @@ class Preflight(QObject):
 
     def _take(self, found: object) -> None:
         self.measuring = None
-        if isinstance(found, Facts):
+        if isinstance(found, Measurements):
             self._ready = replace(self._ready, facts=found)
             dynamics = _dynamics(found, self._protocol)
             if dynamics != self.appraisal.dynamics:  # the delay has changed since, and with it what is withheld
@@ -250,7 +250,7 @@ def _largest(errors_n: list[float | None]) -> float | None:
     return max(known, default=None) if len(known) == len(errors_n) else None
 
 
-def _dynamics(facts: Facts, protocol: Protocol) -> Dynamics:
+def _dynamics(facts: Measurements, protocol: Protocol) -> Dynamics:
     """Return the device's dynamics, with the delay that the servo uses now where the device measures it."""
     if facts.dynamics.delay_s is None:
         return facts.dynamics

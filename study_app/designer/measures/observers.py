@@ -10,7 +10,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from study_app.protocol.checks.expected_precision import Answered, ThresholdPlan
+from study_app.protocol.checks.expected_precision import ObserverAnswers, ThresholdPlan
 from study_app.psychophysics.families import Floats
 
 OBSERVERS: Final = 400
@@ -100,10 +100,10 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
     stimulus, random = plan.stimulus, np.random.default_rng(SEED)
     u = stimulus.coordinate(threshold)
     medians, course, presented = [], None, []
-    first: Answered | None = None
+    first: ObserverAnswers | None = None
     for _ in range(0, OBSERVERS, AT_ONCE):
         check()
-        answered = plan.answered(np.full(AT_ONCE, u), random, lapses)
+        answered = plan.answers(np.full(AT_ONCE, u), random, lapses)
         medians.append(plan.estimates(answered).medians)
         presented += [one.levels[~np.isnan(one.levels)] for one in answered.tracks]
         if first is None:
@@ -146,7 +146,7 @@ def measurable(
         levels, held = [], []
         for _ in range(0, OBSERVERS, AT_ONCE):
             check()
-            answered = plan.answered(np.full(AT_ONCE, u), random, lapses)
+            answered = plan.answers(np.full(AT_ONCE, u), random, lapses)
             estimates = plan.estimates(answered)
             levels += [stimulus.level_of(one) for one in estimates.medians.tolist()]
             held.append((estimates.lows <= u) & (u <= estimates.highs))
@@ -165,7 +165,7 @@ def _longest(found: list[Planted]) -> tuple[float, float] | None:
     return (best[0].threshold, best[-1].threshold) if best else None
 
 
-def _function(answered: Answered, u: float, at: Floats) -> list[float]:
+def _function(answered: ObserverAnswers, u: float, at: Floats) -> list[float]:
     """Return the function of an observer with threshold ``u`` at some levels [u], were they presented in full."""
     found: list[float] = replace(answered.observers, thresholds=np.array(u), presented=None).probability(at).tolist()
     return found
@@ -181,7 +181,7 @@ def _asked(plan: ThresholdPlan, presented: Floats) -> tuple[tuple[float, float],
     return tuple((plan.stimulus.level_of(u), share) for u, share in zip(places.tolist(), counts.tolist(), strict=True))
 
 
-def _course(plan: ThresholdPlan, answered: Answered, check: Check) -> tuple[tuple[int, Values], ...]:
+def _course(plan: ThresholdPlan, answered: ObserverAnswers, check: Check) -> tuple[tuple[int, Values], ...]:
     """Return the quantiles of the estimates after some numbers of trials."""
     each, tracks = answered.tracks[0].levels.shape[1], len(answered.tracks)
     found: list[tuple[int, Values]] = []
@@ -193,7 +193,7 @@ def _course(plan: ThresholdPlan, answered: Answered, check: Check) -> tuple[tupl
     return tuple(found)
 
 
-def _one(plan: ThresholdPlan, answered: Answered) -> list[Asked]:
+def _one(plan: ThresholdPlan, answered: ObserverAnswers) -> list[Asked]:
     """Return the trials of the first observer, in the order of presentation."""
     tracks = len(answered.tracks)
     each = answered.tracks[0].levels.shape[1]

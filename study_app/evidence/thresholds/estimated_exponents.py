@@ -47,7 +47,7 @@ class KnownExponent:
     @property
     def levels(self) -> tuple[float, ...]:
         """The levels, ascending, in the unit of the varied number."""
-        return tuple(sorted(method_of(self.protocol, self.block).asked(stimulus_of(self.protocol, self.block))))
+        return tuple(sorted(method_of(self.protocol, self.block).levels_of(stimulus_of(self.protocol, self.block))))
 
     @property
     def resistance_exponent(self) -> float:
@@ -69,7 +69,7 @@ def known_exponent(name: str, protocol: Protocol) -> KnownExponent | None:
         if design_of(protocol, block).reply != "number" or stimulus.vary in DELAYS or not isinstance(task, Follow):
             continue
         scene = protocol.scene_for(condition_of(protocol, stimulus))
-        levels = sorted(method_of(protocol, block).asked(stimulus))
+        levels = sorted(method_of(protocol, block).levels_of(stimulus))
         pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
         of_levels = tuple(_resistance(override(scene, stimulus.vary, level), pace_mps) for level in levels)
         return KnownExponent(name, protocol, block, of_levels)

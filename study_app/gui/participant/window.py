@@ -43,7 +43,7 @@ from study_app.session.pages import (
     TaskPage,
     TextPage,
 )
-from study_app.session.transitions.events import Continue, ForceStopped, PauseAsked
+from study_app.session.transitions.events import Continue, ForceStopped, PauseRequested
 
 if TYPE_CHECKING:
     from study_app.session.trial import TankView
@@ -368,7 +368,7 @@ class ParticipantWindow(QWidget):
     def _pause(self) -> None:
         """Pause the session; close the last page."""
         if isinstance(self._page, TextPage | TaskPage | QuestionnairePage | DesignPage | FeedbackPage):
-            self.event.emit(PauseAsked(self._clock(), "participant"))
+            self.event.emit(PauseRequested(self._clock(), "participant"))
         elif isinstance(self._page, EndPage):
             self.close()
 

@@ -105,7 +105,7 @@ def check(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol |
     for of_names in (named.references, kinds, named.sequence, named.groups, named.repeats, *of_items):
         yield from of_names(document)
     parts = draft(document, broken, valid)
-    for of_tables in (targets, liquids, unfelt, equal_liquids, equal_conditions, compares, blocks, counted_parts):
+    for of_tables in (targets, liquids, too_weak, equal_liquids, equal_conditions, compares, blocks, counted_parts):
         yield from of_tables(parts)
 
 
@@ -150,7 +150,7 @@ def liquids(parts: Draft) -> Iterator[Fault]:
                 yield Fault(place[:2], message, "move or enlarge the region, or scene.origin_m")
 
 
-def unfelt(parts: Draft) -> Iterator[Fault]:
+def too_weak(parts: Draft) -> Iterator[Fault]:
     """Check that every condition exerts a force in the fastest stroke of its block's task."""
     for name, block in parts.blocks.items():
         task = parts.tasks.get(block.task)

@@ -235,8 +235,8 @@ def groups(document: Mapping[str, Any]) -> Iterator[Fault]:
 
 def decisions(document: Document) -> Iterator[Fault]:
     """Check that what is decided is about statements there are, each once, and that liquids are named by such items."""
-    asked = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
-    items = {item["id"] for item in asked if isinstance(item.get("id"), str) and "kind" not in item}
+    questions = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
+    items = {item["id"] for item in questions if isinstance(item.get("id"), str) and "kind" not in item}
     decided = {key: list(entries(document, f"analysis.{key}.*")) for key in DECIDED_LISTS}
     for found in (*decided.values(), list(entries(document, "analysis.noticed"))):
         for path, name in found:
@@ -299,30 +299,30 @@ def _show_ifs(table: Document, items: Sequence[tuple[Path, Question]], context: 
     earlier: dict[str, Question] = {}
     ids = [item.id for _, item in items]
     for path, item in items:
-        if (asked := item.show_if) is not None:
+        if (rule := item.show_if) is not None:
             place = (*path, "show_if")
-            if asked.item not in ids:
-                missing = f'there is no item "{asked.item}" in this questionnaire'
-                yield Fault(place, missing, did_you_mean(asked.item, earlier))
-            elif asked.item not in earlier:
-                yield Fault(place, f'"{asked.item}" comes later', "name an earlier item")
+            if rule.item not in ids:
+                missing = f'there is no item "{rule.item}" in this questionnaire'
+                yield Fault(place, missing, did_you_mean(rule.item, earlier))
+            elif rule.item not in earlier:
+                yield Fault(place, f'"{rule.item}" comes later', "name an earlier item")
             elif table.get("item_order", "fixed") != "fixed":
                 hint = 'item_order = "fixed": an item comes after the one that it depends on'
                 yield Fault(place, "item_order is shuffled", hint)
             else:
-                yield from _answers(place, asked, earlier[asked.item], context)
+                yield from _answers(place, rule, earlier[rule.item], context)
         earlier[item.id] = item
 
 
-def _answers(place: Path, asked: ShowIf, earlier: Question, context: Context) -> Iterator[Fault]:
+def _answers(place: Path, rule: ShowIf, earlier: Question, context: Context) -> Iterator[Fault]:
     try:
         levels = list(earlier.levels(context))
     except KeyError:  # its scale, or a text in the language, is missing: another check says so
         levels = []
-    for value in asked.permitted:
+    for value in rule.permitted:
         if levels and str(value) not in levels:
             yield Fault(place, f'"{value}" is not one of its answers', f"these are: {', '.join(levels)}")
         elif earlier.value_type != "text" and isinstance(value, str):
             yield Fault(place, f'"{value}" is not one of its answers', "give a number")
-    if not asked.permitted and earlier.value_type == "text":
-        yield Fault(place, f'the answer to "{asked.item}" is not a number', 'write is = "…"')
+    if not rule.permitted and earlier.value_type == "text":
+        yield Fault(place, f'the answer to "{rule.item}" is not a number', 'write is = "…"')

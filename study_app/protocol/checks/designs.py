@@ -175,7 +175,7 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
         yield from faults
         return
     least, most = stimulus.levels
-    levels = sorted((*method.asked(stimulus), *([most] if block.catch else [])))
+    levels = sorted((*method.levels_of(stimulus), *([most] if block.catch else [])))
     if levels[0] < least * (1 - 1e-9) or levels[-1] > most * (1 + 1e-9):
         beyond = levels[0] if levels[0] < least * (1 - 1e-9) else levels[-1]
         message = f"{beyond:g} is not within the stimulus' levels"
@@ -194,7 +194,7 @@ def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
                 what = f"standard {standard:g} at level {level:g} gives" if standard is not None else "the level"
                 yield Fault(("stimuli", str(block.stimulus), "levels"), f"{what} {value:g}: {why}")
                 return
-    yield from settings(protocol, block)
+    yield from adjustable(protocol, block)
 
 
 def _standard(protocol: Protocol, block: Block, stimulus: Stimulus, standard: float, level: float) -> Fault | None:
@@ -253,7 +253,7 @@ def misfits(protocol: Protocol, block: Block) -> Iterator[Fault]:
         yield Fault((*place, "method"), message, 'design = "adjustment", or method = "constant"')
 
 
-def settings(protocol: Protocol, block: Block) -> Iterator[Fault]:
+def adjustable(protocol: Protocol, block: Block) -> Iterator[Fault]:
     """Yield why a number cannot be set while it is presented, or a standard not be matched."""
     design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
     if not design.adjusts:

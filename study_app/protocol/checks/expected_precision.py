@@ -156,13 +156,13 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
         return SensitivityPlan(design, slots, roving=False, of_each="comparison") if choice else None
     stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
     if design.reply == "number":
-        levels = tuple(sorted({one for one in method.asked(stimulus) if one > 0}))
-        repetitions = method.tracks * method.presentations(stimulus) // len(method.asked(stimulus))
+        levels = tuple(sorted({one for one in method.levels_of(stimulus) if one > 0}))
+        repetitions = method.tracks * method.presentations(stimulus) // len(method.levels_of(stimulus))
         decided = () if protocol.analysis is None else protocol.analysis.published
         exponents = (one.value for one in decided if (one.block, one.measure) == (block.id, "exponent"))
         return EstimationPlan(levels, repetitions, next(exponents, EXPONENT)) if len(levels) > 1 else None
-    if isinstance(design, Rated) and len(method.asked(stimulus)) > 1 and len(standards_of(protocol, block)) == 1:
-        repetitions = method.tracks * method.presentations(stimulus) // len(method.asked(stimulus))
+    if isinstance(design, Rated) and len(method.levels_of(stimulus)) > 1 and len(standards_of(protocol, block)) == 1:
+        repetitions = method.tracks * method.presentations(stimulus) // len(method.levels_of(stimulus))
         return RatingPlan(protocol.scales[design.scale].points, repetitions)
     if design.reply == "choice" and has_correct_answer(design, stimulus) and not rises(stimulus, design):
         roving = len(standards_of(protocol, block)) > 1 and method.order == "interleaved"
@@ -193,7 +193,7 @@ MOST_TRIALS: Final = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Answered:
+class ObserverAnswers:
     """What observers answered in a block, one each: the ``tracks`` of one standard, and counts of other answers.
 
     ``catch`` (2, observers) are correct and incorrect answers to catch trials, which present the highest level,
@@ -229,7 +229,7 @@ class ThresholdPlan:
     def with_trials(self, trials: int) -> ThresholdPlan:
         """Return the plan with so many trials for each standard, rounded to what its method divides them into."""
         method, stimulus = self.method, self.stimulus
-        least = method.tracks * (1 if method.adaptive else len(method.asked(stimulus)))
+        least = method.tracks * (1 if method.adaptive else len(method.levels_of(stimulus)))
         each = max(1, round(trials / least))
         changed = {"trials": each * method.tracks} if method.adaptive else {"repetitions": each}
         catch = round(self.catch * each / max(1, self.trials // least))
@@ -267,7 +267,7 @@ class ThresholdPlan:
         with np.errstate(divide="ignore"):  # a level of 0 has the logarithm −∞
             return np.log10(np.maximum(found, 0.0)) if log else found
 
-    def answered(self, thresholds: Floats, random: Generator, lapses: float = LAPSES) -> Answered:
+    def answers(self, thresholds: Floats, random: Generator, lapses: float = LAPSES) -> ObserverAnswers:
         """Return what observers with thresholds (n,) [u] answer."""
         stimulus, design = self.stimulus, self.design
         assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
@@ -283,12 +283,12 @@ class ThresholdPlan:
             yes += 0 if noise is None else (noise < guess).sum(axis=1)
         caught = observers.probability(high) > random.random((self.catch * len(tracks), len(thresholds)))
         right = caught.sum(axis=0)
-        return Answered(
+        return ObserverAnswers(
             observers, tuple(tracks), np.array([right, len(caught) - right]),
             np.array([yes, noise_trials * len(tracks) - yes]) if noise_trials else None,
         )  # fmt: skip
 
-    def estimates(self, answered: Answered, most: int | None = None) -> Estimates:
+    def estimates(self, answered: ObserverAnswers, most: int | None = None) -> Estimates:
         """Return what the analysis estimates from answers, of each track the first ``most`` if that is given."""
         stimulus, design = self.stimulus, self.design
         tracks = [one if most is None else one.first(most) for one in answered.tracks]
@@ -310,7 +310,7 @@ class ThresholdPlan:
 
     def simulate(self, thresholds: Floats, random: Generator) -> Estimates:
         """Return what the analysis estimates of observers with these thresholds [u]."""
-        return self.estimates(self.answered(thresholds, random))
+        return self.estimates(self.answers(thresholds, random))
 
 
 def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:

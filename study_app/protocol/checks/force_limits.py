@@ -72,10 +72,10 @@ def paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterator[Faul
 def _lagging(protocol: Protocol) -> Iterator[Fault]:
     """Check that the velocity estimator passes a damper at the frequency of each target."""
     velocity, rate_hz = protocol.scene.velocity, protocol.device.rate_hz
-    felt: dict[str, list[Scene]] = {}
+    of_task: dict[str, list[Scene]] = {}
     for block in protocol.blocks.values():
-        felt.setdefault(block.task, []).extend(protocol.scene_for(name) for name in protocol.conditions_in(block.id))
-    for name, scenes in felt.items():
+        of_task.setdefault(block.task, []).extend(protocol.scene_for(name) for name in protocol.conditions_in(block.id))
+    for name, scenes in of_task.items():
         task = protocol.tasks[name]
         laws = {liquid.drag.law for scene in scenes for liquid in scene.liquids}
         if not isinstance(task, Follow) or "linear" not in laws:

@@ -115,8 +115,8 @@ def order_of(protocol: Protocol, block: Block) -> BlockOrder:
         slots = tuple(track.slots for track in tracks_of(protocol, block))
     keys = ("phase", "part", "max_repeats", "min_distance", "repetitions", "break_every", "break_page")
     same = {key: getattr(block, key) for key in keys}
-    asked = protocol.questionnaire_of(block.id)
-    codes, about = block_codes(protocol, block), same | _items(asked)
+    questions = protocol.questionnaire_of(block.id)
+    codes, about = block_codes(protocol, block), same | _items(questions)
     return BlockOrder(id=block.id, codes=codes, order=order, slots=slots, **about)
 
 
@@ -159,7 +159,7 @@ def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, 
     try:
         kept = _KeptProtocol.model_validate(protocol)
         if group is not None and group not in kept.groups:
-            raise _untold("groups", f'there is no group "{group}"')
+            raise _incomplete("groups", f'there is no group "{group}"')
         shown = steps_of(kept, group, session)
         if sessions_differ(kept):
             numbers = numbered_parts(shown, {name: block.part for name, block in kept.blocks.items()})
@@ -171,20 +171,20 @@ def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, 
         forms = kept.questionnaires
         blocks = {}
         for name, block in kept.blocks.items():
-            asked = _items(None if block.questionnaire is None else forms[block.questionnaire])
-            blocks[name] = block.model_copy(update={"id": name, "questionnaire": None, **asked})
+            questions = _items(None if block.questionnaire is None else forms[block.questionnaire])
+            blocks[name] = block.model_copy(update={"id": name, "questionnaire": None, **questions})
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        raise _untold(".".join(str(step) for step in first["loc"]), first["msg"]) from error
+        raise _incomplete(".".join(str(step) for step in first["loc"]), first["msg"]) from error
     except KeyError as error:
-        raise _untold("questionnaires", f"there is no {error}") from error
+        raise _incomplete("questionnaires", f"there is no {error}") from error
     for block in blocks.values():
         if block.order != "constrained":
             continue
         constraint = Constraint(block.max_repeats, block.min_distance)
         if (impossible := constraint.impossible(len(block.codes), block.repetitions)) is not None:
             key, sentence = impossible
-            raise _untold(f"blocks.{block.id}.{key}", sentence)
+            raise _incomplete(f"blocks.{block.id}.{key}", sentence)
     steps: dict[str, BlockOrder | FormOrder] = {
         name: FormOrder(name, **_items(form)) for name, form in kept.questionnaires.items()
     }
@@ -192,14 +192,14 @@ def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, 
     return Orders(kept.study.name, tuple(steps.get(step, step) for step in shown))
 
 
-def _items(asked: Questionnaire | _KeptQuestionnaire | None) -> dict[str, Any]:
+def _items(questions: Questionnaire | _KeptQuestionnaire | None) -> dict[str, Any]:
     """Return the ids of what is asked, and their order."""
-    if asked is None:
+    if questions is None:
         return {"items": (), "item_order": "fixed"}
-    return {"items": tuple(item.id for item in asked.items), "item_order": asked.item_order}
+    return {"items": tuple(item.id for item in questions.items), "item_order": questions.item_order}
 
 
-def _untold(place: str, what: str) -> StudyError:
+def _incomplete(place: str, what: str) -> StudyError:
     return StudyError(
         f"the receipt's protocol does not state the orders ({place}: {what}): it was changed, or written by another "
         "version of the program; restore it from a copy"

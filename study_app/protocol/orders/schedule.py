@@ -161,9 +161,9 @@ def codes_of(study: str, block: BlockOrder, participant: str, seed: int, row_of:
             return tuple(codes[number] for number in row(square, len(codes), taken, times))
 
 
-def _shuffled(asked: BlockOrder | FormOrder, seed: int, name: str) -> tuple[str, ...]:
+def _shuffled(step: BlockOrder | FormOrder, seed: int, name: str) -> tuple[str, ...]:
     """Return the ids of what is asked in the order of presentation."""
-    return asked.items if asked.item_order == "fixed" else shuffle(asked.items, stream(seed, f"items/{name}").random)
+    return step.items if step.item_order == "fixed" else shuffle(step.items, stream(seed, f"items/{name}").random)
 
 
 def draw_key(protocol: Protocol, draw: Draw) -> Key:

@@ -357,7 +357,7 @@ LEAST: Final = 1e-9
 """An estimate is above 0, and no estimate is smaller."""
 
 
-def asked(design: Design, languages: Sequence[str]) -> Questionnaire:
+def question_of(design: Design, languages: Sequence[str]) -> Questionnaire:
     """Return what a design asks, in the program's own words where it has none."""
     text: Localised = design.question or {
         language: words(language).design_questions[design.wording] for language in languages

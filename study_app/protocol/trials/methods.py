@@ -61,7 +61,7 @@ class TrackSetting:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Heard:
+class TrialResult:
     """One answered trial: its last attempt, confirmed; never printed, since it reveals a level.
 
     ``success`` is whether the answer was correct, for yes–no whether it was yes, "comparison chosen" where no answer is
@@ -111,11 +111,11 @@ class Method(Table):
         """Return how many comparisons one track presents at most."""
 
     @abstractmethod
-    def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
+    def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
         """Return levels that include the smallest and the largest that it can present."""
 
     @abstractmethod
-    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
+    def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
         """Return the level of a track's comparison ``number`` (from 0), where the track has not ended.
 
         ``heard`` are the track's earlier answers in the order of presentation, ``draws`` secret uniform numbers in
@@ -126,7 +126,7 @@ class Method(Table):
         """Return what is assumed about the psychometric function of its answers."""
         return assumed_for(stimulus, design)
 
-    def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
+    def ended(self, track: TrackSetting, heard: Sequence[TrialResult]) -> bool:
         """Return whether a track has ended with these answers, before its last trial."""
         return False
 
@@ -181,7 +181,7 @@ class Adaptive(Method):
     def presentations(self, stimulus: Stimulus) -> int:
         return self.trials // self.tracks
 
-    def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
+    def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
         return stimulus.grid
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
@@ -201,11 +201,11 @@ class Adaptive(Method):
         """Return the first level of a track (from 1) as it is written; None: the method's own."""
         return self.begin[track - 1] if isinstance(self.begin, tuple) else self.begin
 
-    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
+    def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
         return self.after(track, heard)
 
     @abstractmethod
-    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
+    def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
         """Return the level after these answers."""
 
 
@@ -232,7 +232,7 @@ class Adjustment(Method):
         default=60, description="Longest time for a setting [s]."
     )
 
-    def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
+    def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
         return stimulus.levels
 
     def presentations(self, stimulus: Stimulus) -> int:
@@ -241,7 +241,7 @@ class Adjustment(Method):
     def rounds(self, stimulus: Stimulus) -> int:
         return self.repetitions
 
-    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
+    def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
         """Return the level at which setting ``number`` starts: earlier settings change nothing."""
         low, high = track.stimulus.domain
         first_at_low = draws[0]() < 0.5
@@ -325,21 +325,21 @@ class Constant(Method):
         default=20, description="How often each level is presented."
     )
 
-    def asked(self, stimulus: Stimulus) -> tuple[float, ...]:
+    def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
         return stimulus.spaced(self.levels) if isinstance(self.levels, int) else self.levels
 
     def presentations(self, stimulus: Stimulus) -> int:
-        return len(self.asked(stimulus)) * self.repetitions
+        return len(self.levels_of(stimulus)) * self.repetitions
 
     def rounds(self, stimulus: Stimulus) -> int:
         return self.repetitions
 
-    def level(self, track: TrackSetting, number: int, heard: Sequence[Heard], draws: Sequence[Draw]) -> float:
-        levels = self.asked(track.stimulus)
+    def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
+        levels = self.levels_of(track.stimulus)
         return shuffle(levels, draws[number // len(levels)])[number % len(levels)]
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
-        levels = [track.stimulus.coordinate(level) for level in self.asked(track.stimulus)]
+        levels = [track.stimulus.coordinate(level) for level in self.levels_of(track.stimulus)]
         draws = random.random((len(observers.thresholds), len(levels) * self.repetitions))
         return constant_tracks(levels, self.repetitions, observers, draws)
 
@@ -395,14 +395,14 @@ class QuestPlus(Adaptive):
     def target(self, guess: float | None, success: str) -> str | None:
         return None if guess is None else f"threshold at {50 * (1 + guess):.3g} % {success}"
 
-    def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
+    def ended(self, track: TrackSetting, heard: Sequence[TrialResult]) -> bool:
         if self.stop is None or sum(not one.noise for one in heard) < self.stop.after:
             return False
         search, counts = self._search(track), self._counts(track, heard)
         interval = fit(search.levels, *counts, search.grid).interval
         return ratio_in_u(track.stimulus, *interval) <= self.stop.ratio
 
-    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
+    def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
         """Return the level after these answers: their order does not matter."""
         levels = _levels(track)
         if all(one.noise for one in heard) and (first := self.first(track.number)) is not None:
@@ -429,7 +429,7 @@ class QuestPlus(Adaptive):
         grid = running_grid(stimulus, design, self.assumed(stimulus, design), self.lapses)
         return Search(grid, _coordinates(track), self.learn, design.has_noise)
 
-    def _counts(self, track: TrackSetting, heard: Sequence[Heard]) -> tuple[list[int], list[int]]:
+    def _counts(self, track: TrackSetting, heard: Sequence[TrialResult]) -> tuple[list[int], list[int]]:
         coordinates = _coordinates(track)
         counts = ([0] * len(coordinates), [0] * len(coordinates))
         for (level, success), number in Counter((one.level, bool(one.success)) for one in heard).items():
@@ -511,14 +511,14 @@ class UpDown(Adaptive):
     target_percent = property(lambda self: 100 * converges_to(int(self.rule[0]), self._ratio))
     _ratio = property(lambda self: RATIOS[int(self.rule[0])] if self.ratio is None else self.ratio)
 
-    def ended(self, track: TrackSetting, heard: Sequence[Heard]) -> bool:
+    def ended(self, track: TrackSetting, heard: Sequence[TrialResult]) -> bool:
         if self.stop is None:
             return False
         answers = _answers(track, heard)
         reversals = self.staircase(track.stimulus, track.number).reversals(answers)
         return len(answers) >= self.stop.after and len(reversals) >= self.stop.reversals
 
-    def after(self, track: TrackSetting, heard: Sequence[Heard]) -> float:
+    def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
         """Return the level after these answers: a step from the last one, or that one again."""
         low, high = track.stimulus.levels
         u = self.staircase(track.stimulus, track.number).next(_answers(track, heard))
@@ -552,7 +552,7 @@ class UpDown(Adaptive):
         )
 
 
-def _answers(track: TrackSetting, heard: Sequence[Heard]) -> list[Answer]:
+def _answers(track: TrackSetting, heard: Sequence[TrialResult]) -> list[Answer]:
     """Return the answers to comparisons, with their levels in u: noise trials move no track."""
     return _in_u(track.stimulus, [(one.level, bool(one.success)) for one in heard if not one.noise])
 

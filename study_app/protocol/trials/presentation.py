@@ -11,9 +11,9 @@ from study_app.haptics.model.scene import Scene
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Condition, Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.streams import Draw, Key, keyed_stream, shuffle, stream
+from study_app.protocol.streams import Draw, Key, secret_stream, shuffle, stream
 from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.methods import Heard, TrackSetting
+from study_app.protocol.trials.methods import TrackSetting, TrialResult
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated
 from study_app.protocol.trials.tracks import (
     Track,
@@ -96,7 +96,7 @@ STANDARD_ALONE: Final = 1
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Due:
+class Presentation:
     """What a trial presents; never printed.
 
     ``level`` is 0 where only the standard is presented, None where conditions are compared; ``arrangement`` is which of
@@ -110,7 +110,9 @@ class Due:
     catch: bool = False
 
 
-def next_level(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, heard: Sequence[Heard]) -> Due | None:
+def next_level(
+    protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, heard: Sequence[TrialResult]
+) -> Presentation | None:
     """Return what a trial presents; None where its track has ended or its block met its criterion: it is passed over.
 
     The trial is of a block with a design; participant and seed of the schedule name the draws. Of the answered trials,
@@ -127,10 +129,10 @@ def next_level(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, h
     design = design_of(protocol, block)
     if design.first is not None:
         if trial.index == 1:
-            return due_of(protocol, block, track, 0, design.first.level)
+            return presentation_of(protocol, block, track, 0, design.first.level)
         slot -= 1
     if track.comparison is not None:  # conditions are compared
-        return due_of(protocol, block, track, draws.arrangement(design, slot), None)
+        return presentation_of(protocol, block, track, draws.arrangement(design, slot), None)
     method, stimulus = method_of(protocol, block), stimulus_of(protocol, block)
     setting = TrackSetting(stimulus, design, track.number)
     answered = sorted((one for one in earlier if one.trial in numbers and not one.catch), key=lambda one: one.trial)
@@ -139,17 +141,17 @@ def next_level(protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, h
     catch = draws.catch(track.catch)
     if slot in catch:
         arrangement = draws.arrangement(design, catch.index(slot), "catch")
-        return due_of(protocol, block, track, arrangement, stimulus.levels[1], catch=True)
+        return presentation_of(protocol, block, track, arrangement, stimulus.levels[1], catch=True)
     slot -= sum(one < slot for one in catch)
     noise = draws.noise(design.noise(method.presentations(stimulus)), track.slots - len(catch))
     if slot in noise:
-        return due_of(protocol, block, track, STANDARD_ALONE, 0.0)
+        return presentation_of(protocol, block, track, STANDARD_ALONE, 0.0)
     rounds = draws.rounds(method.rounds(stimulus))
     level = method.level(setting, slot - sum(one < slot for one in noise), answered, rounds)
-    return due_of(protocol, block, track, draws.arrangement(design, slot), level)
+    return presentation_of(protocol, block, track, draws.arrangement(design, slot), level)
 
 
-def criterion_met(block: Block, schedule: Schedule, heard: Sequence[Heard]) -> bool:
+def criterion_met(block: Block, schedule: Schedule, heard: Sequence[TrialResult]) -> bool:
     """Return whether so many of a block's last answers among those ``heard`` were correct that it ends."""
     if block.until is None:
         return False
@@ -172,29 +174,29 @@ class _Draws:
         count = len(design.arrangements)
         run, place = divmod(slot, 2 * count)
         twice: tuple[int, ...] = (*range(count), *range(count))
-        return shuffle(twice, keyed_stream(self.secret, f"{among}/{self.track}/{run}").random)[place]
+        return shuffle(twice, secret_stream(self.secret, f"{among}/{self.track}/{run}").random)[place]
 
     def catch(self, stretches: Sequence[range]) -> tuple[int, ...]:
         """Return the slots of the catch trials, ascending: one of each stretch."""
-        draw = keyed_stream(self.secret, f"catch/{self.track}").random
+        draw = secret_stream(self.secret, f"catch/{self.track}").random
         return tuple(stretch[int(draw() * len(stretch))] for stretch in stretches)
 
     def noise(self, count: int, slots: int) -> tuple[int, ...]:
         """Return the slots that present the standard alone, ascending."""
-        order = shuffle(range(slots), keyed_stream(self.secret, f"noise/{self.track}").random)
+        order = shuffle(range(slots), secret_stream(self.secret, f"noise/{self.track}").random)
         return tuple(sorted(order[:count]))
 
     def rounds(self, count: int) -> list[Draw]:
-        return [keyed_stream(self.secret, f"round/{self.track}/{number}").random for number in range(count)]
+        return [secret_stream(self.secret, f"round/{self.track}/{number}").random for number in range(count)]
 
 
-def due_of(
+def presentation_of(
     protocol: Protocol, block: Block, track: Track, arrangement: int, level: float | None, *, catch: bool = False
-) -> Due:
+) -> Presentation:
     """Return what a trial of a track presents at a level (None: conditions are compared), in an arrangement."""
     presented = design_of(protocol, block).arrangements[arrangement]
     intervals = tuple(_interval(protocol, block, track, level if holds else None, holds) for holds in presented)
-    return Due(level, track.standard, arrangement, intervals, catch)
+    return Presentation(level, track.standard, arrangement, intervals, catch)
 
 
 def _interval(protocol: Protocol, block: Block, track: Track, level: float | None, comparison: bool) -> Stimulated:
@@ -207,7 +209,9 @@ def _interval(protocol: Protocol, block: Block, track: Track, level: float | Non
     return Stimulated(condition, stimulus.vary, stimulus.comparison(track.standard, level))
 
 
-def presented_by(protocol: Protocol, codes: Mapping[str, Mapping[str, str]], started: Mapping[str, Any]) -> Due:
+def presented_by(
+    protocol: Protocol, codes: Mapping[str, Mapping[str, str]], started: Mapping[str, Any]
+) -> Presentation:
     """Return what a trial presented, from the line on its beginning whose sealed fields are opened.
 
     A line, or a key, that does not fit the study raises KeyError, ValueError (its arrangement) or StopIteration (its
@@ -216,10 +220,10 @@ def presented_by(protocol: Protocol, codes: Mapping[str, Mapping[str, str]], sta
     block = protocol.blocks[started["block"]]
     track = track_of(protocol, block, codes[block.id][started["code"]])
     arrangement = arrangement_of(design_of(protocol, block), started["arrangement"])
-    return due_of(protocol, block, track, arrangement, started["level"], catch=started.get("catch", False))
+    return presentation_of(protocol, block, track, arrangement, started["level"], catch=started.get("catch", False))
 
 
-def heard_of(
+def trial_result(
     protocol: Protocol,
     block: Block,
     trial: int,
@@ -229,10 +233,10 @@ def heard_of(
     answer: str,
     *,
     catch: bool = False,
-) -> Heard:
+) -> TrialResult:
     """Return the answer to a trial of a block with a design, at the level (None: conditions are compared)."""
     design = design_of(protocol, block)
     stimulus = None if block.stimulus is None else stimulus_of(protocol, block)
     correct = design.is_correct(arrangement, answer) if has_correct_answer(design, stimulus) else None
     success, noise = design.success(arrangement, answer), not any(design.arrangements[arrangement])
-    return Heard(trial, code, level or 0.0, success, correct, catch, noise)
+    return TrialResult(trial, code, level or 0.0, success, correct, catch, noise)

@@ -108,7 +108,7 @@ def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
     if block.stimulus is None:
         return ()
     stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
-    asked = sorted({*(stimulus.grid if method.adaptive else ()), *method.asked(stimulus)})
+    asked = sorted({*(stimulus.grid if method.adaptive else ()), *method.levels_of(stimulus)})
     scene, hand_mps = protocol.scene_for(condition_of(protocol, stimulus)), hand_mps_of(protocol, block)
     return tuple(
         _level(stimulus, scene, hand_mps, standard, level)
@@ -140,7 +140,7 @@ def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
     if block.stimulus is None:
         return None
     stimulus, standards = stimulus_of(protocol, block), standards_of(protocol, block)
-    scene, asked = protocol.scene_for(condition_of(protocol, stimulus)), method_of(protocol, block).asked(stimulus)
+    scene, asked = protocol.scene_for(condition_of(protocol, stimulus)), method_of(protocol, block).levels_of(stimulus)
     most = max(stimulus.comparison(standard, level) for standard, level in product(standards, (0.0, *asked)))
     if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1 or most <= 0:
         return None
@@ -201,7 +201,7 @@ def ends(protocol: Protocol, block: Block) -> Iterator[tuple[float | None, float
     stimulus = stimulus_of(protocol, block)
     if stimulus.vary == DELAY:
         return
-    asked = method_of(protocol, block).asked(stimulus)
+    asked = method_of(protocol, block).levels_of(stimulus)
     scene = protocol.scene_for(condition_of(protocol, stimulus))
     for standard, level in product(standards_of(protocol, block), (max(asked), min(asked))):
         varied = scene

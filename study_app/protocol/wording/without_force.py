@@ -16,7 +16,7 @@ from study_app.protocol.model import Protocol
 
 SENTENCES: Final[Mapping[str, str]] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 _PATTERNS: Final = tuple(
-    (re.compile(r"\s+".join(map(re.escape, felt.split()))), seen) for felt, seen in SENTENCES.items()
+    (re.compile(r"\s+".join(map(re.escape, pattern.split()))), seen) for pattern, seen in SENTENCES.items()
 )
 
 
@@ -38,6 +38,6 @@ def _seen(text: Any) -> Any:
     """Return a localised text without its sentences about force."""
     if isinstance(text, Mapping):
         return {language: _seen(one) for language, one in text.items()}
-    for felt, seen in _PATTERNS if isinstance(text, str) else ():
-        text = felt.sub(seen, text)
+    for pattern, seen in _PATTERNS if isinstance(text, str) else ():
+        text = pattern.sub(seen, text)
     return text

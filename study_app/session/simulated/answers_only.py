@@ -38,7 +38,7 @@ from study_app.session.transitions.events import (
     Continue,
     Event,
     Finish,
-    ResumeAsked,
+    ResumeRequested,
     ShowPage,
     StartTrial,
     Stepped,
@@ -186,7 +186,7 @@ class Answering(SimulatedParticipant):
                 case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
                 case PausePage():  # before the trial that a resumed session goes on with
-                    self._post(ResumeAsked(self._time.seconds, "participant"))
+                    self._post(ResumeRequested(self._time.seconds, "participant"))
                 case _:
                     raise SessionError(f"the session failed at {self.page}")
 

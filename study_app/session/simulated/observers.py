@@ -77,8 +77,8 @@ class SensedTrial:
 
     def clear(self) -> None:
         """Forget what came so far."""
-        for came in (self.forces_n, self.velocities_mps, self.ages_s):
-            came.clear()
+        for samples in (self.forces_n, self.velocities_mps, self.ages_s):
+            samples.clear()
 
     def features(self) -> TrialFeatures:
         """Return the features that an opinion is made of."""

@@ -48,7 +48,7 @@ from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_proto
 from study_app.session.runner import Runner
 from study_app.session.simulated.observers import Draw, SensedTrial, hand_for, reading_s, rest
 from study_app.session.simulated.participant import LOOK_AT_SETTING_S, AdjustingObserver, SimulatedParticipant
-from study_app.session.transitions.events import Begin, Continue, Event, ResumeAsked, Stepped, Submitted
+from study_app.session.transitions.events import Begin, Continue, Event, ResumeRequested, Stepped, Submitted
 from study_app.session.trial import TankView
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.blinding import Key
@@ -172,7 +172,7 @@ class RehearsedSession(SimulatedParticipant):
         """Go from the first page to the last."""
         self._post(Begin(self._now_s()))
         if isinstance(self.page, PausePage):  # before the trial that a resumed session goes on with
-            self._post(ResumeAsked(self._now_s(), "participant"))
+            self._post(ResumeRequested(self._now_s(), "participant"))
         while not self._runner.finished:
             match self.page:
                 case TextPage() as page:

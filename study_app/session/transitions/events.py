@@ -204,14 +204,14 @@ class TimeUp(_Timed):
 
 
 @dataclass(frozen=True, slots=True)
-class PauseAsked(_Timed):
+class PauseRequested(_Timed):
     """Esc, the operator's pause, or the program's when it is ended from outside or stood still."""
 
     by: Literal["participant", "operator", "program"]
 
 
 @dataclass(frozen=True, slots=True)
-class ResumeAsked(_Timed):
+class ResumeRequested(_Timed):
     """The pause ends; an interrupted trial starts again. Only the operator resumes what the operator stopped."""
 
     by: Literal["participant", "operator"]
@@ -233,14 +233,14 @@ class Note(_Timed):
 
 
 @dataclass(frozen=True, slots=True)
-class RepeatAsked(_Timed):
+class RepeatRequested(_Timed):
     """The operator wants the running trial again, with a reason."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
-class EndAsked(_Timed):
+class EndRequested(_Timed):
     """The operator ends the session early, or the participant does not consent."""
 
     status: Literal["withdrawn", "aborted"]
@@ -294,12 +294,12 @@ Event: TypeAlias = (
     | Stepped
     | Submitted
     | TimeUp
-    | PauseAsked
-    | ResumeAsked
+    | PauseRequested
+    | ResumeRequested
     | ForceStopped
     | Note
-    | RepeatAsked
-    | EndAsked
+    | RepeatRequested
+    | EndRequested
     | Broke
     | Reconnected
     | WriteFailed

@@ -11,18 +11,18 @@ from study_app.session.transitions.events import (
     Begin,
     Broke,
     Continue,
-    EndAsked,
+    EndRequested,
     FadeIn,
     Finish,
     ForceStopped,
     LanguageChosen,
     LeaveTask,
     Note,
-    PauseAsked,
+    PauseRequested,
     Reconnected,
-    RepeatAsked,
+    RepeatRequested,
     Rest,
-    ResumeAsked,
+    ResumeRequested,
     Stepped,
     StopForce,
     StopTrial,
@@ -158,14 +158,14 @@ def end_feedback(state: SessionState, event: TimeUp) -> Result:
     return (state, ()) if before_end(state, event.at_s) else enter(state, state.index + 1, at_s=event.at_s)
 
 
-def pause(state: SessionState, event: PauseAsked) -> Result:
+def pause(state: SessionState, event: PauseRequested) -> Result:
     """Show the pause; a task under way is over as an attempt."""
     held: Hold | None = "pause" if event.by == "operator" else None
     paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, held=held)
     return paused, (*break_off(state), Write(journal.Paused(by=event.by)), WriteTables(), show(paused))
 
 
-def pause_again(state: SessionState, event: PauseAsked) -> Result:
+def pause_again(state: SessionState, event: PauseRequested) -> Result:
     """Let the operator take over the participant's pause; else do nothing."""
     if event.by != "operator" or state.held is not None:
         return state, ()
@@ -173,7 +173,7 @@ def pause_again(state: SessionState, event: PauseAsked) -> Result:
     return paused, (Write(journal.Paused(by=event.by)), WriteTables(), show(paused))
 
 
-def resume(state: SessionState, event: ResumeAsked) -> Result:
+def resume(state: SessionState, event: ResumeRequested) -> Result:
     """Go back to what was interrupted, with the force if it was off; the operator's stop is the operator's to end."""
     if state.held is not None and event.by != "operator":
         what = "switched the force off" if state.held == "force" else "paused the session"
@@ -211,7 +211,7 @@ def stop_force_after_end(state: SessionState, _event: ForceStopped) -> Result:
     return state, (StopForce(),)
 
 
-def repeat(state: SessionState, event: RepeatAsked) -> Result:
+def repeat(state: SessionState, event: RepeatRequested) -> Result:
     """Present the trial again, keeping the attempt that was."""
     if not event.reason.strip():
         raise SessionError("repeating a trial needs a reason: enter one")
@@ -225,7 +225,7 @@ def note(state: SessionState, event: Note) -> Result:
     return state, (written, WriteTables())
 
 
-def end(state: SessionState, event: EndAsked) -> Result:
+def end(state: SessionState, event: EndRequested) -> Result:
     """End early; a session in trouble from which the participant did not withdraw counts as broken."""
     broken = state.phase is Phase.TROUBLE and event.status == "aborted"
     ended = replace(state, phase=Phase.ENDED, interrupted=None)
@@ -293,7 +293,7 @@ def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
     return state, (StopForce(),)
 
 
-def end_unwritten(state: SessionState, _event: EndAsked) -> Result:
+def end_unwritten(state: SessionState, _event: EndRequested) -> Result:
     """End without a line in the journal: the session stays unfinished, and what is left is still tried."""
     if state.over:
         raise SessionError("the session is over: its last lines wait for the disk")

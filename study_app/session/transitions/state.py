@@ -11,8 +11,8 @@ from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Ste
 from study_app.protocol.questions import Context, Question, shown
 from study_app.protocol.streams import Key
 from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.methods import Adjusting, Adjustment, Heard
-from study_app.protocol.trials.presentation import Due, next_level
+from study_app.protocol.trials.methods import Adjusting, Adjustment, TrialResult
+from study_app.protocol.trials.presentation import Presentation, next_level
 from study_app.protocol.trials.tasks import AnyTask, lasting
 from study_app.protocol.trials.tracks import adjusting_of, design_of, method_of
 from study_app.session.resume import FIRST, Start
@@ -56,7 +56,7 @@ class Plan:
     start: Start = FIRST
     secret: bytes = field(default=b"", repr=False)
 
-    def due(self, trial: Trial, heard: Sequence[Heard]) -> Due | None:
+    def due(self, trial: Trial, heard: Sequence[TrialResult]) -> Presentation | None:
         """Return what a trial of a block with a design presents; None where it is passed over."""
         return next_level(self.protocol, Key(self.key, self.secret), self.schedule, trial, heard)
 
@@ -106,8 +106,8 @@ class SessionState:
     held: Hold | None = None
     stall: Stall | None = None
     since_s: float = 0.0
-    heard: tuple[Heard, ...] = field(default=(), repr=False)
-    due: Due | None = field(default=None, repr=False)
+    heard: tuple[TrialResult, ...] = field(default=(), repr=False)
+    due: Presentation | None = field(default=None, repr=False)
     interval: int = 1
     until_s: float | None = None
     errors_ms: tuple[float | None, ...] = ()

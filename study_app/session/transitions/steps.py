@@ -7,12 +7,12 @@ from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial
 from study_app.protocol.trials.presentation import (
-    Due,
+    Presentation,
     arrangement_text,
     criterion_met,
     delay_s_of,
-    heard_of,
     longest_delay_s,
+    trial_result,
 )
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.session.transitions import page_builder
@@ -183,7 +183,7 @@ def _block(state: SessionState, trial: Trial) -> Block:
 
 
 def _passed_over(
-    state: SessionState, before: Step | None, step: Step | None, due: Due | None
+    state: SessionState, before: Step | None, step: Step | None, due: Presentation | None
 ) -> journal.PassedOver | None:
     """Return the line on a step that is passed over: a trial that is not due, a break after one."""
     if isinstance(step, Trial):
@@ -274,7 +274,7 @@ def submit(state: SessionState, event: Submitted) -> Result:
     )
     written = Write(line, waits=True)
     if state.due is not None:
-        return _heard(state, written, event.at_s)
+        return _keep_result(state, written, event.at_s)
     return enter(state, state.index + 1, (written,), at_s=event.at_s)
 
 
@@ -285,13 +285,13 @@ def keep_setting(state: SessionState, done: Commands, at_s: float) -> Result:
     return state, (*done, *chosen, *kept)
 
 
-def _heard(state: SessionState, written: Write, at_s: float) -> Result:
+def _keep_result(state: SessionState, written: Write, at_s: float) -> Result:
     """Keep the answer for the levels to come, and say whether it was correct, where that is due."""
     trial, due, design = state.trial, state.due, state.design
     assert due is not None and design is not None  # noqa: S101, PT018 - the caller has looked
     protocol, answer = state.plan.protocol, str(state.answers[design.name].value)
     block = protocol.blocks[trial.block]
-    heard = heard_of(protocol, block, trial.number, trial.code, due.level, due.arrangement, answer, catch=due.catch)
+    heard = trial_result(protocol, block, trial.number, trial.code, due.level, due.arrangement, answer, catch=due.catch)
     state = replace(state, heard=(*state.heard, heard))
     if heard.correct is None or not design.shows_feedback(trial.phase == "practice"):
         return enter(state, state.index + 1, (written,), at_s=at_s)

@@ -36,16 +36,16 @@ from study_app.session.transitions.events import (
     Chosen,
     Command,
     Continue,
-    EndAsked,
+    EndRequested,
     Event,
     ForceStopped,
     ItemShown,
     LanguageChosen,
     Note,
-    PauseAsked,
+    PauseRequested,
     Reconnected,
-    RepeatAsked,
-    ResumeAsked,
+    RepeatRequested,
+    ResumeRequested,
     Retracted,
     Stepped,
     Submitted,
@@ -79,9 +79,9 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     (Phase.ANSWERING, Retracted): steps.retract,  # stays
     (Phase.ANSWERING, Submitted): steps.submit,  # → reading, task, resting, feedback, complete, ended
     # Pausing: esc, the operator, or a force stop.
-    **{(phase, PauseAsked): moves.pause for phase in RUNNING},  # → paused; the attempt at a trial is over
-    (Phase.PAUSED, PauseAsked): moves.pause_again,  # stays
-    (Phase.PAUSED, ResumeAsked): moves.resume,  # → reading, answering; task, again; after feedback the next step
+    **{(phase, PauseRequested): moves.pause for phase in RUNNING},  # → paused; the attempt at a trial is over
+    (Phase.PAUSED, PauseRequested): moves.pause_again,  # stays
+    (Phase.PAUSED, ResumeRequested): moves.resume,  # → reading, answering; task, again; after feedback the next step
     # The force: off at once, wherever we are.
     **{(phase, ForceStopped): moves.stop_force for phase in RUNNING},  # → paused; the attempt at a trial is over
     (Phase.PAUSED, ForceStopped): moves.stop_force,  # stays
@@ -89,9 +89,10 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     (Phase.COMPLETE, ForceStopped): moves.stop_force_after_end,  # stays
     (Phase.ENDED, ForceStopped): moves.stop_force_after_end,  # stays
     # The operator.
-    **{(phase, RepeatAsked): moves.repeat for phase in (Phase.TASK, Phase.RESTING, Phase.ANSWERING)},  # → task, again
+    # A repeated trial: → task, again.
+    **{(phase, RepeatRequested): moves.repeat for phase in (Phase.TASK, Phase.RESTING, Phase.ANSWERING)},
     **{(phase, Note): moves.note for phase in (*RUNNING, Phase.PAUSED, Phase.TROUBLE)},  # stays
-    **{(phase, EndAsked): moves.end for phase in OPEN},  # → ended
+    **{(phase, EndRequested): moves.end for phase in OPEN},  # → ended
     # What breaks.
     **{(phase, Broke): moves.call_operator for phase in OPEN},  # → trouble
     (Phase.TROUBLE, Reconnected): moves.reconnect,  # → paused, without force; only after a failure of the device
@@ -100,7 +101,7 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     (Phase.STALLED, WriteRetried): moves.retry,  # stays
     (Phase.STALLED, WriteCompleted): moves.recover,  # → paused; what it was in trouble and at the end
     (Phase.STALLED, ForceStopped): moves.stop_force_of_stalled,  # stays
-    (Phase.STALLED, EndAsked): moves.end_unwritten,  # stays, over
+    (Phase.STALLED, EndRequested): moves.end_unwritten,  # stays, over
 }
 
 

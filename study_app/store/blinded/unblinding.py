@@ -21,7 +21,7 @@ from study_app.store.exclusions import Exclusion, exclude, exclusions, reversals
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Event, TrialStarted, start_of
-from study_app.store.progress import heard_in
+from study_app.store.progress import trial_results
 from study_app.store.sessions.folder_lock import is_open, open_alone
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.sites.merged import folders_of
@@ -159,7 +159,7 @@ def _missed(session: SessionFolder, key: Key) -> Iterator[str]:
     protocol = whole_protocol(published, key)
     lines = opened(journal.read(session.journal), key)
     blocks = {line.trial: line.block for line in lines if isinstance(line, TrialStarted)}
-    heard = [one for one in heard_in(protocol, lines) if one.catch]
+    heard = [one for one in trial_results(protocol, lines) if one.catch]
     for block in protocol.blocks.values():
         answered = [one for one in heard if blocks[one.trial] == block.id]
         wrong = sum(not one.correct for one in answered)

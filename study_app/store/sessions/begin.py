@@ -131,7 +131,7 @@ def begin(
         allocation = allocate(study_folder, key, start.participant)
         group = None if allocation is None else allocation.group
         own_protocol(protocol, group, start.session)  # refuses a session that the group does not have
-        started, first_receipt = first_words(
+        started, first_receipt = first_records(
             protocol, source, start, key_hash=key.hash, measures_sealed=sealed, clock=clock, allocation=allocation
         )
         first_receipt["resolved"] = sealed_model(protocol, start.participant, start.session, key)
@@ -141,7 +141,7 @@ def begin(
         raise
 
 
-def first_words(
+def first_records(
     protocol: Protocol,
     source: bytes,
     start: SessionStart,
@@ -152,7 +152,7 @@ def first_words(
     allocation: Allocation | None = None,
 ) -> tuple[SessionStarted, dict[str, Any]]:
     """Return a session's first line, and its receipt as it is before the first trial."""
-    facts: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "participant": start.participant,
         "session": start.session,
         "study": protocol.study.name,
@@ -169,7 +169,7 @@ def first_words(
     }
     limits = protocol.limits.model_dump(mode="json")
     started = SessionStarted(
-        **facts,
+        **fields,
         format=FORMAT,
         device=start.device.get("name"),
         limits=limits,
@@ -185,7 +185,7 @@ def first_words(
         "started_at": clock.at(0),
         "ended_at": None,
         "resumed": [],
-        **facts,
+        **fields,
         "generator": receipt.GENERATOR,
         **surroundings(start.device, start.screens, clock, start.motors_masked, start.outlets, start.video),
         "protocol": receipt.without_conditions(protocol),
@@ -211,10 +211,10 @@ def make_recorder(place: Place, start: SessionStarted, clock: SessionClock) -> R
     """Return the recorder of a session as its first line says, or None where it keeps no recordings."""
     if not start.recordings:
         return None
-    facts = {
+    fields = {
         name: getattr(start, name) for name in ("study", "participant", "session", "simulated", "pilot", "version")
     }
-    return Recorder(place.folder.recordings, {**facts, "origin_ns": clock.origin_ns}, waits=start.simulated)
+    return Recorder(place.folder.recordings, {**fields, "origin_ns": clock.origin_ns}, waits=start.simulated)
 
 
 def surroundings(

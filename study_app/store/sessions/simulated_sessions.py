@@ -26,7 +26,7 @@ from study_app.store.checksums import checksum_bytes, fingerprint, note_fingerpr
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import SessionClock, line_bytes, line_of
 from study_app.store.journals.journal_events import Allocated, Event, SessionEnded, plain, read_event, start_of
-from study_app.store.sessions.begin import SessionStart, check_participant, first_words, make_folder, used_ids
+from study_app.store.sessions.begin import SessionStart, check_participant, first_records, make_folder, used_ids
 from study_app.store.sessions.folder_lock import Opening, open_alone
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables import csv_files, session_tables
@@ -94,7 +94,7 @@ class SimulatedStudy:
             simulated=True,
         )
         sealed_measures = not reveals(self.folder.path)
-        self.started, receipt = first_words(
+        self.started, receipt = first_records(
             protocol, source, start, key_hash=self.key.hash, measures_sealed=sealed_measures, clock=SessionClock()
         )
         self._receipt = plain(receipt)

@@ -69,7 +69,7 @@ def presented_numbers(protocol: Protocol) -> frozenset[float]:
         if block.design is None or block.stimulus is None:
             continue
         stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
-        levels = {*method.asked(stimulus)}
+        levels = {*method.levels_of(stimulus)}
         first = design_of(protocol, block).first
         levels |= {stimulus.levels[1]} if block.catch is not None else set()
         levels |= set() if first is None else {first.level}

@@ -24,7 +24,7 @@ from study_app.store.blinded.blinding import opened, read_key, whole_protocol
 from study_app.store.folders import StudyFolder, locate
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
-from study_app.store.progress import heard_in
+from study_app.store.progress import trial_results
 
 
 @dataclass(slots=True)
@@ -114,7 +114,7 @@ class _Compared:
         block = self._protocol.blocks[trial.block]
         if block.design is None:
             return
-        due = next_level(self._protocol, self._key, self._schedule, trial, heard_in(self._protocol, before))
+        due = next_level(self._protocol, self._key, self._schedule, trial, trial_results(self._protocol, before))
         if isinstance(line, events.PassedOver):
             if due is not None:
                 self.differences.append(f"trial {trial.number}: passed over, though it was due by the answers")

@@ -53,7 +53,7 @@ class Finding:
         return f"{self.place}: {self.message}"
 
 
-class Gathered:
+class Collector:
     """Findings so far: ``errors`` are files that cannot be trusted as they are, ``warnings`` something to know."""
 
     def __init__(self, folder: Path) -> None:
@@ -61,11 +61,11 @@ class Gathered:
         self.warnings: list[Finding] = []
         self._folder = folder
 
-    def apart(self) -> Gathered:
+    def apart(self) -> Collector:
         """Return findings of the same folder, with nothing found."""
-        return Gathered(self._folder)
+        return Collector(self._folder)
 
-    def take(self, others: Gathered) -> None:
+    def take(self, others: Collector) -> None:
         """Add what others found."""
         self.errors += others.errors
         self.warnings += others.warnings
@@ -96,7 +96,7 @@ class Gathered:
 
 
 @dataclass(frozen=True, slots=True)
-class Checked:
+class CheckedSession:
     """What the study's own files are compared with, of one session.
 
     ``row`` is its row of the participants table: None where it has not begun, or its journal cannot be read
@@ -113,13 +113,13 @@ class Checked:
     fingerprint: str = ""
 
 
-def check_session(place: Place, key: Key | None, found: Gathered, *, recordings: bool = True) -> Checked:
+def check_session(place: Place, key: Key | None, found: Collector, *, recordings: bool = True) -> CheckedSession:
     """Check one session; again where there is an error and a program has opened it meanwhile.
 
     Without ``recordings`` these are not read, which takes a while.
     """
     errors = found.apart()
-    checked = Checked(place, running=is_open(place.folder.path))
+    checked = CheckedSession(place, running=is_open(place.folder.path))
     with errors.reading(place.folder.path):
         checked = _check(place, key, errors, running=checked.running, recordings=recordings)
     if errors.errors and not checked.running and is_open(place.folder.path):
@@ -128,7 +128,7 @@ def check_session(place: Place, key: Key | None, found: Gathered, *, recordings:
     return checked
 
 
-def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, recordings: bool) -> Checked:
+def _check(place: Place, key: Key | None, found: Collector, *, running: bool, recordings: bool) -> CheckedSession:
     folder = place.folder
     if running:
         found.warning(folder.path, "is open in another program")
@@ -142,7 +142,7 @@ def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, rec
     if not running:
         _receipt(folder, lines, key.hash if key else None, found)
     if not lines:
-        return Checked(place, readable=running or never_begun(folder.path), running=running)
+        return CheckedSession(place, readable=running or never_begun(folder.path), running=running)
     start = events.start_of(lines)
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
@@ -166,7 +166,7 @@ def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, rec
         with found.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
                 found.warning(folder.rebuilt, f"{events.shortened(line)}; only a copy of {FINGERPRINTS} proves more")
-    return Checked(
+    return CheckedSession(
         place,
         readable=True,
         running=running,
@@ -177,7 +177,7 @@ def _check(place: Place, key: Key | None, found: Gathered, *, running: bool, rec
     )
 
 
-def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Contents:
+def _journal(folder: SessionFolder, found: Collector, *, running: bool) -> Contents:
     """Return what the journal holds: no line where it says nothing of the session."""
     nothing = Contents([], 0)
     if not is_there(folder.journal):
@@ -221,7 +221,7 @@ def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Conten
     return contents
 
 
-def _receipt(folder: SessionFolder, lines: list[events.Event], key_hash: str | None, found: Gathered) -> None:
+def _receipt(folder: SessionFolder, lines: list[events.Event], key_hash: str | None, found: Collector) -> None:
     path = folder.receipt
     if not lines and not is_there(path):
         return  # claimed and never begun
@@ -237,7 +237,7 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key_hash: str | N
     if not lines:
         return
     start = events.start_of(lines)
-    compared = [name for name in (*receipt.FACTS, "row_of") if name in held or name == "row_of"]
+    compared = [name for name in (*receipt.COPIED_FIELDS, "row_of") if name in held or name == "row_of"]
     if differing := [name for name in compared if held.get(name) != getattr(start, name)]:
         found.error(path, f"{', '.join(differing)}: differ from the journal")
     if receipt.other_format(held, start):
@@ -276,7 +276,7 @@ def _same_answer(listed_answer: events.Answer, given: events.Answer) -> bool:
     )
 
 
-def _tables(place: Place, lines: list[events.Event], found: Gathered, *, ended: bool) -> None:
+def _tables(place: Place, lines: list[events.Event], found: Collector, *, ended: bool) -> None:
     """Compare the tables with what the journal gives; one that tells more than the journal is named as such."""
     telling: set[Path] = set()
     with contextlib.suppress(StoreError):  # said of receipt or journal already
@@ -295,7 +295,7 @@ def _tables(place: Place, lines: list[events.Event], found: Gathered, *, ended: 
 
 
 def check_table(
-    path: Path, expected: bytes, columns: tuple[Column, ...], found: Gathered, *, may_differ: Callable[[int], bool]
+    path: Path, expected: bytes, columns: tuple[Column, ...], found: Collector, *, may_differ: Callable[[int], bool]
 ) -> None:
     """Compare a table with what the journals give, and its cells with the dictionary.
 
@@ -327,7 +327,7 @@ def _hash(folder: SessionFolder, name: str) -> str:
         return ""
 
 
-def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Gathered, *, recordings: bool) -> None:
+def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Collector, *, recordings: bool) -> None:
     if not is_there(folder.checksums):
         found.error(
             folder.checksums, "is missing: was the program killed at the end of the session? rebuild creates it"
@@ -350,7 +350,7 @@ def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Gathered
 
 
 def _recordings(
-    folder: SessionFolder, lines: list[events.Event], hashes: Mapping[str, str], found: Gathered, *, ended: bool
+    folder: SessionFolder, lines: list[events.Event], hashes: Mapping[str, str], found: Collector, *, ended: bool
 ) -> None:
     """Check that every recording the journal tells of is there, whole and of this trial, and no other."""
     listed: set[str] = set()
@@ -391,7 +391,7 @@ def _recordings(
             found.warning(folder.path / name, f"is in no line of the journal{then}")
 
 
-def _facts(folder: SessionFolder, line: events.Recorded, kind: str, name: str, rows: int, found: Gathered) -> None:
+def _facts(folder: SessionFolder, line: events.Recorded, kind: str, name: str, rows: int, found: Collector) -> None:
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     path = folder.path / name
@@ -405,7 +405,7 @@ def _facts(folder: SessionFolder, line: events.Recorded, kind: str, name: str, r
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class Discrepancy:
     """A file that is not what was recorded, and what to do about it."""
 
     path: Path
@@ -416,7 +416,7 @@ class Doubt:
         return f"{self.path} {self.what}: {self.remedy}"
 
 
-def doubts(place: Place) -> tuple[Doubt, ...]:
+def doubts(place: Place) -> tuple[Discrepancy, ...]:
     """Return what cannot be trusted of a session's journal, receipt, tables and checksums.
 
     Once the session has ended they are compared with their checksums: files that keep these are as they were when the
@@ -427,10 +427,10 @@ def doubts(place: Place) -> tuple[Doubt, ...]:
     folder = place.folder
     if is_open(folder.path):
         return ()
-    found = (Doubt(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
+    found = (Discrepancy(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
     if _as_ended(place):
         return found
-    told = Gathered(folder.path)
+    told = Collector(folder.path)
     check_session(place, None, told, recordings=False)
     first: dict[str, Finding] = {}
     for one in (*told.errors, *(warning for warning in told.warnings if warning.place.endswith(".csv"))):
@@ -438,7 +438,7 @@ def doubts(place: Place) -> tuple[Doubt, ...]:
     if (of_journal := first.get(folder.journal.name)) is not None:
         first = {of_journal.place: of_journal}
     remedy = f"liquid-study verify {place.study_folder.path} checks everything"
-    return (*found, *(Doubt(folder.path / error.place, error.message, remedy) for error in first.values()))
+    return (*found, *(Discrepancy(folder.path / error.place, error.message, remedy) for error in first.values()))
 
 
 def _as_ended(place: Place) -> bool:

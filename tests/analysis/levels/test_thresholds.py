@@ -11,7 +11,7 @@ from study_app.analysis.levels.thresholds import counts_of, thresholds
 from study_app.analysis.statistics.thresholds import group_mean, p_of_fit
 from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import default_design
-from study_app.protocol.trials.methods import Heard, QuestPlus, TrackSetting, UpDown
+from study_app.protocol.trials.methods import QuestPlus, TrackSetting, TrialResult, UpDown
 from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, assumed_for
 from study_app.psychophysics.families import success
 from study_app.psychophysics.grid import fit
@@ -180,14 +180,14 @@ def test_a_function_that_does_not_fit_and_answers_that_drift_are_said_to() -> No
 
 def tracks_of_staircases(method: UpDown, trials: int) -> pd.DataFrame:
     """Return rows of two interleaved tracks of one participant, whose levels follow from the answers before."""
-    draw, heard = np.random.default_rng(9), {1: list[Heard](), 2: list[Heard]()}
+    draw, heard = np.random.default_rng(9), {1: list[TrialResult](), 2: list[TrialResult]()}
     found = []
     for trial in range(1, trials + 1):
         number = 1 + trial % 2
         level = method.after(TrackSetting(STIMULUS, default_design("2ifc"), number), heard[number])
         assert level is not None
         right = bool(draw.random() < success("weibull", math.log10(level), math.log10(0.15), 1.4, 0.5, 0.01))
-        heard[number].append(Heard(trial, f"A{number}", level, right, right))
+        heard[number].append(TrialResult(trial, f"A{number}", level, right, right))
         found.append(("P001", "01", trial, "b", 8.0, level, level, True, right, f"A{number}", f"8/{number}"))
     frame = pd.DataFrame(found, columns=[*NAMES, "code", "track"]).assign(catch=False, arrangement="CS")
     return frame.astype({"level_delivered": "Float64", "success": "boolean"})

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.escape_key import EscapeKey
 from study_app.session.pages import PausePage, TaskPage, TroublePage
-from study_app.session.transitions.events import EndAsked
+from study_app.session.transitions.events import EndRequested
 from tests.app.world import begin_trial
 
 pytestmark = pytest.mark.slow
@@ -246,7 +246,7 @@ def test_what_the_device_asks_for_is_shown_and_the_button_waits(lost, device, wo
 
 def test_a_session_that_ends_meanwhile_stays_ended(lost, device, world, qtbot):
     lost.operator.reconnect_asked.emit()
-    lost.participant.event.emit(EndAsked(world.now_s, "aborted", "cable"))
+    lost.participant.event.emit(EndRequested(world.now_s, "aborted", "cable"))
     device.go_on.set()
     settled(lost, qtbot)
     assert lost.view().over

@@ -24,7 +24,7 @@ from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load
 from study_app.protocol.trials.tasks import Stroke
-from study_app.session.preflight import Facts
+from study_app.session.preflight import Measurements
 from study_app.session.start import NewSession, Ready
 from tests.session import small
 
@@ -79,7 +79,7 @@ def ask(qapp: Any, machine: Any) -> Iterator[Callable[..., Preflight]]:
     """Return a function that asks before a session of the demo, of such facts and outlets."""
     made: list[Preflight] = []
 
-    def ask(facts: Facts = FACTS, **given: Any) -> Preflight:
+    def ask(facts: Measurements = FACTS, **given: Any) -> Preflight:
         ready = Ready(machine, facts, **given)
         made.append(Preflight(CHOSEN, load("demo"), ready, QGuiApplication.primaryScreen, "Participant P001", LIGHT))
         made[-1].open()
@@ -109,7 +109,7 @@ def test_a_device_that_is_lost_meanwhile_is_told_once(asked: Preflight, machine:
 def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, monkeypatch: Any) -> None:
     begun, waited = threading.Event(), []
 
-    def slow(_machine: Any, _chosen: Any, _videos: Any, *, sleep: Any) -> Facts:
+    def slow(_machine: Any, _chosen: Any, _videos: Any, *, sleep: Any) -> Measurements:
         begun.set()
         waited.append(sleep(60.0))
         return FACTS
@@ -205,7 +205,7 @@ def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_c
 def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
     asked: Preflight, monkeypatch: Any, qtbot: Any
 ) -> None:
-    def broken(*_words: Any, **_named: Any) -> Facts:
+    def broken(*_words: Any, **_named: Any) -> Measurements:
         raise ValueError("no samples")
 
     monkeypatch.setattr(preflight_controller, "measured", broken)

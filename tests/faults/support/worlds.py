@@ -6,7 +6,7 @@ from typing import Any
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
-from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, ResumeAsked, Submitted
+from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, ResumeRequested, Submitted
 from study_app.session.transitions.state import Phase
 from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
@@ -62,7 +62,7 @@ class StoredWorld(World):
                     self.runner.post(Chosen(self.clock(), item, 5))
                 self.runner.post(Submitted(self.clock()))
             case Phase.PAUSED:
-                self.runner.post(ResumeAsked(self.clock(), "operator"))
+                self.runner.post(ResumeRequested(self.clock(), "operator"))
             case _:
                 self.run(0.3, LEFT)
                 self.run(0.3, RIGHT)

@@ -19,7 +19,7 @@ from study_app.protocol.questions import ChoiceView, NumberView
 from study_app.protocol.trials.tasks import lasting
 from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import ChoicePage, FeedbackPage, Interval, NumberPage, Progress, TaskPage
-from study_app.session.transitions.events import Continue, PauseAsked, Stepped, Submitted
+from study_app.session.transitions.events import Continue, PauseRequested, Stepped, Submitted
 from tests.gui.participant.driver import KEY, Participant
 from tests.gui.small import follow, task_page, view
 
@@ -107,7 +107,7 @@ def test_everything_fits_apart_and_can_be_hit_and_escape_pauses(
         for one, other in combinations(places, 2):
             assert not one.intersects(other)
         seen.press(KEY.Key_Escape)
-        assert (seen.kinds[-1], seen.told[-1].by) == (PauseAsked, "participant")
+        assert (seen.kinds[-1], seen.told[-1].by) == (PauseRequested, "participant")
 
 
 def interval(*, adjusts: bool = False, language: str = "en", resting: bool = False) -> TaskPage:
@@ -220,7 +220,7 @@ def test_the_mouse_presses_and_holds_the_buttons(opened: Participant, qtbot: Any
     assert opened.kinds[-1] is Submitted
     assert opened.window.hasFocus()
     QTest.keyClick(opened.window, KEY.Key_Escape)
-    qtbot.waitUntil(lambda: PauseAsked in opened.kinds)
+    qtbot.waitUntil(lambda: PauseRequested in opened.kinds)
 
 
 def test_where_the_mouse_is_the_device_keys_are_named_and_no_button_is_shown(captured: Participant) -> None:

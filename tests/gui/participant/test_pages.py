@@ -9,7 +9,7 @@ from PySide6.QtGui import QPointingDevice
 
 from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import PausePage
-from study_app.session.transitions.events import Continue, EndAsked, LanguageChosen, ResumeAsked
+from study_app.session.transitions.events import Continue, EndRequested, LanguageChosen, ResumeRequested
 from tests.gui.participant.driver import KEY, Participant, tap
 from tests.gui.small import text_page
 
@@ -47,7 +47,7 @@ def test_consent_can_be_declined_in_every_language(opening: Opening, by_key: boo
         else:
             seen.click(decline)
         (end,) = seen.told
-        assert (type(end), end.status, end.reason) == (EndAsked, "withdrawn", "no consent")
+        assert (type(end), end.status, end.reason) == (EndRequested, "withdrawn", "no consent")
     with pytest.raises(LookupError):
         opening(text_page(), FULL).find(ENGLISH.decline)
 
@@ -81,4 +81,4 @@ def test_texts_languages_and_a_pause_work_by_touch(opening: Opening, finger: QPo
     tap(finger, seen.find("Go on"))
     seen.show(PausePage(force_off=False))
     tap(finger, seen.page.button)
-    assert seen.kinds == [LanguageChosen, Continue, ResumeAsked]
+    assert seen.kinds == [LanguageChosen, Continue, ResumeRequested]

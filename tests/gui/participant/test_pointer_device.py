@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.participant.pointer_capture import NOTCHES, SHARE_OF_SCREEN, PointerCapture
 from study_app.session.pages import Page
-from study_app.session.transitions.events import PauseAsked
+from study_app.session.transitions.events import PauseRequested
 from tests.gui.participant.driver import Participant
 from tests.gui.small import questionnaire, task_page, text_page
 
@@ -65,7 +65,7 @@ def test_another_program_that_takes_the_keyboard_pauses(captured: Participant, q
     other = other_window(captured, qtbot)
     with qtbot.waitSignal(captured.window.event):
         other.windowHandle().destroy()  # no window of the program has the keyboard then
-    assert captured.events == [PauseAsked(captured.events[0].at_s, "participant")]
+    assert captured.events == [PauseRequested(captured.events[0].at_s, "participant")]
 
 
 class Hand:

@@ -20,7 +20,7 @@ from study_app.session.transitions.events import (
     Begin,
     Chosen,
     ItemShown,
-    PauseAsked,
+    PauseRequested,
     Retracted,
     ShowPage,
     Submitted,
@@ -179,7 +179,7 @@ def test_escape_pauses_and_takes_what_was_typed(opening: Opening, name: str) -> 
     seen = opening(kind.page, FULL)
     give(seen, tuple(key for key in kind.keys if isinstance(key, str)))
     seen.press(KEY.Key_Escape)
-    assert seen.kinds[-1] is PauseAsked
+    assert seen.kinds[-1] is PauseRequested
     assert len(seen.answers) == isinstance(kind.keys[0], str)
 
 

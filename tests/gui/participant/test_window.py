@@ -15,7 +15,7 @@ from study_app.gui.participant.window import LEAST_SIZE
 from study_app.gui.widgets.escape_key import HOLD_MS, EscapeKey
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import EndPage, FeedbackPage, Page, PausePage, TroublePage
-from study_app.session.transitions.events import Chosen, Continue, ForceStopped, PauseAsked, ResumeAsked
+from study_app.session.transitions.events import Chosen, Continue, ForceStopped, PauseRequested, ResumeRequested
 from tests.gui.participant.driver import KEY, Participant, name_of, told_of
 from tests.gui.small import explore, questionnaire, task_page, text_page, view
 
@@ -190,7 +190,7 @@ def test_page_follows_the_window_down_to_its_least_size(opened: Participant) -> 
     [
         (text_page("consent"), KEY.Key_Return, Continue),
         (text_page(), KEY.Key_Space, Continue),
-        (PausePage(force_off=False), KEY.Key_Return, ResumeAsked),
+        (PausePage(force_off=False), KEY.Key_Return, ResumeRequested),
         (questionnaire(), KEY.Key_4, Chosen),
         (task_page(explore()), KEY.Key_Space, Continue),
     ],
@@ -236,7 +236,7 @@ def test_a_late_frame_of_the_tank_before_is_not_told_as_one_of_the_next(opened: 
 def test_closing_by_accident_is_a_pause_which_lies_over_the_tank(opened: Participant) -> None:
     opened.show(task_page())
     assert not opened.window.close()
-    assert opened.kinds == [PauseAsked]
+    assert opened.kinds == [PauseRequested]
     opened.show(PausePage(force_off=True))
     under = opened.page.under
     assert under is not None
@@ -277,7 +277,7 @@ def test_short_escape_pauses_a_page_but_no_pause_and_no_end(opened: Participant)
     for page in (text_page(), task_page(), questionnaire()):
         opened.show(page)
         opened.press(KEY.Key_Escape)
-        assert opened.told == [PauseAsked(opened.told[0].at_s, "participant")]
+        assert opened.told == [PauseRequested(opened.told[0].at_s, "participant")]
         opened.events.clear()
 
 

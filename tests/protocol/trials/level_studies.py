@@ -4,8 +4,8 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key
 from study_app.protocol.streams import Key, stream
-from study_app.protocol.trials.methods import Heard
-from study_app.protocol.trials.presentation import Due, heard_of, next_level
+from study_app.protocol.trials.methods import TrialResult
+from study_app.protocol.trials.presentation import Presentation, next_level, trial_result
 from study_app.protocol.trials.tracks import design_of
 from tests.protocol.edited_studies import text_of as text_of_study
 
@@ -78,15 +78,17 @@ def key_of(protocol: Protocol, secret: bytes = SECRET) -> Key:
     return Key(draw_key(protocol, stream(1, "key").random), secret)
 
 
-def run(protocol: Protocol, key: Key, answer: str = "", participant: str = "P001", seed: int = 1) -> list[Due]:
+def run(protocol: Protocol, key: Key, answer: str = "", participant: str = "P001", seed: int = 1) -> list[Presentation]:
     """Return what the trials of a session present; each is answered alike, or correctly where ``answer`` is empty."""
     schedule = build_schedule(protocol, participant, seed)
     return [due for due, _ in answered(protocol, key, schedule, answer)]
 
 
-def answered(protocol: Protocol, key: Key, schedule: Schedule, answer: str = "") -> list[tuple[Due, Heard]]:
+def answered(
+    protocol: Protocol, key: Key, schedule: Schedule, answer: str = ""
+) -> list[tuple[Presentation, TrialResult]]:
     """Return what each trial presents, with the answer to it; trials that are passed over are left out."""
-    heard: list[Heard] = []
+    heard: list[TrialResult] = []
     found = []
     for trial in schedule.trials:
         due = next_level(protocol, key, schedule, trial, heard)
@@ -95,6 +97,6 @@ def answered(protocol: Protocol, key: Key, schedule: Schedule, answer: str = "")
         design = design_of(protocol, protocol.blocks[trial.block])
         given = answer or design.correct(due.arrangement) or ""
         block, level = protocol.blocks[trial.block], due.level
-        heard.append(heard_of(protocol, block, trial.number, trial.code, level, due.arrangement, given))
+        heard.append(trial_result(protocol, block, trial.number, trial.code, level, due.arrangement, given))
         found.append((due, heard[-1]))
     return found

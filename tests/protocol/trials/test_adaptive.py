@@ -8,7 +8,7 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.trials.methods import Heard, TrackSetting, UpDown
+from study_app.protocol.trials.methods import TrackSetting, TrialResult, UpDown
 from study_app.protocol.trials.presentation import next_level
 from study_app.protocol.trials.tracks import design_of, tracks_of
 from tests.protocol.trials.level_studies import answered, key_of, study
@@ -31,7 +31,7 @@ def adaptive(method: str, *edits: tuple[str, str]) -> Protocol:
     return study((CONSTANT, method), *edits)
 
 
-def answers_of(protocol: Protocol, threshold: float, seed: int = 1) -> list[Heard]:
+def answers_of(protocol: Protocol, threshold: float, seed: int = 1) -> list[TrialResult]:
     """Return the answers of one session of an observer who is right above the threshold, and half of the time below."""
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", seed)
     design = design_of(protocol, protocol.blocks["viscosity"])
@@ -42,7 +42,7 @@ def answers_of(protocol: Protocol, threshold: float, seed: int = 1) -> list[Hear
             assert due.level is not None
             right = draw.random() < (0.98 if due.level > threshold else 0.5)
             noise = not any(design.arrangements[due.arrangement])
-            heard.append(Heard(trial.number, trial.code, due.level, right, right, noise=noise))
+            heard.append(TrialResult(trial.number, trial.code, due.level, right, right, noise=noise))
     return heard
 
 
@@ -93,7 +93,7 @@ def test_the_next_level_depends_on_the_levels_presented_and_not_on_how_answers_a
         assert due == again
         assert due.level == heard[number].level
     # Answers at another level than would be chosen count at that level.
-    other = [Heard(one.trial, one.code, 0.8, True, True) for one in heard[:10]]
+    other = [TrialResult(one.trial, one.code, 0.8, True, True) for one in heard[:10]]
     moved = next_level(protocol, key, schedule, schedule.trials[10], other)
     assert moved is not None
     assert moved.level != heard[10].level
@@ -157,12 +157,12 @@ def test_a_staircase_moves_on_from_answers_at_a_level_of_zero() -> None:
     method = 'kind = "updown"\nrule = "1down1up"\nratio = 1\nstep_up = 0.2\nbegin = 0'
     protocol = adaptive(method, ONE_STANDARD, FROM_ZERO)
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
-    heard: list[Heard] = []
+    heard: list[TrialResult] = []
     for trial, right in zip(schedule.trials, (False, True, False, False), strict=False):
         due = next_level(protocol, key, schedule, trial, heard)
         assert due is not None
         assert due.level is not None
-        heard.append(Heard(trial.number, trial.code, due.level, right, right))
+        heard.append(TrialResult(trial.number, trial.code, due.level, right, right))
     assert [one.level for one in heard] == pytest.approx([0, 0.2, 0, 0.2])
 
 
@@ -179,7 +179,7 @@ def test_reversals_at_a_level_of_zero_count() -> None:
 def test_questplus_counts_answers_at_a_level_of_zero(method: str) -> None:
     protocol = adaptive(method, ONE_STANDARD, FROM_ZERO)
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
-    heard = [Heard(one.number, one.code, 0.0, False, False) for one in schedule.trials[:6]]
+    heard = [TrialResult(one.number, one.code, 0.0, False, False) for one in schedule.trials[:6]]
     due = next_level(protocol, key, schedule, schedule.trials[6], heard)
     assert due is None if "stop" in method else due is not None and due.level != 0
 

@@ -8,7 +8,7 @@ import pytest
 from study_app.protocol.blocks import Catch
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.trials.methods import Heard
+from study_app.protocol.trials.methods import TrialResult
 from study_app.protocol.trials.presentation import next_level
 from study_app.protocol.trials.tracks import design_of, tracks_of
 from tests.protocol.trials.level_studies import answered, key_of, study
@@ -81,13 +81,13 @@ def test_answers_to_catch_trials_move_no_level(method: str) -> None:
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
     levels: dict[bool, list[float | None]] = {}
     for attentive in (True, False):
-        heard: list[Heard] = []
+        heard: list[TrialResult] = []
         for trial in schedule.trials:
             due = next_level(protocol, key, schedule, trial, heard)
             assert due is not None
             assert due.level is not None
             right = attentive if due.catch else trial.number % 3 > 0
-            heard.append(Heard(trial.number, trial.code, due.level, right, right, due.catch))
+            heard.append(TrialResult(trial.number, trial.code, due.level, right, right, due.catch))
             levels.setdefault(attentive, []).append(due.level)
     assert levels[True] == levels[False]
 
@@ -99,7 +99,7 @@ def test_a_track_that_has_ended_presents_no_catch_trial_and_no_noise() -> None:
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", 1)
     design = design_of(protocol, protocol.blocks["viscosity"])
     ended: set[str] = set()
-    heard: list[Heard] = []
+    heard: list[TrialResult] = []
     for trial in schedule.trials:
         due = next_level(protocol, key, schedule, trial, heard)
         if due is None:
@@ -109,7 +109,7 @@ def test_a_track_that_has_ended_presents_no_catch_trial_and_no_noise() -> None:
         assert due.level is not None
         success = len(heard) % 2 == 0
         noise = not any(design.arrangements[due.arrangement])
-        heard.append(Heard(trial.number, trial.code, due.level, success, success, due.catch, noise))
+        heard.append(TrialResult(trial.number, trial.code, due.level, success, success, due.catch, noise))
     assert ended == {track.code for track in schedule.trials}
 
 

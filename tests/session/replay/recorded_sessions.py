@@ -21,11 +21,11 @@ from study_app.session.runner import Runner
 from study_app.session.transitions.events import (
     Begin,
     Continue,
-    EndAsked,
+    EndRequested,
     ForceStopped,
-    PauseAsked,
-    RepeatAsked,
-    ResumeAsked,
+    PauseRequested,
+    RepeatRequested,
+    ResumeRequested,
 )
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import SessionClock
@@ -99,20 +99,20 @@ def troubled(folder: Path) -> Path:
             servo.advance(20)
             runner.post(Continue(clock.seconds()))  # so early that the servo's own fade is under way
             wait(700)
-            runner.post(RepeatAsked(clock.seconds(), "a sneeze"))  # from one force into the next
+            runner.post(RepeatRequested(clock.seconds(), "a sneeze"))  # from one force into the next
             wait(850)
             servo.advance(7)
-            runner.post(RepeatAsked(clock.seconds(), "another"))
+            runner.post(RepeatRequested(clock.seconds(), "another"))
             wait(900)
             runner.post(ForceStopped(clock.seconds(), "operator"))
             wait(300)
-            runner.post(ResumeAsked(clock.seconds(), "operator"))
+            runner.post(ResumeRequested(clock.seconds(), "operator"))
             wait(800)
-            runner.post(PauseAsked(clock.seconds(), "operator"))
+            runner.post(PauseRequested(clock.seconds(), "operator"))
             wait(2000)
-            runner.post(ResumeAsked(clock.seconds(), "operator"))
+            runner.post(ResumeRequested(clock.seconds(), "operator"))
             wait(1500)
-            runner.post(EndAsked(clock.seconds(), "aborted", ""))
+            runner.post(EndRequested(clock.seconds(), "aborted", ""))
             place: Path = store.folder.path
     return place
 
@@ -152,7 +152,7 @@ def stressed(folder: Path, liquid: str) -> Path:
             wait(300)
         handle.delay = 3
         wait(600)
-        runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
+        runner.post(EndRequested(store.clock.seconds(), "aborted", ""))
         place: Path = store.folder.path
     return place
 

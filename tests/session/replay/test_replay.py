@@ -20,7 +20,7 @@ from study_app.protocol import formats
 from study_app.session import replay as replay_module
 from study_app.session.replay import Replayed, replay
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.session.transitions.events import Begin, Continue, EndAsked, PauseAsked, ResumeAsked
+from study_app.session.transitions.events import Begin, Continue, EndRequested, PauseRequested, ResumeRequested
 from study_app.store import recordings
 from study_app.store.blinded.blinding import opened, read_key
 from study_app.store.folders import StudyFolder
@@ -62,7 +62,7 @@ def resumed_on_another_device(folder: Path) -> Path:
             runner.post(Begin(store.clock.seconds()))
             runner.post(Continue(store.clock.seconds()))
             wait(1500)
-            runner.post(PauseAsked(store.clock.seconds(), "operator"))
+            runner.post(PauseRequested(store.clock.seconds(), "operator"))
         place: Path = store.folder.path
     with LightDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
         described = Rig(device, servo).described
@@ -72,9 +72,9 @@ def resumed_on_another_device(folder: Path) -> Path:
             runner, wait = held(store, device, servo)
             servo.advance(900)  # its recording begins at a tick that the one before holds too
             runner.post(Begin(store.clock.seconds()))
-            runner.post(ResumeAsked(store.clock.seconds(), "operator"))
+            runner.post(ResumeRequested(store.clock.seconds(), "operator"))
             wait(1500)
-            runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
+            runner.post(EndRequested(store.clock.seconds(), "aborted", ""))
     return place
 
 
@@ -96,7 +96,7 @@ def stirred(folder: Path, device: ScriptedDevice, *, before: int, until: int) ->
             wait(until - before)
             runner.post(Continue(store.clock.seconds()))
             wait(1500)
-            runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
+            runner.post(EndRequested(store.clock.seconds(), "aborted", ""))
         place: Path = store.folder.path
     return place
 

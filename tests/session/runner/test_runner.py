@@ -14,13 +14,13 @@ from study_app.session.transitions.events import (
     Begin,
     Chosen,
     Continue,
-    EndAsked,
+    EndRequested,
     ForceStopped,
     ItemShown,
     Note,
-    PauseAsked,
-    RepeatAsked,
-    ResumeAsked,
+    PauseRequested,
+    RepeatRequested,
+    ResumeRequested,
     Submitted,
 )
 from study_app.session.transitions.state import Phase
@@ -58,9 +58,9 @@ def test_nothing_but_what_a_person_gave_waits_for_the_disk() -> None:
     world = at_block("seeing")
     world.runner.post(Note(world.clock(), "mark", ""))
     world.runner.post(Note(world.clock(), "note", "tired"))
-    world.runner.post(PauseAsked(world.clock(), "operator"))
-    world.runner.post(ResumeAsked(world.clock(), "operator"))
-    world.runner.post(RepeatAsked(world.clock(), "a sneeze"))
+    world.runner.post(PauseRequested(world.clock(), "operator"))
+    world.runner.post(ResumeRequested(world.clock(), "operator"))
+    world.runner.post(RepeatRequested(world.clock(), "a sneeze"))
     while not world.runner.finished:
         for item in world.state.trial.items if world.state.phase is Phase.ANSWERING else ():
             world.runner.post(ItemShown(world.clock(), item))
@@ -229,7 +229,7 @@ def test_a_fault_of_the_servo_is_kept_once_and_calls_the_operator(practising: Wo
     ]
     assert isinstance(practising.pages[-1], TroublePage)
     assert practising.log[0] == "stop_force"
-    practising.runner.post(EndAsked(2.0, "aborted", "cable"))
+    practising.runner.post(EndRequested(2.0, "aborted", "cable"))
     assert practising.journal.status == "broken"
 
 
@@ -312,7 +312,7 @@ def test_when_the_disk_takes_data_again_all_is_kept_in_order_and_once_and_the_se
     assert world.journal.lines[:before] == undisturbed.journal.lines
     after = [(line["event"], line.get("by", line.get("outcome"))) for line in world.journal.lines[before:]]
     assert after == [("trial_ended", "interrupted"), ("force_stopped", "program"), ("paused", "program")]
-    world.runner.post(ResumeAsked(20.0, "operator"))
+    world.runner.post(ResumeRequested(20.0, "operator"))
     assert world.servo.force_is_on
     assert world.state.phase is Phase.TASK
     assert world.state.attempt == 2
@@ -327,7 +327,7 @@ def test_a_choice_that_met_a_full_disk_is_there_after_the_pause() -> None:
     with pytest.raises(SessionError, match="disk full"):
         world.runner.post(Submitted(9.1))
     wait_for_the_disk(world)
-    world.runner.post(ResumeAsked(20.0, "operator"))
+    world.runner.post(ResumeRequested(20.0, "operator"))
     assert world.pages[-1].chosen == ((item, 6),)
     assert [line["value"] for line in world.journal.of("choice")] == [6]
 
@@ -366,9 +366,9 @@ def test_the_operators_stop_while_the_disk_is_full_is_not_the_participants_to_un
     wait_for_the_disk(practising)
     assert practising.pages[-1] == PausePage(force_off=True, held="force")
     with pytest.raises(SessionError, match="the operator resumes it"):
-        practising.runner.post(ResumeAsked(9.0, "participant"))
+        practising.runner.post(ResumeRequested(9.0, "participant"))
     assert not practising.servo.force_is_on
-    practising.runner.post(ResumeAsked(9.1, "operator"))
+    practising.runner.post(ResumeRequested(9.1, "operator"))
     assert practising.servo.force_is_on
 
 
@@ -394,7 +394,7 @@ def test_a_session_that_is_ended_with_a_full_disk_ends_and_stays_unfinished(prac
     stall(practising)
     practising.runner.post(Note(1.0, "mark", ""))
     with pytest.raises(StoreError, match="resume it later"):
-        practising.runner.post(EndAsked(2.0, "aborted", ""))
+        practising.runner.post(EndRequested(2.0, "aborted", ""))
     assert practising.runner.finished
     assert isinstance(practising.pages[-1], EndPage)
     assert practising.journal.status is None
@@ -404,7 +404,7 @@ def test_a_session_that_is_ended_when_there_is_space_again_is_finished(practisin
     stall(practising)
     practising.runner.post(Note(1.0, "mark", ""))
     practising.journal.fails_after = None
-    practising.runner.post(EndAsked(2.0, "withdrawn", ""))
+    practising.runner.post(EndRequested(2.0, "withdrawn", ""))
     assert practising.journal.status == "withdrawn"
     assert [line["event"] for line in practising.journal.lines[-4:]] == [
         "note",
@@ -416,7 +416,7 @@ def test_a_session_that_is_ended_when_there_is_space_again_is_finished(practisin
 
 def test_an_end_whose_receipt_fails_is_an_end_and_is_tried_again(practising: World) -> None:
     practising.journal.finish_fails = True
-    practising.runner.post(EndAsked(1.0, "withdrawn", ""))
+    practising.runner.post(EndRequested(1.0, "withdrawn", ""))
     assert practising.runner.finished
     assert practising.runner.stalled == "no room for the receipt"
     assert isinstance(practising.pages[-1], EndPage)

@@ -10,7 +10,7 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.session.device_buttons import ANSWERS
-from study_app.session.transitions.events import Chosen, Continue, PauseAsked, ResumeAsked, Submitted, TaskDone
+from study_app.session.transitions.events import Chosen, Continue, PauseRequested, ResumeRequested, Submitted, TaskDone
 from study_app.session.transitions.state import Phase
 from tests.compiled import needs_servo
 from tests.protocol.trials.level_studies import study
@@ -62,11 +62,11 @@ def test_force_is_zero_in_rests_feedback_and_pauses_and_not_in_intervals(bench: 
     assert bench.run(0.5).max() < STILL_N
     bench.run_to(Phase.TASK)
     bench.run(0.4)
-    bench.runner.post(PauseAsked(bench.clock(), "participant"))
+    bench.runner.post(PauseRequested(bench.clock(), "participant"))
     bench.run(0.06)
     assert bench.run(0.5).max() < STILL_N
     assert bench.state.phase is Phase.PAUSED
-    bench.runner.post(ResumeAsked(bench.clock(), "participant"))
+    bench.runner.post(ResumeRequested(bench.clock(), "participant"))
     assert bench.run(0.5).max() > 0.5
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from study_app.haptics.model.layout import LIMITER_GLITCH
-from study_app.session.transitions.events import Begin, Continue, EndAsked, PauseAsked, ResumeAsked
+from study_app.session.transitions.events import Begin, Continue, EndRequested, PauseRequested, ResumeRequested
 from study_app.session.trial import SETTLED_S
 from tests.session.fakes import LEFT, RIGHT, World, at_block, step
 
@@ -105,11 +105,11 @@ def test_samples_that_were_lost_are_counted_for_their_trial_alone(practising: Wo
 
 def test_an_interrupted_attempt_keeps_what_was_measured_and_the_trial_starts_again(practising: World) -> None:
     practising.run(0.8)
-    practising.runner.post(PauseAsked(0.8, "operator"))
+    practising.runner.post(PauseRequested(0.8, "operator"))
     (first,) = practising.journal.of("trial_ended")
     assert (first["attempt"], first["outcome"], first["ticks"]) == (1, "interrupted", 800)
     practising.run(5.0)  # a pause is no exploration
-    practising.runner.post(ResumeAsked(5.8, "operator"))
+    practising.runner.post(ResumeRequested(5.8, "operator"))
     assert practising.servo.scene == 2
     practising.run(3.2)
     second = practising.journal.of("trial_ended")[-1]
@@ -192,13 +192,13 @@ def test_force_task_and_recording_begin_with_the_first_painted_frame_of_the_tank
 def test_a_trial_that_is_paused_before_its_first_frame_was_neither_felt_nor_recorded() -> None:
     tape = Tape()
     world = unpainted(tape)
-    world.runner.post(PauseAsked(2.0, "operator"))
+    world.runner.post(PauseRequested(2.0, "operator"))
     (row,) = world.journal.of("trial_ended")
     assert (row["outcome"], row["duration_s"], row["ticks"], row["first_frame_gap_ms"]) == ("interrupted", 0, 0, None)
     assert row["samples_dropped"] == 0
     assert tape.told == []
     world.runner.frame_shown(1, 0)  # the last frame of a tank that is gone
-    world.runner.post(ResumeAsked(3.0, "operator"))
+    world.runner.post(ResumeRequested(3.0, "operator"))
     assert "load" not in world.log
 
 
@@ -230,9 +230,9 @@ def test_frames_are_recorded_with_their_trial_and_attempts_have_recordings_of_th
     world.runner.post(Continue(0.0))
     world.run(0.5)
     world.runner.frame_shown(500, 400)
-    world.runner.post(PauseAsked(0.5, "operator"))
+    world.runner.post(PauseRequested(0.5, "operator"))
     world.run(0.5)
-    world.runner.post(ResumeAsked(1.0, "operator"))
+    world.runner.post(ResumeRequested(1.0, "operator"))
     told = [told for told in tape.told if isinstance(told, tuple)]
     first = [("start", 1, 1, 1000.0), ("frame", 0, 0), ("frame", 500, 400), ("stop",)]
     assert told == [*first, ("start", 1, 2, 1000.0), ("frame", 10**9, 10**9)]
@@ -243,7 +243,7 @@ def test_the_end_is_put_off_until_the_recordings_are_on_the_disk() -> None:
     world = unpainted(settled=lambda: bool(settled))
     told: list[bool] = []
     world.runner.on_change(lambda _state: told.append(world.runner.finished))
-    world.runner.post(EndAsked(3.0, "aborted", "cable"))
+    world.runner.post(EndRequested(3.0, "aborted", "cable"))
     world.run(0.5)
     assert world.runner.ending
     assert not world.runner.finished

@@ -12,7 +12,7 @@ from study_app.haptics.model.slope_limits import SLEW_N
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.orders.schedule import stream
 from study_app.session.device_buttons import ANSWERS, CONTINUE
-from study_app.session.transitions.events import PauseAsked, Stepped, Submitted
+from study_app.session.transitions.events import PauseRequested, Stepped, Submitted
 from study_app.session.transitions.state import Phase
 from tests.compiled import needs_servo
 from tests.protocol.trials.matching import ALONE, DELAY, matching
@@ -98,7 +98,7 @@ def test_force_is_zero_in_the_rest_before_and_after_and_in_a_pause(rig: Rig) -> 
     assert bench.run(0.4).max() < STILL_N
     bench.run_to(Phase.TASK)
     assert bench.run(0.8).max() > 0.1
-    bench.runner.post(PauseAsked(bench.clock(), "participant"))
+    bench.runner.post(PauseRequested(bench.clock(), "participant"))
     bench.run(0.06)
     assert bench.run(0.4).max() < STILL_N
 

@@ -19,11 +19,11 @@ from study_app.session.runner import Runner
 from study_app.session.transitions.events import (
     Begin,
     Continue,
-    EndAsked,
+    EndRequested,
     ForceStopped,
-    PauseAsked,
-    RepeatAsked,
-    ResumeAsked,
+    PauseRequested,
+    RepeatRequested,
+    ResumeRequested,
 )
 from study_app.session.transitions.state import Phase
 from study_app.session.trial import SETTLED_S
@@ -81,7 +81,7 @@ def bench() -> Iterator[Bench]:
 def test_there_is_no_force_before_the_first_painted_frame_and_then_it_fades_in(bench: Bench) -> None:
     bench.run(800)
     bench.paints = False
-    bench.runner.post(RepeatAsked(bench.clock(), "the window was hidden"))
+    bench.runner.post(RepeatRequested(bench.clock(), "the window was hidden"))
     bench.run(60)
     assert (bench.run(500) == 0).all()
     assert bench.runner.task is not None
@@ -98,7 +98,7 @@ def test_a_force_stop_is_zero_force_with_the_next_tick_and_until_it_is_faded_in(
     bench.runner.post(ForceStopped(bench.clock(), "participant"))
     assert (bench.run(500) == 0).all()
     assert bench.pages[-1] == PausePage(force_off=True)
-    bench.runner.post(ResumeAsked(bench.clock(), "operator"))
+    bench.runner.post(ResumeRequested(bench.clock(), "operator"))
     force_n = bench.run(900)
     assert force_n.max() > 0.5
     assert force_n[:50].max() < 0.15 * force_n.max()  # the start's fade takes half a second
@@ -115,12 +115,12 @@ def test_button_four_of_the_device_stops_the_force(bench: Bench) -> None:
 
 def test_a_pause_and_an_end_take_the_liquid_away(bench: Bench) -> None:
     bench.run(800)
-    bench.runner.post(PauseAsked(bench.clock(), "operator"))
+    bench.runner.post(PauseRequested(bench.clock(), "operator"))
     bench.run(60)  # a change of scene fades
     assert (bench.run(500) == 0).all()
-    bench.runner.post(ResumeAsked(bench.clock(), "operator"))
+    bench.runner.post(ResumeRequested(bench.clock(), "operator"))
     assert bench.run(500).max() > 0.5
-    bench.runner.post(EndAsked(bench.clock(), "withdrawn", ""))
+    bench.runner.post(EndRequested(bench.clock(), "withdrawn", ""))
     bench.run(60)
     assert (bench.run(500) == 0).all()
 
@@ -148,7 +148,7 @@ def late(bench: Bench, clock: VirtualClock) -> None:
 
 
 def late_before_the_first_tick(bench: Bench, clock: VirtualClock) -> None:
-    bench.runner.post(RepeatAsked(bench.clock(), "once more"))
+    bench.runner.post(RepeatRequested(bench.clock(), "once more"))
     clock.memory[0].now_ns += 5_000_000_000  # between the first painted frame and the first tick of the scene
 
 
@@ -175,7 +175,7 @@ def test_a_freeze_within_a_trial_interrupts_it_and_it_comes_again(bench: Bench, 
     assert (row["trial"], row["outcome"]) == (1, "interrupted")
     assert row["worst_gap_ms"] == pytest.approx(5000, abs=2)
     bench.run(500)
-    bench.runner.post(ResumeAsked(bench.clock(), "participant"))
+    bench.runner.post(ResumeRequested(bench.clock(), "participant"))
     bench.run(3500)
     row = bench.journal.of("trial_ended")[-1]
     assert (row["trial"], row["attempt"], row["outcome"]) == (
@@ -189,12 +189,12 @@ def test_a_freeze_within_a_trial_interrupts_it_and_it_comes_again(bench: Bench, 
 def test_a_freeze_while_a_page_is_read_interrupts_nothing(bench: Bench) -> None:
     clock = bench.servo.loop.clock
     assert isinstance(clock, VirtualClock)
-    bench.runner.post(PauseAsked(bench.clock(), "participant"))
+    bench.runner.post(PauseRequested(bench.clock(), "participant"))
     bench.run(100)
     clock.memory[0].now_ns += 5_000_000_000
     clock.suspension_ns += 5_000_000_000
     bench.run(100)
-    bench.runner.post(ResumeAsked(bench.clock(), "participant"))
+    bench.runner.post(ResumeRequested(bench.clock(), "participant"))
     bench.run(3500)
     assert bench.journal.of("trial_ended")[-1]["outcome"] == "complete"
 

@@ -6,16 +6,16 @@ from typing import Any, get_args
 from study_app.session.transitions.events import (
     Broke,
     Chosen,
-    EndAsked,
+    EndRequested,
     Event,
     ForceStopped,
     ItemShown,
     LanguageChosen,
     Note,
-    PauseAsked,
+    PauseRequested,
     Reconnected,
-    RepeatAsked,
-    ResumeAsked,
+    RepeatRequested,
+    ResumeRequested,
     Retracted,
     ShowPage,
     Stepped,
@@ -54,13 +54,13 @@ def state_in(phase: Phase) -> SessionState:
         case Phase.FEEDBACK:
             return pairs.walk(pairs.opened(), Phase.FEEDBACK)
         case Phase.PAUSED:
-            return advance(answering, PauseAsked(9.0, "operator"))[0]
+            return advance(answering, PauseRequested(9.0, "operator"))[0]
         case Phase.STALLED:
             return advance(answering, WriteFailed(9.0, "disk full", (LEFT,)))[0]
         case Phase.TROUBLE:
             return advance(answering, Broke(9.0, "cable", "device"))[0]
         case _:
-            return advance(answering, EndAsked(9.0, "withdrawn", ""))[0]
+            return advance(answering, EndRequested(9.0, "withdrawn", ""))[0]
 
 
 def event_of(kind: type[Any]) -> Any:
@@ -72,12 +72,12 @@ def event_of(kind: type[Any]) -> Any:
         Chosen: ("liquid", 3),
         Retracted: ("liquid",),
         LanguageChosen: ("en",),
-        PauseAsked: ("participant",),
-        ResumeAsked: ("operator",),
+        PauseRequested: ("participant",),
+        ResumeRequested: ("operator",),
         ForceStopped: ("device",),
         Note: ("note", "spilled, coffee"),
-        RepeatAsked: ("a call",),
-        EndAsked: ("aborted", "fire drill"),
+        RepeatRequested: ("a call",),
+        EndRequested: ("aborted", "fire drill"),
         Broke: ("no sample for 50 ms",),
         WriteFailed: ("disk full", ()),
         Reconnected: ({"name": "memory"},),

@@ -9,7 +9,7 @@ import pytest
 from study_app.errors import SessionError
 from study_app.protocol.orders.schedule import Trial
 from study_app.session.resume import resume_at
-from study_app.session.transitions.events import Begin, Finish, ResumeAsked, TaskDone, TimeUp, Write
+from study_app.session.transitions.events import Begin, Finish, ResumeRequested, TaskDone, TimeUp, Write
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance
 from tests.journal_lines import event_from
@@ -143,7 +143,7 @@ def test_a_session_killed_after_any_line_gives_up_the_same_trials_as_one_that_wa
         start = resume_at(protocol, schedule, map(event_from, [began, *lines[:count]]), NO_SEALS)
         state, _ = advance(pairs.opened(protocol, start=start), Begin(0.0))
         if state.phase is Phase.PAUSED:
-            state, _ = advance(state, ResumeAsked(0.0, "operator"))
+            state, _ = advance(state, ResumeRequested(0.0, "operator"))
         resumed = [line for _, line in events_of(state, FAILS)]
         assert answers([*lines[:count], *resumed]) == whole, lines[count - 1]
         assert undelivered([*lines[:count], *resumed]) == invalid, lines[count - 1]

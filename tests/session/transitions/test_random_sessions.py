@@ -17,15 +17,15 @@ from study_app.session.transitions.events import (
     Broke,
     Chosen,
     Continue,
-    EndAsked,
+    EndRequested,
     FadeIn,
     Finish,
     ForceStopped,
     ItemShown,
-    PauseAsked,
-    RepeatAsked,
+    PauseRequested,
+    RepeatRequested,
     Rest,
-    ResumeAsked,
+    ResumeRequested,
     Retracted,
     ShowPage,
     StartTrial,
@@ -46,12 +46,12 @@ from tests.session.transitions.states import EVENTS, event_of
 
 CHOICES = st.one_of(st.integers(1, 7), st.none())
 ANY_EVENT = st.one_of(
-    *(st.just(event_of(kind)) for kind in EVENTS if kind not in (Chosen, ItemShown, Broke, EndAsked, Retracted)),
+    *(st.just(event_of(kind)) for kind in EVENTS if kind not in (Chosen, ItemShown, Broke, EndRequested, Retracted)),
     st.builds(Chosen, st.just(0.0), st.sampled_from(["liquid", "strong", "spare", "different"]), CHOICES),
     st.builds(ItemShown, st.just(0.0), st.sampled_from(["liquid", "strong", "spare", "different"])),
     st.builds(Retracted, st.just(0.0), st.sampled_from(["liquid", "strong", "spare", "different"])),
 )
-INCIDENTS = st.one_of(ANY_EVENT, st.sampled_from([event_of(Broke), event_of(EndAsked)]))
+INCIDENTS = st.one_of(ANY_EVENT, st.sampled_from([event_of(Broke), event_of(EndRequested)]))
 
 
 @settings(max_examples=150, deadline=None)
@@ -87,7 +87,7 @@ def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events:
     if state.phase is Phase.STALLED:
         state, _ = advance(state, WriteCompleted(998.0))
     if state.phase not in FINAL:
-        state, commands = advance(state, EndAsked(999.0, "aborted", ""))
+        state, commands = advance(state, EndRequested(999.0, "aborted", ""))
         assert any(isinstance(command, Finish) for command in commands)
     assert state.phase in FINAL
 
@@ -96,7 +96,7 @@ def _going_on(state: SessionState) -> Any:
     if state.phase is Phase.STALLED:
         return WriteCompleted(1.0)
     waiting = state.phase in {Phase.PAUSED, Phase.TROUBLE, *FINAL}
-    return ResumeAsked(1.0, "operator") if waiting else small.next_event(state, 1.0)
+    return ResumeRequested(1.0, "operator") if waiting else small.next_event(state, 1.0)
 
 
 def _check_order(commands: tuple[Any, ...]) -> None:
@@ -116,9 +116,11 @@ def test_every_trial_that_was_begun_is_ended_once_per_attempt(seed: int, data: s
     ended: list[tuple[int, int]] = []
     while state.phase not in FINAL:
         if state.phase is Phase.PAUSED:
-            event: Any = ResumeAsked(1.0, "operator")
+            event: Any = ResumeRequested(1.0, "operator")
         elif state.phase is Phase.TASK and data.draw(st.booleans()):
-            event = data.draw(st.sampled_from([event_of(PauseAsked), event_of(ForceStopped), event_of(RepeatAsked)]))
+            event = data.draw(
+                st.sampled_from([event_of(PauseRequested), event_of(ForceStopped), event_of(RepeatRequested)])
+            )
         else:
             event = small.next_event(state, 1.0)
         state, commands = advance(state, event)

@@ -132,7 +132,7 @@ def test_a_program_killed_between_claim_and_first_line_leaves_a_consistent_folde
     study = StudyFolder(tmp_path / "s")
     begun(study.path, "P000").close()
     with monkeypatch.context() as patched:
-        patched.setattr("study_app.store.sessions.begin.first_words", die)
+        patched.setattr("study_app.store.sessions.begin.first_records", die)
         assert forked(lambda: begun(study.path, "P001")) == -signal.SIGKILL
     assert [claim.participant for claim in claims(study)] == ["P000", "P001"]
     found = verify(study.path)

@@ -8,7 +8,7 @@ import pytest
 from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NORM, SAMPLE
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.presentation import Due
+from study_app.protocol.trials.presentation import Presentation
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store.delivered import delay_error_ms, delivered, delivered_error, judged, missed, undelivered
 
@@ -127,8 +127,8 @@ def test_the_fade_and_refused_positions_are_not_judged(protocol: Protocol) -> No
 def test_delays_are_judged_by_the_difference_of_their_errors(
     protocol: Protocol, errors_ms: list[float | None], holds: tuple[bool, ...], broken: list[str]
 ) -> None:
-    assert [*missed(protocol.limits, Due(10.0, 50.0, 0, (DELAY, DELAY)), holds, errors_ms, 1000.0)] == broken
-    assert [*missed(protocol.limits, Due(0.1, 8.0, 0, (DAMPING, DAMPING)), holds, errors_ms, 1000.0)] == []
+    assert [*missed(protocol.limits, Presentation(10.0, 50.0, 0, (DELAY, DELAY)), holds, errors_ms, 1000.0)] == broken
+    assert [*missed(protocol.limits, Presentation(0.1, 8.0, 0, (DAMPING, DAMPING)), holds, errors_ms, 1000.0)] == []
 
 
 def late(delay: int, b_nspm: float = 8.0) -> Any:

@@ -24,7 +24,7 @@ from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, font
 from study_app.gui.widgets.accessible import HeadingLabel, say
 from study_app.gui.widgets.boxes import STRETCH, vbox
 from study_app.session.pages import EndPage, PausePage, TextPage, TroublePage
-from study_app.session.transitions.events import Continue, EndAsked, LanguageChosen, ResumeAsked
+from study_app.session.transitions.events import Continue, EndRequested, LanguageChosen, ResumeRequested
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words
@@ -345,7 +345,7 @@ class TextWidget(ReadingPage):
             self.decline.move(left, place.center().y() - size.height() // 2)
 
     def _decline(self) -> None:
-        self.event_made.emit(EndAsked(self._clock(), "withdrawn", "no consent"))
+        self.event_made.emit(EndRequested(self._clock(), "withdrawn", "no consent"))
 
     def _place_count(self) -> None:
         assert self.button is not None  # noqa: S101  # these pages have one
@@ -428,7 +428,7 @@ class PauseWidget(ReadingPage):
     def go_on(self) -> None:
         """Ask to go on with the session, where that is the participant's to do."""
         if self.button is not None:
-            self.event_made.emit(ResumeAsked(self._clock(), "participant"))
+            self.event_made.emit(ResumeRequested(self._clock(), "participant"))
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
