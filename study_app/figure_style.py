@@ -5,7 +5,7 @@ Files are deterministic: no dates, SVG ids from a fixed salt. SVG keeps text as 
 
 import contextlib
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -106,7 +106,7 @@ def screen_fonts() -> tuple[str, ...]:
     return ("Inter", *PRINT_FONTS)
 
 
-def fonts_for(kind: str) -> Sequence[str]:
+def fonts_for(kind: str) -> tuple[str, ...]:
     """Return the families for a file of ``kind`` (one of ``FORMATS``)."""
     return PRINT_FONTS if kind == "pdf" else screen_fonts()
 

@@ -1,5 +1,6 @@
 """From a study to all that can be said about it: the one place that decides which tests apply to which block."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -31,20 +32,19 @@ SEED: Final = 1
 """Of all random rearrangements and resamples: the same results give the same numbers."""
 
 
-def evaluate(study: Study, *, progress: Progress = silent, planning: bool = True) -> Results:
+def evaluate(study: Study, *, progress: Progress = silent) -> Results:
     """Test everything that the answers and recordings of a study can answer.
 
     While the key is sealed only counts and comparisons of codes are there; ``BlockFound.absent`` says what waits, and
     what so few participants could not show. A part that fails is in ``Results.failures`` and, with the reason, in its
-    block's ``absent``; everything else is there. ``planning``: whether to
-    compute how many participants each comparison would need, which is most of the work.
+    block's ``absent``; everything else is there.
 
     Examples
     --------
     >>> from pathlib import Path
     >>> from study_app.analysis.findings.statement_tests import SettingsDiffer
     >>> from study_app.analysis.data.study_tables import load_study
-    >>> results = evaluate(load_study(Path("results/sample-rek2024")), planning=False)
+    >>> results = evaluate(load_study(Path("results/sample-rek2024")))
     >>> [(block.id, block.n, block.revealed) for block in results.blocks]
     [('liquids', 12, False), ('delays', 12, False)]
     >>> tested = SettingsDiffer.of(results.blocks[0])[0]
@@ -53,7 +53,7 @@ def evaluate(study: Study, *, progress: Progress = silent, planning: bool = True
     """
     failures = Failures()
     try:
-        return _evaluated(study, failures, partial(_ending, progress), planning=planning)
+        return _evaluated(study, failures, partial(_ending, progress))
     except Ended as ended:
         raise ended.error from None
 
@@ -66,13 +66,13 @@ def _ending(progress: Progress, what: str, share: float) -> None:
         raise Ended(error) from error
 
 
-def _evaluated(study: Study, failures: Failures, progress: Progress, *, planning: bool) -> Results:
+def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
     def tested(number: int, block: Block) -> BlockFound:
         def tell(what: str) -> None:
             progress(f"testing: {what}", 0.5 * number / len(study.blocks))
 
         def test() -> BlockFound:
-            return found_in(study, block_answers(study, block, SEED, tell, failures, planning=planning))
+            return found_in(study, block_answers(study, block, SEED, failures), tell)
 
         found = failures.attempt("all tests", test, block=block.id)
         return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
@@ -103,8 +103,11 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, planning
     )
 
 
-def found_in(study: Study | None, answers: BlockAnswers) -> BlockFound:
-    """Test everything that a block's answers can answer; without a study no measures."""
+def found_in(study: Study | None, answers: BlockAnswers, tell: Callable[[str], object] = str) -> BlockFound:
+    """Test everything that a block's answers can answer; without a study no measures.
+
+    ``tell`` receives the name of each finding that is begun.
+    """
     block = answers.block
     found = block_facts(study, answers)
     settings: list[NotTested] = []
@@ -116,6 +119,7 @@ def found_in(study: Study | None, answers: BlockAnswers) -> BlockFound:
             if not block.revealed and block.kind in finding.waits:
                 not_tested.append(NotTested(finding.what, SEALED))
             continue
+        tell(finding.what)
         (value, absent), failed = answers.attempt(
             finding.what, partial(finding.test, answers, found), (finding.empty, ())
         )

@@ -106,10 +106,11 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
 
     for number, block in enumerate(study.blocks):
         send(Progress("drawing", 0.3 + 0.7 * number / len(study.blocks)))
-        words, svg = "No completed session has answers here yet.", b""
+        words, svg, name = "No completed session has answers here yet.", b"", block_name(study, block)
         if len(study.answers(block)):
-            words, svg = answer_figures.caption(study, block), answer_figures.render(study, block, "svg")
-        send(FigureDrawn(block_name(study, block), answer_figures.title(block), words, svg))
+            picture = answer_figures.answers_picture(study, block, name, ("svg",))
+            words, svg = picture.caption, picture.files["svg"]
+        send(FigureDrawn(name, answer_figures.title(block), words, svg))
         _go_on(stop)
     _draw_questions(study, send, stop)
     if study.revealed and study.n:
@@ -174,7 +175,7 @@ def _evaluate(study: Study, send: Send, stop: Callable[[], bool]) -> None:
 
     going = partial(_going, send, stop)
     going("testing", 0.0)
-    results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share), planning=False)
+    results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share))
     titles = {block_name(study, block): answer_figures.title(block) for block in study.blocks}
     titles |= {one.figure_name: one.figure_title for one in all_findings() if one.figure_name}
     for drawn, picture in enumerate(pictures(study, results, ("svg",)), start=1):

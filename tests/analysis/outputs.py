@@ -26,7 +26,6 @@ def figures_as_lines() -> Iterator[None]:
     """Let files of figures hold what these show."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(figure_style, "file_bytes", stub_png)
-        patched.setattr(write_report, "font_faces", str)
         for draw in (pictures, level_pictures, question_pictures):
             patched.setattr(write_report, draw.__name__, partial(draw, forms=("png",)))
         yield

@@ -47,7 +47,7 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
 
     Each finding has a value only in blocks that it is about, and only codes to speak of while the key is sealed.
     """
-    results = evaluate(made, planning=False)
+    results = evaluate(made)
     assert results.failures == ()
     json.dumps(plain(results), allow_nan=False)
     failures = Failures()

@@ -34,12 +34,12 @@ def study_of(people: int, *, changed: bool = False, alpha: float = 0.05, levels:
 
 def test_decisions_that_changed_are_told_as_that_and_not_as_none() -> None:
     made = study_of(8, changed=True)
-    told = methods(made, evaluate(made, planning=False))
+    told = methods(made, evaluate(made))
     assert "The decisions about the analysis changed between sessions" in told
     assert not any(f"{word} before the first session" in told.lower() for word in ("decided", "made"))
     assert "No decisions were made beforehand" not in told
     kept = study_of(8)
-    told = methods(kept, evaluate(kept, planning=False))
+    told = methods(kept, evaluate(kept))
     assert "a bound of ±1 point, decided before the first session, and 90 % intervals" in told
 
 
@@ -47,12 +47,12 @@ def test_pooled_versions_of_a_protocol_are_named() -> None:
     made = study_of(4)
     people = made.participants.assign(protocol_version=["1", "1", "2", "2"])
     both = replace(made, participants=people)
-    assert "versions 1 and 2, pooled" in methods(both, evaluate(both, planning=False))
+    assert "versions 1 and 2, pooled" in methods(both, evaluate(both))
 
 
 def test_the_verdict_of_unanimity_holds_after_the_correction() -> None:
     made = study_of(12)
-    (found,) = evaluate(made, planning=False).blocks
+    (found,) = evaluate(made).blocks
     assert {one.verdict for one in ContrastsWithControl.of(found) if one.delay_ms > 0} == {"different"}
     assert all(one.found.interval is None for one in ContrastsWithControl.of(found))
 
@@ -65,7 +65,7 @@ def test_the_verdict_of_one_of_many_comparisons_is_the_corrected_one(longest_ms:
         return 4 + {"D1": 0, "D2": by_chance[person]}.get(code, scattered[person])
 
     settings = delays([ms for ms in (0.0, 50.0, 100.0, 150.0, 200.0) if ms <= longest_ms])
-    (found,) = evaluate(study(settings, list(everybody(settings, 10, answer))), planning=False).blocks
+    (found,) = evaluate(study(settings, list(everybody(settings, 10, answer)))).blocks
     assert ContrastsWithControl.of(found)[0].found.p_difference is not None
     assert ContrastsWithControl.of(found)[0].found.p_difference <= 0.05 / 2
     assert ContrastsWithControl.of(found)[0].verdict == verdict
@@ -77,7 +77,7 @@ def test_all_statements_are_told_as_a_reader_would() -> None:
     ]
     two = liquids(2)
     made = study(two, list(everybody(two, 10, moved)))
-    told = " ".join(findings(evaluate(made, planning=False)))
+    told = " ".join(findings(evaluate(made)))
     assert "one test over both statements" in told
     assert "“Different” (higher for Liquid2, adjusted p" in told
 
@@ -96,7 +96,7 @@ def rising(seed: int, shift: float = 0.0):  # type: ignore[no-untyped-def]
 
 
 def evaluated(made: Study) -> tuple[Results, BlockFound]:
-    results = evaluate(made, planning=False)
+    results = evaluate(made)
     assert results.failures == ()
     return results, results.blocks[0]
 

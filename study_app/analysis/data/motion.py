@@ -7,7 +7,7 @@ first reach of a trial begins wherever the hand was and is left out.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from study_app.analysis.data.blocks import Block
-from study_app.analysis.data.measures import Array, quartiles
+from study_app.analysis.data.measures import Array, quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_GLITCH
@@ -197,19 +197,6 @@ class Performance:
         """Return whether there is any reach of a block."""
         return any(trial.block == block for trial in self.reached)
 
-    def by_participant(self, people: Sequence[str], block: Block, measure: str) -> Array:
-        """Return the medians of a measure of reaches (participants, settings), NaN where there is none."""
-        values = np.full((len(people), len(block.codes)), np.nan)
-        found: dict[tuple[int, int], list[float]] = {}
-        for trial in self.reached:
-            if trial.block == block.id:
-                place = people.index(trial.participant), block.codes.index(trial.code)
-                found.setdefault(place, []).extend(getattr(reach, measure) for reach in trial.found)
-        for place, numbers in found.items():
-            if numbers:
-                values[place] = np.median(numbers)
-        return values
-
 
 def performance(study: Study, each: Callable[[int, int], object] = lambda _done, _of: None) -> Performance:
     """Measure the trials that count; ``each`` receives how many recordings of how many were read."""
@@ -227,12 +214,19 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
             unread[one] = unread.get(one, 0) + 1
         else:
             found.append(one)
-    moved = [*_of_trials(study, rows)]
-    whole = Performance((), where, tuple(found), 0, 0, 0, 0, ())
-    for block in study.blocks:
-        if block.id in where and found:
-            for measure in OF_REACHES:
-                moved += _summarised(block, measure, whole.by_participant(study.people, block, measure))
+    of_trials = rows.assign(
+        path_m=rows["path_length_m"],
+        at_limit_percent=100 * rows["limiter_norm"].astype("Float64") / rows["ticks"].replace(0, pd.NA),
+    )
+    moved = [one for block in study.blocks for one in _quartiles(block, of_trials, OF_TRIALS)]
+    if found:
+        of_reaches = pd.DataFrame(
+            [{**asdict(trial), **asdict(reach)} for trial in found for reach in trial.found],
+            columns=["participant", "block", "code", *OF_REACHES],
+        )
+        moved += [
+            one for block in study.blocks if block.id in where for one in _quartiles(block, of_reaches, OF_REACHES)
+        ]
     return Performance(
         moved=tuple(moved),
         reaching=where,
@@ -288,35 +282,11 @@ def _file(folder: Path, row: Mapping[Any, Any]) -> Path:
     return session_in(folder, str(row["participant"]), int(row["session"])).path / str(row["recording"])
 
 
-def _of_trials(study: Study, rows: pd.DataFrame) -> list[Moved]:
-    table = pd.DataFrame(
-        {
-            "participant": rows["participant"],
-            "block": rows["block"],
-            "code": rows["code"],
-            "duration_s": rows["duration_s"],
-            "path_m": rows["path_length_m"],
-            "force_mean_n": rows["force_mean_n"],
-            "force_peak_n": rows["force_peak_n"],
-            "at_limit_percent": 100 * rows["limiter_norm"].astype("Float64") / rows["ticks"].replace(0, pd.NA),
-        }
-    )
-    medians = table.groupby(["block", "code", "participant"])[list(OF_TRIALS)].median().reset_index()
-    found = []
-    for block in study.blocks:
-        here = medians[(medians["block"] == block.id) & medians["code"].isin(block.codes)]
-        for measure in OF_TRIALS:
-            wide = here.pivot_table(index="participant", columns="code", values=measure, dropna=False)
-            values = wide.reindex(columns=list(block.codes)).to_numpy(dtype=float, na_value=np.nan)
-            found += _summarised(block, measure, values)
-    return found
-
-
-def _summarised(block: Block, measure: str, values: Array) -> list[Moved]:
-    """Return a measure's quartiles over participants (participants, settings) for each setting."""
-    found = []
-    for code, column in zip(block.codes, values.T, strict=True):
-        n = int((~np.isnan(column)).sum())
-        q1, median, q3 = quartiles(column) if n else (None, None, None)
-        found.append(Moved(block.id, code, measure, n, median, q1, q3))
-    return found
+def _quartiles(block: Block, rows: pd.DataFrame, measures: Sequence[str]) -> Iterator[Moved]:
+    """Yield the quartiles over participants of each one's median, by measure and setting; ``rows`` are of any block."""
+    here = rows[rows["block"] == block.id]
+    medians = here.groupby(["code", "participant"])[list(measures)].median()
+    for measure in measures:
+        for code in block.codes:
+            values = medians[measure][medians.index.get_level_values("code") == code].dropna().to_numpy(dtype=float)
+            yield Moved(block.id, code, measure, len(values), *quartiles_or_none(values))

@@ -1,4 +1,4 @@
-"""The figures of answers to statements, with their captions: by setting, over delay, and of recognition; and motion.
+"""The figures of answers to statements, with their captions: by setting, over delay, and of recognition.
 
 Disagreement grows left and agreement right from one line; neutral answers stand in a column of their own on the same
 scale, since splitting them over the line would make half of "neither" look like disagreement.
@@ -11,13 +11,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
@@ -25,7 +25,7 @@ from study_app import figure_style as style
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import COUNT_COLUMNS, LEVELS, NEUTRAL, QUARTILES, Array, by_participant, quartiles
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.page_layout import MARGIN_PT, Look, Sheet, Style, study_marks
+from study_app.analysis.figures.page_layout import MARGIN_PT, Look, Picture, Sheet, Style, picture_of
 from study_app.analysis.statistics.thresholds import Threshold
 from study_app.errors import AnalysisError
 from study_app.number_text import counted
@@ -240,40 +240,6 @@ def draw_threshold(found: Threshold, lowest_ms: float | None, look: Look) -> She
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
     axes.plot(levels[there], shares, "o", **dots)
     sheet.text(MARGIN_PT, sheet.height_pt - 5, "Added delay, ms", size=6.5, colour=style.TEXT_SOFT)
-    return sheet
-
-
-MOVEMENT_PT: Final = 104.0
-MOVEMENT_TOP_PT: Final = 40.0
-TITLE_PT: Final = 16.0
-MOVEMENT_GAP_PT: Final = 30.0
-MOVEMENT_LEFT_PT: Final = 24.0
-MOVEMENT_FOOT_PT: Final = 32.0
-
-
-@style.own_settings()
-def draw_movement(plots: Sequence[tuple[str, Array]], delays_ms: Sequence[float], foot: str, look: Look) -> Sheet:
-    """Draw measures (their title with the unit, and (participants, delays) values) on scales that begin where these do.
-
-    NaN is a value that is missing.
-    """
-    columns = len(plots)
-    width = (style.PAGE_WIDTH_PT - 2 * MARGIN_PT - MOVEMENT_LEFT_PT - (columns - 1) * MOVEMENT_GAP_PT) / columns
-    sheet = look.sheet(MOVEMENT_TOP_PT + TITLE_PT + MOVEMENT_PT + MOVEMENT_FOOT_PT)
-    legend(sheet, lines=True)
-    for place, (title, values) in enumerate(plots):
-        x = MARGIN_PT + MOVEMENT_LEFT_PT + place * (width + MOVEMENT_GAP_PT)
-        sheet.text(x, MOVEMENT_TOP_PT + 8, title, size=7.5, weight="bold")
-        axes = sheet.axes(x, MOVEMENT_TOP_PT + TITLE_PT, width, MOVEMENT_PT)
-        axes.set_label(f"measure{place + 1}")
-        there = values[~np.isnan(values)]
-        low, high = (float(there.min()), float(there.max())) if len(there) else (0.0, 0.0)
-        room = 0.08 * (high - low) or 0.5
-        axes.set_ylim(low - room, high + room)
-        ticks = round_ticks(low - room, high + room, max(0.0, low - room), high + room) if high > low else [low]
-        sheet.scale(axes, "y", ticks, [f"{tick:.3g}" for tick in ticks], lines=True)
-        over_delay(sheet, axes, values, np.asarray(delays_ms, dtype=float), 0.0)
-    sheet.text(MARGIN_PT + MOVEMENT_LEFT_PT, sheet.height_pt - 6, foot, size=6.5, colour=style.TEXT_SOFT)
     return sheet
 
 
@@ -581,16 +547,19 @@ def _segment(sheet: Sheet, axes: Axes, left: float, y: int, level: int, count: i
         axes.text(left + count / 2, y, str(count), fontproperties=font, color=ink, **place)
 
 
-def figure(
-    study: Study, block: Block, fonts: Sequence[str] | None = None, lowest: Mapping[str, float] = MappingProxyType({})
-) -> Figure:
+def answers_picture(
+    study: Study,
+    block: Block,
+    name: str,
+    forms: Sequence[str] = style.FORMATS,
+    lowest: Mapping[str, float] = MappingProxyType({}),
+) -> Picture:
     """Draw the answers of a block: diverging bars, a panel per setting; of delays, a plot per statement over delay.
 
-    A participant's repeated answers are drawn over delay as their median; ``lowest`` maps items to the lowest delay at
-    which a trend shows [ms], which is marked. Raises AnalysisError where no session was completed.
+    ``lowest`` maps items to the lowest delay at which a trend shows [ms], which is marked. Raises AnalysisError where
+    no session was completed.
     """
-    answers = study.answers(block)
-    if not len(answers):
+    if not len(study.answers(block)):
         columns = ["participant", "session", "status", "excluded"]
         states = ", ".join(
             f"{participant} session {session} {'excluded' if excluded else status}"
@@ -600,22 +569,28 @@ def figure(
             f"{study.folder}: no completed session with answers in {block.id!r} yet ({states}): figures are drawn from "
             "completed sessions; export writes what there is"
         )
-    look = Look(title(block), study_marks(study), counts(study, block), fonts or style.screen_fonts())
+    words = caption(study, block)
+    if lowest:
+        words += (
+            " Dashed: lowest delay at which stepping down still shows a trend, with the error rate held over all "
+            "statements; an upper bound of the delay that is noticed."
+        )
+    draw = partial(draw_block, study, block, lowest)
+    return picture_of(study, block.id, name, title(block), words, draw, forms, counts(study, block))
+
+
+def draw_block(study: Study, block: Block, lowest: Mapping[str, float], look: Look) -> Sheet:
+    """Draw the answers of a block; a participant's repeated answers are drawn over delay as their median."""
     if block.kind != "delays":
-        return draw_agreement(study, block, look).figure
+        return draw_agreement(study, block, look)
+    answers = study.answers(block)
     people = sorted(answers["participant"].unique())
     plots = [(item.short, by_participant(answers, people, block.columns, item.id)) for item in block.items]
     marked = [lowest.get(item.id) for item in block.items]
     shown = block.delays_ms if block.revealed else None
     said = "Added delay, ms." if block.revealed else "Delay settings by code; the order of the codes says nothing."
     foot = f"{said}   1 = {block.labels[0]}, 7 = {block.labels[-1]}."
-    return draw_answers(plots, block.codes, shown, marked, foot, look).figure
-
-
-def render(study: Study, block: Block, form: str, lowest: Mapping[str, float] = MappingProxyType({})) -> bytes:
-    """Return the figure of a block as a file of ``form`` (png, svg or pdf); ``lowest`` as in :func:`figure`."""
-    drawn = figure(study, block, style.fonts_for(form), lowest)
-    return style.file_bytes(drawn, form, f"{study.name}: {title(block)}")
+    return draw_answers(plots, block.codes, shown, marked, foot, look)
 
 
 CELL_PT: Final = (52.0, 26.0)

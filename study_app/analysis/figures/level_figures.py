@@ -639,7 +639,7 @@ def level_pictures(
     """
     yield from attempted(
         (
-            (found.block, f"{what}-{found.block}", partial(draw, study, found, forms))
+            (found.block, name := f"{what}-{found.block}", partial(draw, study, found, forms, name))
             for what, applies, draw in FIGURES
             for found in levels
             if applies(found)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -196,12 +195,12 @@ class Picture:
 
 
 def attempted(
-    pictures: Iterable[tuple[str, str, Callable[[str], Picture | None]]], failures: Failures | None
+    pictures: Iterable[tuple[str, str, Callable[[], Picture | None]]], failures: Failures | None
 ) -> Iterator[Picture]:
-    """Yield figures from block, name and what draws it by that name; one that fails is kept in ``failures`` instead."""
+    """Yield figures from block, name and what draws it; one that fails is kept in ``failures`` instead."""
     held = Failures() if failures is None else failures
     for block, name, draw in pictures:
-        drawn = held.attempt(f"figure {name}", partial(draw, name), block=block)
+        drawn = held.attempt(f"figure {name}", draw, block=block)
         if drawn is not None and not isinstance(drawn, Failure):
             yield drawn
 
@@ -218,12 +217,9 @@ def picture_of(
 ) -> Picture:
     """Return the figure that ``draw`` draws in each form; ``counts`` say how many took part if not all of the study."""
     people = (counted(study.n, "participant"),) if counts is None else counts
-    files = {
-        form: style.file_bytes(
-            draw(Look(title, study_marks(study), people, style.fonts_for(form))).figure, form, f"{study.name}: {title}"
-        )
-        for form in forms
-    }
+    fonts = {form: style.fonts_for(form) for form in forms}
+    drawn = {one: draw(Look(title, study_marks(study), people, one)).figure for one in dict.fromkeys(fonts.values())}
+    files = {form: style.file_bytes(drawn[fonts[form]], form, f"{study.name}: {title}") for form in forms}
     return Picture(block, name, caption, files)
 
 

@@ -198,7 +198,11 @@ def question_pictures(
     set_by_hand = {block.id for block in study.levels if block.design.adjusts}
     yield from attempted(
         (
-            (found.where, f"question-{found.where}-{found.item}", partial(_picture, study, asked, found, forms))
+            (
+                found.where,
+                name := f"question-{found.where}-{found.item}",
+                partial(_picture, study, asked, found, forms, name),
+            )
             for asked, found in zip(study.others.questions, answered, strict=True)
             if found.figure is not None and found.n and found.where not in set_by_hand
         ),

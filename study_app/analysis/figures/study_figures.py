@@ -1,7 +1,6 @@
 """Every figure of a study: of its answers as files, and of its findings for a report."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +9,6 @@ from study_app.analysis.data.blocks import KINDS, Block
 from study_app.analysis.data.questions import questions_found
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.figures.answer_figures import render
 from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.page_layout import Drawing, Picture, attempted
 from study_app.analysis.figures.question_figures import question_pictures
@@ -29,51 +27,29 @@ def pictures(
 
     A figure that fails is left out, and kept in ``failures``.
     """
-    yield from attempted(
-        (
-            (
-                block.id,
-                f"{what}-{block.id}" if len(study.blocks_of(block.kind)) > 1 else what,
-                partial(_named, draw, one),
-            )
-            for block, found in zip(study.blocks, results.blocks, strict=True)
-            if found.n
-            for one in [Drawing(study, block, found, results, block.kind, forms)]
-            for what, draw in _of_block(one)
-        ),
-        failures,
-    )
+    yield from attempted(_of_blocks(study, results, forms), failures)
+
+
+def _of_blocks(
+    study: Study, results: Results, forms: Sequence[str]
+) -> Iterator[tuple[str, str, Callable[[], Picture | None]]]:
+    for block, found in zip(study.blocks, results.blocks, strict=True):
+        if not found.n:
+            continue
+        lowest = {one.item: one.over_all_ms for one in LowestDelay.of(found) if one.over_all_ms is not None}
+        name = block_name(study, block)
+        yield block.id, name, partial(answer_figures.answers_picture, study, block, name, forms, lowest)
+        for finding in all_findings():
+            if finding.figure_name:
+                name = block_name(study, block, finding.figure_name)
+                drawing = Drawing(study, block, found, results, name, forms)
+                yield block.id, name, partial(finding(found, results).figure, drawing)
 
 
 def block_name(study: Study, block: Block, what: str = "") -> str:
     """Return the name of a figure as a file, by default of the block's answers."""
     name = what or block.kind
     return f"{name}-{block.id}" if len(study.blocks_of(block.kind)) > 1 else name
-
-
-def _named(draw: Callable[[Drawing], Picture | None], drawing: Drawing, name: str) -> Picture | None:
-    return draw(replace(drawing, name=name))
-
-
-def _of_block(drawing: Drawing) -> Iterator[tuple[str, Callable[[Drawing], Picture | None]]]:
-    """Yield what a block's figures are called, and how each is drawn."""
-    yield drawing.block.kind, _answers
-    for finding in all_findings():
-        if finding.figure_name:
-            yield finding.figure_name, finding(drawing.found, drawing.results).figure
-
-
-def _answers(drawing: Drawing) -> Picture:
-    study, block, found = drawing.study, drawing.block, drawing.found
-    lowest = {one.item: one.over_all_ms for one in LowestDelay.of(found) if one.over_all_ms is not None}
-    caption = answer_figures.caption(study, block)
-    if lowest:
-        caption += (
-            " Dashed: lowest delay at which stepping down still shows a trend, with the error rate held over all "
-            "statements; an upper bound of the delay that is noticed."
-        )
-    files = {form: answer_figures.render(study, block, form, lowest) for form in drawing.forms}
-    return Picture(block.id, drawing.name, caption, files)
 
 
 def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None) -> tuple[Path, ...]:
@@ -95,7 +71,12 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
     files: dict[str, bytes] = {}
     failures = Failures()
     questions = question_pictures(study, questions_found(study), failures=failures)
-    for picture in (*_of_statements(study), *questions, *level_pictures(study, levels_found(study), failures=failures)):
+    statements = (
+        answer_figures.answers_picture(study, block, block_name(study, block))
+        for kind in KINDS
+        for block in study.blocks_of(kind)
+    )
+    for picture in (*statements, *questions, *level_pictures(study, levels_found(study), failures=failures)):
         files |= {f"{picture.name}.{form}": content for form, content in picture.files.items()}
         files[f"{picture.name}.txt"] = f"{picture.caption}\n".encode()
     if failures.found:
@@ -105,10 +86,3 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
     written = write_output(study.folder, Path(to), files)
     study.tell_doubts(warn)
     return written
-
-
-def _of_statements(study: Study) -> Iterator[Picture]:
-    for kind in KINDS:
-        for block in study.blocks_of(kind):
-            files = {form: render(study, block, form) for form in style.FORMATS}
-            yield Picture(block.id, block_name(study, block), answer_figures.caption(study, block), files)

@@ -1,12 +1,10 @@
 """Comparisons over delays: each with the shortest, the lowest that shows, the detection threshold, and reaching."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
-from study_app.analysis.data.blocks import Block, Direction
-from study_app.analysis.data.motion import OF_REACHES
+from study_app.analysis.data.blocks import Direction
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.finding import (
@@ -28,7 +26,6 @@ from study_app.analysis.report.html_page import heading, paragraph, table, table
 from study_app.analysis.results import (
     BlockFound,
     NotTested,
-    Results,
     all_of,
     beyond,
     counted,
@@ -43,14 +40,7 @@ from study_app.analysis.results import (
     percent,
     short,
 )
-from study_app.analysis.statistics.equivalence import (
-    MOST_PARTICIPANTS,
-    STUDIES,
-    Equivalence,
-    fewest,
-    participants_needed,
-    tost,
-)
+from study_app.analysis.statistics.equivalence import Equivalence, fewest, tost
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.outcome import holm
 from study_app.analysis.statistics.thresholds import Threshold, noticed
@@ -130,13 +120,6 @@ def _p_different(one: ContrastWithControl) -> str:
     return "out of reach" if out and one.p_adjusted is not None else p_value(one.p_adjusted)
 
 
-def _needed(one: ContrastWithControl) -> str:
-    """Return how many participants equivalence would take, and a dash where this is unknown."""
-    if one.found.n_needed is not None:
-        return str(one.found.n_needed)
-    return f"> {MOST_PARTICIPANTS}" if one.found.sd is not None else "–"
-
-
 def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     """Yield how the comparisons with the shortest delay were made, and what they could not show."""
     first = against[0].found
@@ -145,8 +128,7 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
         "Equivalent: the t tests, changes of signs, signed ranks and the bootstrap-t all show that the mean lies "
         f"within the bound, with {enough(first.alpha)}. Different: the larger p of a two-sided t test and of exact "
         f"signed ranks, Holm-adjusted over the {len(against)} comparisons of this table, is at most {first.alpha:g}. "
-        "Inconclusive: neither. Out of reach: no answers of so many participants could have given either. n for 80 %: "
-        f"the number of participants with whom 80 % of {STUDIES} simulated studies with this spread show equivalence."
+        "Inconclusive: neither. Out of reach: no answers of so many participants could have given either."
     )
     differing = 0.5 ** (first.n - 1) if first.n else 1.0
     if differing * len(against) > first.alpha:
@@ -233,7 +215,6 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             return (), (NotTested(cls.what, why),)
         outcomes = []
         for item in answers.block.items:
-            answers.tell(item.short)
             values = answers.values[item.id]
             for place, delay_ms in enumerate(delays_ms[1:], start=1):
                 differences = values[:, place] - values[:, 0]
@@ -245,8 +226,6 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
                     checks=answers.n <= MANY,
                     verdict_only=answers.verdicts_only,
                 )
-                if answers.planning:
-                    tested = replace(tested, n_needed=participants_needed(differences, bound, answers.decided.alpha))
                 outcomes.append((item.id, delay_ms, tested))
         adjusted = holm([tested.p_difference for _, _, tested in outcomes])
         return tuple(
@@ -297,7 +276,6 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             ("p equivalent", lambda one: p_value(one.found.p)),
             ("p without normality", lambda one: p_value(_without_normality(one.found))),
             ("p different, adjusted", _p_different),
-            ("n for 80 %", _needed),
             ("Verdict", lambda one: one.verdict + (" *" if one.found.checks_agree is False else "")),
             words=2,
             last=1,
@@ -456,7 +434,6 @@ class DetectionThreshold(Finding[Threshold | None]):
         item = answers.decided.noticed
         if item is None or item not in answers.values:
             return None, (NotTested(cls.what, "the protocol names no statement that asks for it"),)
-        answers.tell(cls.what)
         single, delays_ms = answers.single[item], answers.block.delays_ms
         return noticed(single, delays_ms, alpha=answers.decided.alpha, seed=answers.seed), ()
 
@@ -622,54 +599,3 @@ class UnchangedUpTo(Finding[None]):
 def _within(against: ContrastWithControl) -> str:
     bound = against.found.bound
     return f"within ±{bound:g} {'point' if bound == 1 else 'points'} of those at {ms(against.control_ms)}"
-
-
-MOVES = {
-    "movement_time_s": "Movement time, s",
-    "path_mm": "Path, mm",
-    "overshoot_mm": "Overshoot, mm",
-    "submovements": "Submovements",
-}
-
-
-def _kept(block: Block, results: Results) -> str:
-    """Say how many trials kept to the limits of timing."""
-    here = [one for one in results.delivered if one.block == block.id]
-    judged, valid = sum(one.judged for one in here), sum(one.valid for one in here)
-    if not judged:
-        return "Whether trials kept to the protocol's limits of timing was not measured."
-    return f"Trials that kept to the protocol's limits of timing: {valid} of {judged}; all are included."
-
-
-class Movement(Finding[None]):
-    """The figure of how participants reach under a delay, measured from recordings."""
-
-    key = "movement"
-    place = 11
-    part = "figure of movement"
-    figure_name = "movement"
-    figure_title = "Reaching over added delay"
-
-    def section(self) -> Iterable[str]:
-        return self.drawn()
-
-    def figure(self, drawing: Drawing) -> Picture | None:
-        block, measured = drawing.block, drawing.results.performance
-        if not drawing.found.delays_ms or measured is None or not measured.recorded_in(block.id):
-            return None
-        people = sorted({trial.participant for trial in measured.reached if trial.block == block.id})
-        plots = [(MOVES[measure], measured.by_participant(people, block, measure)) for measure in OF_REACHES]
-        n = f"n = {len(people)} participant" + ("" if len(people) == 1 else "s")
-        foot = "Added delay, ms. A participant's point: the median of a trial's reaches, the first left out."
-        caption = (
-            f"How participants reached, over the delay that was asked for ({drawing.simulated}{n} with recordings). "
-            f"Thin lines: {answer_figures.line_words(len(people))}; thick line: median; band: the middle half. "
-            "Movement time: from the lighting of a target to the entry that was held. Scales do not begin at zero. "
-            f"{_kept(block, drawing.results)}"
-        )
-        return drawing.picture(
-            self.figure_title,
-            caption,
-            partial(answer_figures.draw_movement, plots, [setting.delay_ms or 0.0 for setting in block.settings], foot),
-            (f"{n} with recordings", n),
-        )

@@ -24,10 +24,6 @@ T = TypeVar("T")
 U = TypeVar("U")
 
 SEALED: Final = "after unblinding: the key is sealed, and this needs to know which setting is which"
-MEASURES: Final = "measures of settings"
-COUNTS: Final = "counts of answers"
-NUMBERS: Final = "numbers of sessions"
-
 MANY: Final = DRAWN_UP_TO
 """Above so many participants p of single statements is approximated, and no mixed model is fitted."""
 
@@ -50,11 +46,9 @@ class BlockAnswers:
     people: tuple[str, ...]
     values: Mapping[str, Array]
     seed: int
-    tell: Callable[[str], object]
     failures: Failures
     single: Mapping[str, Array]
     sessions: Mapping[str, Array]
-    planning: bool = True
     verdicts_only: bool = False
     sites: tuple[str, ...] = ()
 
@@ -92,10 +86,8 @@ class BlockAnswers:
         return draws_for(self.decided.alpha, DRAWS if self.n <= MANY else FEWER_DRAWS)
 
 
-def block_answers(
-    study: Study, block: Block, seed: int, tell: Callable[[str], object], failures: Failures, *, planning: bool = True
-) -> BlockAnswers:
-    """Collect a block's answers; ``tell`` receives every statement that is begun."""
+def block_answers(study: Study, block: Block, seed: int, failures: Failures) -> BlockAnswers:
+    """Collect a block's answers."""
     answers = study.answers(block)
     people = tuple(sorted(map(str, answers["participant"].unique())))
     by_item = dict(iter(answers.groupby("item", sort=False)))
@@ -105,9 +97,7 @@ def block_answers(
     }
     single = {item: answers_ for item, (answers_, _) in given.items()}
     sessions = {item: numbers for item, (_, numbers) in given.items()}
-    found = of_tables(
-        block, study.decided, people, single, sessions, seed=seed, tell=tell, failures=failures, planning=planning
-    )
+    found = of_tables(block, study.decided, people, single, sessions, seed=seed, failures=failures)
     return replace(found, sites=tuple(map(study.site_of, people))) if study.sites else found
 
 
@@ -119,9 +109,7 @@ def of_tables(
     sessions: Mapping[str, Array] | None = None,
     *,
     seed: int = 1,
-    tell: Callable[[str], object] = str,
     failures: Failures | None = None,
-    planning: bool = True,
     verdicts_only: bool = False,
 ) -> BlockAnswers:
     """Return a block's answers from tables of single answers (participants, settings, presentations) of each item.
@@ -134,11 +122,9 @@ def of_tables(
         people,
         {item: medians(answers) for item, answers in single.items()},
         seed,
-        tell,
         Failures() if failures is None else failures,
         single,
         {item: np.ones_like(answers) for item, answers in single.items()} if sessions is None else sessions,
-        planning,
         verdicts_only,
     )
 
@@ -146,17 +132,19 @@ def of_tables(
 def block_facts(study: Study | None, answers: BlockAnswers) -> BlockFound:
     """Return a block without findings: settings, statements, counts; without a study no measures."""
     block = answers.block
-    measures, no_measures = answers.attempt(MEASURES, lambda: _measures(study, block), ())
-    counts, no_counts = answers.attempt(COUNTS, lambda: presented(answers.single.values()), (0, 0))
-    numbers, no_numbers = answers.attempt(NUMBERS, lambda: session_numbers(answers.sessions.values()), ())
+    columns = list(block.columns.values())
+    delays = enumerate(block.delays_ms) if block.kind == "delays" and block.revealed else ()
+    sessions = np.concatenate([numbers[~np.isnan(numbers)] for numbers in answers.sessions.values()] or [np.zeros(0)])
     return replace(
         untested(block),
         n=answers.n,
-        measures=measures,
-        presentations=counts,
-        replicated_ms=_replicated(block),
-        sessions=numbers,
-        absent=(*no_measures, *no_counts, *no_numbers),
+        measures=tuple(
+            {str(name): None if pd.isna(value) else value for name, value in row.items()}
+            for row in ([] if study is None else study.aggregate(block).to_dict("records"))
+        ),
+        presentations=presented(answers.single.values()),
+        replicated_ms=tuple(delay for place, delay in delays if columns.count(place) > 1),
+        sessions=tuple(sorted({int(number) for number in sessions})),
     )
 
 
@@ -177,40 +165,11 @@ def untested(block: Block, *absent: NotTested) -> BlockFound:
     )
 
 
-def _measures(study: Study | None, block: Block) -> tuple[dict[str, Any], ...]:
-    return tuple(
-        {str(name): None if pd.isna(value) else value for name, value in row.items()}
-        for row in ([] if study is None else study.aggregate(block).to_dict("records"))
-    )
-
-
 def presented(single: Iterable[Array]) -> tuple[int, int]:
     """Return the fewest and the most single answers that a participant gave to one statement on one setting."""
     counts = np.concatenate([(~np.isnan(values)).sum(axis=2).ravel() for values in single] or [np.zeros(0)])
     given = counts[counts > 0]
     return (int(given.min()), int(given.max())) if len(given) else (0, 0)
-
-
-def session_numbers(sessions: Iterable[Array]) -> tuple[int, ...]:
-    """Return the numbers of the sessions in which answers were given."""
-    return tuple(sorted({int(one) for numbers in sessions for one in np.unique(numbers[~np.isnan(numbers)])}))
-
-
-def _replicated(block: Block) -> tuple[float, ...]:
-    """Return the delays that were presented under more than one condition."""
-    if block.kind != "delays" or not block.revealed:
-        return ()
-    columns = list(block.columns.values())
-    return tuple(delay for place, delay in enumerate(block.delays_ms) if columns.count(place) > 1)
-
-
-def each_statement(answers: BlockAnswers, test: Callable[[Array], Outcome]) -> dict[str, Outcome]:
-    """Return the outcomes of a test of every statement's answers (participants, settings), by statement."""
-    found = {}
-    for item in answers.block.items:
-        answers.tell(item.short)
-        found[item.id] = test(answers.values[item.id])
-    return found
 
 
 Correct: TypeAlias = Callable[[Sequence[float | None]], tuple[float | None, ...]]

@@ -41,7 +41,6 @@ def asked_again(
     else:
         models = {}
         for item in answers.block.items:
-            answers.tell(item.short)
             models[item.id] = ordinal(
                 answers.single[item.id], columns, sessions=answers.sessions[item.id], sites=answers.sites or None
             )

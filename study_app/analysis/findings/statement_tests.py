@@ -23,7 +23,6 @@ from study_app.analysis.findings.finding import (
     BlockAnswers,
     Finding,
     Row,
-    each_statement,
     in_family,
     judged,
     judged_row,
@@ -147,7 +146,7 @@ def compared(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
     """Test in every statement whether the settings are answered alike."""
     if answers.k < 2:
         return (), (NotTested("test of settings", "the block has one setting: there is nothing to compare it with"),)
-    outcomes = each_statement(answers, lambda values: _alike(answers, values))
+    outcomes = {item: _alike(answers, values) for item, values in answers.values.items()}
     return judged(outcomes, answers.decided, f"{answers.block.id}: settings differ"), ()
 
 
@@ -243,7 +242,6 @@ class DelayTrend(StatementTests):
         outcomes = {}
         for item in answers.block.items:
             if (direction := answers.decided.direction(item.id)) is not None:
-                answers.tell(item.short)
                 outcomes[item.id] = page(answers.values[item.id], direction, seed=answers.intervals)
         undirected = [item.short for item in answers.block.items if item.id not in outcomes]
         why = f"the protocol does not say whether answers should rise or fall with delay ({', '.join(undirected)})"
@@ -286,7 +284,6 @@ class SessionsDiffer(StatementTests):
             return (), ()
         outcomes = {}
         for item in answers.block.items:
-            answers.tell(f"{item.short}, sessions")
             single, of = answers.single[item.id], answers.sessions[item.id]
             each = np.stack([medians(np.where(of == one, single, np.nan)) for one in numbers], axis=2)
             common = np.asarray(~np.isnan(each).any(axis=2))
@@ -335,7 +332,6 @@ class SitesDiffer(Finding[SiteTests]):
 
         levels, profiles = {}, {}
         for item in answers.block.items:
-            answers.tell(f"{item.short}, sites")
             values = answers.values[item.id]
             levels[item.id] = differ(np.median(values, axis=1)[:, None], "Kruskal-Wallis")
             if answers.k == 2:
@@ -400,7 +396,6 @@ def over_all(answers: BlockAnswers, draws: int | None = None) -> Outcome | None:
     """Test once over all statements whether the settings are answered alike; ``draws`` of them if not as usual."""
     if answers.k < 2 or (answers.verdicts_only and draws is None):
         return None
-    answers.tell("all statements")
     values = np.array(list(answers.values.values()))
     return global_permutation(values, draws=draws or answers.draws_over_all, seed=answers.seed)
 

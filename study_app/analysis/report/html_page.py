@@ -1,13 +1,10 @@
-"""The page and its parts: one HTML file with its style, typeface and pictures inside, without scripts."""
+"""The page and its parts: one HTML file with its style and pictures inside, without scripts."""
 
 import base64
-import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from importlib import resources
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
-from fontTools.subset import Options, Subsetter, load_font, save_font
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
@@ -42,9 +39,9 @@ def _part(macro: str, *values: object) -> Markup:
     return Markup(getattr(_environment().get_template("parts.html").module, macro)(*values))  # noqa: S704
 
 
-def page(title: str, body: str, faces: str = "") -> str:
-    """Return the whole file; ``body`` is HTML, ``faces`` are rules of the style that hold the typeface."""
-    return render("page.html", title=title, body=Markup(body), faces=Markup(faces))  # noqa: S704 - HTML and CSS
+def page(title: str, body: str) -> str:
+    """Return the whole file; ``body`` is HTML."""
+    return render("page.html", title=title, body=Markup(body))  # noqa: S704 - HTML
 
 
 def heading(level: int, words: str) -> Markup:
@@ -111,33 +108,3 @@ def drawn(pictures: Mapping[str, Picture], name: str) -> Iterator[Markup]:
     """Yield the figure of this name, where there is one."""
     if name in pictures:
         yield picture(pictures[name].files["png"], pictures[name].caption)
-
-
-WEIGHTS: Final = {400: "Regular", 600: "SemiBold"}
-
-
-def font_faces(text: str) -> str:
-    """Return ``@font-face`` rules with the signs of ``text``; empty where Inter was not installed with the program."""
-    folder = resources.files("study_app") / "gui" / "assets" / "fonts"
-    rules = []
-    for weight, name in WEIGHTS.items():
-        file = folder / f"Inter-{name}.otf"
-        if not file.is_file():
-            return ""
-        data = base64.b64encode(_subset(file.read_bytes(), text)).decode("ascii")
-        rules.append(
-            f'@font-face {{ font-family: "Inter"; font-weight: {weight}; src: url(data:font/woff;base64,{data}); }}'
-        )
-    return "\n".join(rules)
-
-
-def _subset(content: bytes, text: str) -> bytes:
-    """Return the signs of ``text`` as WOFF; the same signs give the same bytes."""
-    options = Options(flavor="woff", layout_features=["kern", "tnum"], notdef_outline=True)
-    font = load_font(io.BytesIO(content), options)
-    subsetter = Subsetter(options)
-    subsetter.populate(text=text)
-    subsetter.subset(font)
-    target = io.BytesIO()
-    save_font(font, target, options)
-    return target.getvalue()

@@ -30,17 +30,7 @@ from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
 from study_app.analysis.planning.preregistration import deviations
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
 from study_app.analysis.report import sections
-from study_app.analysis.report.html_page import (
-    attempted,
-    box,
-    bullets,
-    font_faces,
-    heading,
-    page,
-    paragraph,
-    render,
-    table,
-)
+from study_app.analysis.report.html_page import attempted, box, bullets, heading, page, paragraph, render, table
 from study_app.analysis.report.sections import methods, version_words
 from study_app.analysis.results import (
     BlockFound,
@@ -348,8 +338,7 @@ def _page(
         failures=[str(one) for one in failures.found],
         first=Markup().join(first),
     )
-    faces = failures.value("typeface", lambda: font_faces("".join(sorted(set(body.unescape())))), "")
-    return page(f"{study.title}: report", body, faces)
+    return page(f"{study.title}: report", body)
 
 
 def _facts(study: Study) -> str:

@@ -1,4 +1,4 @@
-"""Equivalence: two one-sided tests, without normality too, and their power.
+"""Equivalence: two one-sided tests, without normality too, and whether many simulated studies show it.
 
 Efron & Tibshirani (1993), An Introduction to the Bootstrap, 12.5. Where only few participants answer strongly, many
 resamples hold none of them: their standard error is small, they lie far away, and the mean is then not shown to lie
@@ -21,7 +21,6 @@ from typing import Any, Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtr, stdtrit
-from scipy.stats import norm
 from scipy.stats import t as t_distribution
 
 from study_app.analysis.statistics.outcome import (
@@ -138,7 +137,6 @@ class Equivalence(Outcome):
     checks_agree: bool | None = None
     sd: float | None = None
     beyond: Beyond | None = None
-    n_needed: int | None = None
 
     @property
     def equal(self) -> bool:
@@ -345,17 +343,8 @@ def _signs(shifted: Array, seed: int) -> float:
 
 
 PLANNED_DRAWS: Final = 499
-MOST_PLANNED_DRAWS: Final = 20_000
 AT_ONCE: Final = 500
 """Studies that are resampled together: more take more memory."""
-
-POWER: Final = 0.80
-STUDIES: Final = 1000
-MOST_PARTICIPANTS: Final = 400
-"""No more participants than these are looked for."""
-
-FINENESS: Final = 0.04
-"""Spreads within 4 % of each other need the same number of participants."""
 
 
 def equivalent(
@@ -400,68 +389,3 @@ def p_above(values: Array, positive: NDArray[np.bool_], up: NDArray[np.float32])
     seen = np.where(positive, values, 0).sum(axis=1).astype(np.float32) * np.float32(1 - 1e-6)
     drawn = up @ values.T.astype(np.float32)
     return np.asarray((1 + (drawn >= seen).sum(axis=0)) / (1 + len(up)))
-
-
-def participants_needed(differences: Array, bound: float, alpha: float) -> int | None:
-    """Return how many participants show equivalence with 80 % power; None: more than ``MOST``.
-
-    Studies are simulated whose differences spread as these do about a true difference of 0, normally and then rounded
-    as these are: to whole points, to halves, or not at all.
-    """
-    kept = differences[~np.isnan(differences)]
-    step = next((size for size in (1.0, 0.5) if np.array_equal(kept / size, np.rint(kept / size))), 0.0)
-    sd = float(kept.std(ddof=1)) if len(kept) > 1 else 0.0
-    place = round(math.log(max(sd, 1e-3)) / FINENESS)
-    return _needed(place, step, bound, alpha)
-
-
-@lru_cache(maxsize=4096)
-def _needed(place: int, step: float, bound: float, alpha: float) -> int | None:
-    """Return the smallest number with enough power, which grows with it except at single steps of rounded answers."""
-    sd = math.exp(place * FINENESS)
-    normal = _before_rounding(sd, step)
-
-    def enough(n: int) -> bool:
-        return power(n, normal, step, bound, alpha) >= POWER
-
-    least = fewest(alpha, equal=True)
-    by_t = math.ceil((float(norm.ppf([1 - alpha, (1 + POWER) / 2]).sum()) * sd / bound) ** 2)
-    low, high = least - 1, max(least, by_t)
-    while high <= MOST_PARTICIPANTS and not enough(high):
-        low, high = high, high + max(1, high // 6)
-    if high > MOST_PARTICIPANTS:
-        return None
-    if low == least - 1 and high > least:
-        low = max(low, high * 4 // 5)
-        if enough(low):
-            low, high = least - 1, low
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if enough(middle) else (middle, high)
-    return high
-
-
-def power(n: int, sd: float, step: float, bound: float, alpha: float) -> float:
-    """Return the share of simulated studies of ``n`` participants that show equivalence, the true difference being 0.
-
-    ``sd`` is that of the normal differences before they are rounded to ``step`` (0: not at all).
-    """
-    rng = np.random.default_rng(n)
-    drawn = sd * rng.normal(size=(STUDIES, n))
-    rounded = step * np.rint(drawn / step) if step else drawn
-    draws = min(MOST_PLANNED_DRAWS, max(PLANNED_DRAWS, math.ceil(5 / alpha)))
-    return float(equivalent(rounded, bound, alpha, rng, draws).mean())
-
-
-def _before_rounding(sd: float, step: float) -> float:
-    """Return the spread of a normal number whose multiple of ``step`` nearest to it spreads by ``sd``."""
-    if not step:
-        return sd
-    levels = step * np.arange(1, 60)
-    low, high = 0.0, sd + step
-    for _ in range(40):
-        middle = (low + high) / 2
-        beyond = norm.sf((levels - step / 2) / middle)
-        spread = 2 * (levels**2 * -np.diff(beyond, append=0.0)).sum()
-        low, high = (middle, high) if spread < sd**2 else (low, middle)
-    return high

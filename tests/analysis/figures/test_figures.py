@@ -1,4 +1,5 @@
 import re
+from collections.abc import Mapping
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -11,21 +12,28 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from study_app import figure_style as style
+from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures, study_figures
-from study_app.analysis.figures.page_layout import Look
+from study_app.analysis.figures.page_layout import Look, study_marks
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Answer, Results, twelve
 
 pytestmark = pytest.mark.slow
 
 
+def drawn(study: Study, block: Block, fonts: tuple[str, ...] = (), lowest: Mapping[str, float] | None = None) -> Figure:
+    words = answer_figures.counts(study, block)
+    look = Look(answer_figures.title(block), study_marks(study), words, fonts or style.screen_fonts())
+    return answer_figures.draw_block(study, block, lowest or {}, look).figure
+
+
 def liquids(study: Study, **look: Any) -> Figure:
-    return answer_figures.figure(study, study.blocks_of("liquids")[0], **look)
+    return drawn(study, study.blocks_of("liquids")[0], **look)
 
 
 def delays(study: Study, **look: Any) -> Figure:
-    return answer_figures.figure(study, study.blocks_of("delays")[0], **look)
+    return drawn(study, study.blocks_of("delays")[0], **look)
 
 
 def test_disagreement_ends_and_agreement_begins_at_the_line_and_neutral_stands_apart(rek: Results) -> None:
@@ -172,36 +180,16 @@ def test_the_lowest_delay_is_marked_at_its_place_on_the_true_scale(rek: Results,
     assert f"≤ {lowest_ms:g}" in texts(figure, "item1")
 
 
-def test_motion_is_drawn_for_every_participant_with_its_own_scale() -> None:
-    values = np.array([[0.8, 0.9, 1.0], [0.85, np.nan, 1.1]])
-    figure = answer_figures.draw_movement(
-        [("Time, s", values), ("Flat", np.ones((2, 3)))],
-        [0.0, 100.0, 200.0],
-        "",
-        Look("Motion", [], ["n = 2"], style.PRINT_FONTS),
-    ).figure
-    first, second = figure.axes
-    gids = {str(line.get_gid()): line for line in first.lines}
-    assert np.asarray(gids["measure1-participant1"].get_ydata()).tolist() == [0.8, 0.9, 1.0]
-    assert np.asarray(gids["measure1-median"].get_ydata()).tolist() == pytest.approx([0.825, 0.9, 1.05])
-    low, high = first.get_ylim()
-    assert low < 0.8
-    assert high > 1.1
-    assert [tick.get_text() for tick in second.get_yticklabels()] == ["1"]
-    assert second.get_ylim() == (0.5, 1.5)
-
-
 def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
     values = np.tile(np.array([1.0, 2.0, 3.0]), (500, 1))
     values[::2] += 1
-    figure = answer_figures.draw_movement(
-        [("Time, s", values)], [0.0, 100.0, 200.0], "", Look("Motion", [], ["n = 500"], style.PRINT_FONTS)
-    ).figure
+    look = Look("Answers", [], ["n = 500"], style.PRINT_FONTS)
+    figure = answer_figures.draw_answers([("Harder", values)], [], [0.0, 100.0, 200.0], [None], "", look).figure
     gids = {str(line.get_gid()): line for line in figure.axes[0].lines}
     drawn = [gid for gid in gids if "participant" in gid]
     assert len(drawn) == answer_figures.MOST_LINES
-    assert {"measure1-participant1", "measure1-participant500"} <= set(drawn)
-    assert np.asarray(gids["measure1-median"].get_ydata()).tolist() == [1.5, 2.5, 3.5]
+    assert {"item1-participant1", "item1-participant500"} <= set(drawn)
+    assert np.asarray(gids["item1-median"].get_ydata()).tolist() == [1.5, 2.5, 3.5]
     assert answer_figures.line_words(500) == "60 of the 500 participants, evenly chosen in the order of their ids"
     assert answer_figures.line_words(60) == "participants"
 

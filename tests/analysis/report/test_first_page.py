@@ -30,7 +30,7 @@ DELAYS = (0.0, 50.0, 100.0, 150.0)
 
 def of_delays(answer: object, people: int = 16) -> Results:
     settings = delays(DELAYS)
-    return evaluate(study(settings, list(everybody(settings, people, answer))), planning=False)
+    return evaluate(study(settings, list(everybody(settings, people, answer))))
 
 
 def rising(from_code: int) -> Results:
@@ -101,17 +101,17 @@ def test_liquids_are_recognised_by_name_and_the_wrong_name_is_told() -> None:
             )
         ),
     )
-    told = named(evaluate(right, planning=False), "distinguished")
+    told = named(evaluate(right), "distinguished")
     assert told.claims
     assert told.text.startswith("Liquid1 and liquid2 were recognised above chance. Rated differently: ")
-    wrong = named(evaluate(study(settings, list(everybody(settings, 12, answer))), planning=False), "distinguished")
+    wrong = named(evaluate(study(settings, list(everybody(settings, 12, answer)))), "distinguished")
     assert "liquid2 was called liquid1 by 12 of 12" in wrong.text
 
 
 def test_decisions_that_came_later_are_marked_as_exploratory() -> None:
     results = rising(3)
     made = study(delays(DELAYS), list(everybody(delays(DELAYS), 12, lambda p, s, code, i: 1 + int(code[1:]))))
-    later = evaluate(replace(made, decided=replace(DECIDED, changed=True)), planning=False)
+    later = evaluate(replace(made, decided=replace(DECIDED, changed=True)))
     assert named(later, "noticed from").verdict == "suggested"
     assert "suggested" in first_page(later, ())
     assert "suggested" not in first_page(results, ())
@@ -121,7 +121,7 @@ def ordered(people: int, decided: Decided = DECIDED) -> Results:
     """Return a study of three liquids that everybody puts in the same order in the second statement."""
     settings = liquids(3)
     trials = list(everybody(settings, people, lambda _p, _s, code, i: 2 * int(code[1:]) if i == ITEMS[1] else 4))
-    results = evaluate(study(settings, trials, decided), planning=False)
+    results = evaluate(study(settings, trials, decided))
     return replace(results, blocks=(LiquidRecognition.add_to(results.blocks[0], None),))
 
 
@@ -166,7 +166,7 @@ def test_the_verdict_is_of_primary_statements_and_of_exploratory_ones_without_th
         return (6 - up if item == "harder" else 1 + up) + wobble
 
     made = study(settings, list(everybody(settings, 16, answer)), replace(DECIDED, primary=ITEMS[1:]))
-    results = evaluate(made, planning=False)
+    results = evaluate(made)
     found = named(results, "noticed from")
     assert found.text == (
         "From 150 ms on at the latest “Harder” changes with the delay; shorter delays may be noticed too."

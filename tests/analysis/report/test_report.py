@@ -1,14 +1,11 @@
 """The report: whole, self-contained, the same each time."""
 
-import base64
-import io
 import random
 import re
 import shutil
 from pathlib import Path
 
 import pytest
-from fontTools.ttLib import TTFont
 
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.report.write_report import report
@@ -17,16 +14,6 @@ from tests.analysis.conftest import HIDDEN, Results, twelve
 from tests.analysis.report.read_report import answered_by_two, numbers, read, run_in_r
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
-
-
-def test_the_typeface_is_in_the_page_with_every_sign(of_twelve: Path) -> None:
-    page = (of_twelve / "report.html").read_text(encoding="utf-8")
-    fonts = re.findall(r"font-weight: (\d+); src: url\(data:font/woff;base64,([^)]+)\)", page)
-    assert [weight for weight, _ in fonts] == ["400", "600"]
-    assert "font-src data:" in page
-    signs = {sign for sign in read(of_twelve) if sign.isprintable()}
-    for _, data in fonts:
-        assert signs <= {chr(code) for code in TTFont(io.BytesIO(base64.b64decode(data))).getBestCmap()}
 
 
 def test_the_caption_of_delays_says_what_is_dashed(of_twelve: Path) -> None:

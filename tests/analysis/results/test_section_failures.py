@@ -17,9 +17,6 @@ from tests.analysis.conftest import Results, make_results, twelve
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 TESTS = {
-    "data.study_tables.Study.aggregate": ("liquids", "measures of settings"),
-    "findings.finding.presented": ("delays", "counts of answers"),
-    "findings.finding.session_numbers": ("delays", "numbers of sessions"),
     "findings.statement_tests.friedman": ("liquids", "test of settings"),
     "findings.statement_tests.global_permutation": ("liquids", "test over all statements"),
     "findings.recognition.recognition": ("liquids", "test of recognition"),
@@ -30,7 +27,7 @@ TESTS = {
     "findings.delays.noticed": ("delays", "detection threshold"),
 }
 WRITING = {
-    "figures.answer_figures.render": "figure liquids",
+    "figures.answer_figures.answers_picture": "figure liquids",
     "report.write_report.methods": "texts: methods",
     "report.write_report.sections.findings": "texts: findings",
     "report.write_report.r_script": "report.R",

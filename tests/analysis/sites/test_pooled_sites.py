@@ -186,11 +186,11 @@ def test_planted_differences_between_sites_are_found_and_nothing_else() -> None:
 
         return study(liquids(3), list(everybody(liquids(3), 12, answer)))
 
-    (block,) = evaluate(pooled_of(at("A"), at("B")), planning=False).blocks
+    (block,) = evaluate(pooled_of(at("A"), at("B"))).blocks
     tests = SitesDiffer.of(block)
     assert {one.item: one.verdict for one in tests.level} == {"different": "suggested", "harder": "not shown"}
     assert {one.item: one.verdict for one in tests.profile} == {"different": "not shown", "harder": "suggested"}
-    (alone,) = evaluate(at("A"), planning=False).blocks
+    (alone,) = evaluate(at("A")).blocks
     assert SitesDiffer.of(alone) == SitesDiffer.empty
 
 
@@ -203,7 +203,7 @@ def test_two_settings_are_compared_by_their_differences() -> None:
 
         return study(settings, list(everybody(settings, 10, answer)))
 
-    (block,) = evaluate(pooled_of(at(0), at(2)), planning=False).blocks
+    (block,) = evaluate(pooled_of(at(0), at(2))).blocks
     (first, *_) = SitesDiffer.of(block).profile
     assert first.outcome.test == "Kruskal-Wallis of differences"
     assert first.verdict == "suggested"

@@ -163,8 +163,6 @@ def of_larger_models() -> Iterator[str]:
     yield from results(mixed_model.ordinal, some, intercepts=False)
     yield from results(mixed_model.ordinal, {"sites": some["falls"]}, sites=list("AABBBAABBBAA"))
     yield from results(mixed_model.ordinal, {"columns": some["falls"]}, np.array([[0.0], [0.0], [1.0]]))
-    needed = {name: np.asarray(DIFFERENCES[name], float) for name in ("small", "large", "outlier", "wide")}
-    yield from results(equivalence.participants_needed, needed, 1.0, 0.05)
 
 
 TABLES = [

@@ -58,9 +58,7 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participant
         for block, values in zip(rek.blocks, given, strict=True):
             single_ = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
             whole, quick = (
-                found_in(
-                    None, of_tables(block, rek.decided, people, single_, planning=False, verdicts_only=verdicts_only)
-                )
+                found_in(None, of_tables(block, rek.decided, people, single_, verdicts_only=verdicts_only))
                 for verdicts_only in (False, True)
             )
             assert [one.verdict for one in ContrastsWithControl.of(quick)] == [

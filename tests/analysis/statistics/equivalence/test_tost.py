@@ -1,11 +1,10 @@
-import math
 from itertools import product
 
 import numpy as np
 import pytest
 from scipy.stats import binom, wilcoxon
 
-from study_app.analysis.statistics.equivalence import fewest, participants_needed, tost
+from study_app.analysis.statistics.equivalence import fewest, tost
 from study_app.errors import AnalysisError
 
 # Hours of sleep gained by ten patients with two drugs (Student 1908; R, sleep).
@@ -87,35 +86,6 @@ def test_people_beyond_the_bound_are_counted_whatever_the_mean() -> None:
     assert found.beyond is not None
     assert (found.beyond.count, found.beyond.n) == (2, 24)
     assert (found.beyond.interval.low, found.beyond.interval.high) == pytest.approx((0.0103, 0.2700), abs=1e-4)
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-@pytest.mark.parametrize(("spread", "step"), [(0.5, 1.0), (1.0, 1.0), (1.5, 0.5), (0.7, 0.0)])
-def test_so_many_participants_as_are_told_give_the_verdict_in_80_percent(spread: float, step: float) -> None:
-    rng = np.random.default_rng(8)
-    seen = spread * rng.normal(size=60)
-    seen = np.rint(seen / step) * step if step else seen
-    needed = participants_needed(seen, 1.0, 0.05)
-    assert needed is not None
-
-    def power_of(n: int) -> float:
-        """Return how often studies of n, drawn as the differences spread, are called equivalent by ``tost``."""
-        drawn = rng.normal(size=(300, n))
-        drawn *= normal_before_rounding(float(seen.std(ddof=1)), step)
-        drawn = np.rint(drawn / step) * step if step else drawn
-        return float(np.mean([tost(one, 1.0).verdict == "equivalent" for one in drawn]))
-
-    assert power_of(needed) > 0.8 - 0.03 - 3 * math.sqrt(0.8 * 0.2 / 300)
-    assert needed <= 14 or power_of(needed - 1) < 0.8 + 0.03 + 3 * math.sqrt(0.8 * 0.2 / 300)
-
-
-def normal_before_rounding(sd: float, step: float) -> float:
-    """Return the spread of the normal numbers whose multiples of ``step`` spread by ``sd``, by trying."""
-    numbers = np.random.default_rng(0).normal(size=20_000)
-    tried = np.linspace(0.05, 2 * sd + step, 400)
-    spreads = [np.std(np.rint(one * numbers / step) * step if step else one * numbers) for one in tried]
-    return float(tried[np.searchsorted(spreads, sd)])
 
 
 def test_a_small_but_certain_difference_can_be_equivalent() -> None:
