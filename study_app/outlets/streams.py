@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import study_app
 from study_app.errors import OutletError
+from study_app.haptics.model.layout import SAMPLE_FIELDS
 
 MARKERS: Final = "liquid-study markers"
 SAMPLES: Final = "liquid-study samples"
@@ -26,12 +27,8 @@ MEASURE_EVERY_S: Final = 5.0
 READINGS: Final = 8
 SEND_EVERY_S: Final = 0.01
 PATIENCE_S: Final = 1.0
-CHANNELS: Final = (
-    *(f"position_{axis} m" for axis in "xyz"),
-    *(f"velocity_{axis} m/s" for axis in "xyz"),
-    *(f"force_{axis} N" for axis in "xyz"),
-    "limiters",
-)
+STREAMED: Final = tuple(field for field in SAMPLE_FIELDS if field.stream)
+CHANNELS: Final = tuple(f"{name} {field.unit}".rstrip() for field in STREAMED for name in field.named(field.stream))
 
 
 def library() -> Any:
@@ -121,12 +118,7 @@ class ClockMapping:
 
 def channels_of(samples: Any) -> NDArray[np.float32]:
     """Return the channels of the stream for samples (array of ``layout.SAMPLE``)."""
-    out = np.empty((len(samples), len(CHANNELS)), np.float32)
-    out[:, 0:3] = samples["position_m"]
-    out[:, 3:6] = samples["velocity_mps"]
-    out[:, 6:9] = samples["device_force_n"]
-    out[:, 9] = samples["limiters"]
-    return out
+    return np.column_stack([samples[field.name] for field in STREAMED]).astype(np.float32)
 
 
 class SampleStream:

@@ -24,20 +24,11 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 from study_app.errors import StoreError
-from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
-from study_app.haptics.model.layout import (
-    FORCE_STEP_N,
-    MEASURED_GRIPPER,
-    MEASURED_ORIENTATION,
-    MEASURED_VELOCITY,
-    SAMPLE,
-    records,
-)
+from study_app.haptics.model.layout import SAMPLE, SAMPLE_FIELDS, SampleField, records
 from study_app.store.atomic import cannot_read, parse_json, sync_folder, temporary_path
 from study_app.store.journals.journal_events import plain
-from study_app.store.tables.csv_files import Column
+from study_app.store.tables.csv_files import Column, Kind
 
-_AXES = (("x", "to the right"), ("y", "up"), ("z", "toward the participant"))
 FRAMES: tuple[Column, ...] = (
     Column("painted_ns", "integer", "Time when the frame was shown, on the servo's clock.", "ns"),
     Column("sample_ns", "integer", "Time of the hand position that was shown.", "ns"),
@@ -60,93 +51,34 @@ FRAMES: tuple[Column, ...] = (
     ),
 )
 FORMAT = 4
-SPEED_STEP_MPS = 2.0**-12
-ROUNDED_TO = {
-    "velocity_mps": SPEED_STEP_MPS,
-    "wake_mps": SPEED_STEP_MPS,
-    "device_force_n": FORCE_STEP_N,
-    "command_n": FORCE_STEP_N,
-    "force_n": FORCE_STEP_N,
-}
+RECORDED = tuple(field for field in SAMPLE_FIELDS if field.column)
+ROUNDED_TO = {field.name: field.step for field in RECORDED if field.step}
 """Fields of ``layout.SAMPLE`` that are recorded rounded, and the step."""
 FRAME = np.dtype([(column.name, np.int64) for column in FRAMES])
 NO_VIDEO = {"video_frame": -1, "video_ns": 0, "video_age_ns": -1}
 """Values of a frame without a video."""
 FACTS_KEY = b"liquid_study"
-AXES = ("x", "y", "z")
-MEASURED = {
-    **{f"device_velocity_{axis}_mps": ("device_velocity_mps", i, MEASURED_VELOCITY) for i, axis in enumerate(AXES)},
-    **{f"orientation_{part}": ("orientation", i, MEASURED_ORIENTATION) for i, part in enumerate("wxyz")},
-    "gripper_m": ("gripper_m", None, MEASURED_GRIPPER),
-}
-"""Optional measurements of a device: field of ``layout.SAMPLE``, its component, and its bit."""
-_SINCE_2 = frozenset({"delay_ticks", *(f"undelivered_{axis}_n" for axis in AXES)})
-_SINCE_3 = frozenset({"measured", "device_time_ns", *MEASURED})
-_LACKING = {1: _SINCE_2 | _SINCE_3 | NO_VIDEO.keys(), 2: _SINCE_3 | NO_VIDEO.keys(), 3: NO_VIDEO.keys(), FORMAT: ()}
-"""Columns that recordings of each format lack."""
-SHORT = frozenset({"buttons", "delay_ticks", "limiters", "measured", "scene", "status"})
+_VIDEO_SINCE = 4
+"""First format of recordings whose frames have numbers and times of a video."""
 GROUP_SECONDS = 30  # rows of so many seconds are compressed together
 _COMPRESSION = ("zstd", 9)
 
 
-def _vector(name: str, unit: str, ending: str, description: str) -> tuple[Column, ...]:
-    return tuple(
-        Column(f"{name}_{axis}_{ending}", "number", f"{description}, {direction}.", unit) for axis, direction in _AXES
-    )
+def _columns(field: SampleField) -> list[Column]:
+    """Return the columns that a recording has of a field of ``layout.SAMPLE``."""
+    kind: Kind = "flag" if field.stored is np.bool_ else "integer" if issubclass(field.stored, np.integer) else "number"
+    meanings = [field.words.replace("*", words) for words in field.parts.values()] or [field.words]
+    return [
+        Column(name, kind, meaning, field.unit, field.levels, field.minimum, field.maximum)
+        for name, meaning in zip(field.named(field.column), meanings, strict=True)
+    ]
 
 
-SAMPLES: tuple[Column, ...] = (
-    Column("tick", "integer", "Number of the servo's tick since its start; gaps are lost samples."),
-    Column("time_ns", "integer", "Time when the device was read, on the servo's clock.", "ns"),
-    Column("due_ns", "integer", "Time when the tick was due; its lateness is time_ns - due_ns.", "ns"),
-    Column("fresh", "flag", "true where the device reported a new sample."),
-    *_vector("position", "m", "m", "Position of the hand, exact"),
-    *_vector(
-        "velocity", "m/s", "mps", ("Velocity in the scene from which the force was computed; resolution 1/4096 m/s")
-    ),
-    *_vector("wake", "m/s", "mps", "Velocity of the liquid's wake in the scene; resolution 1/4096 m/s"),
-    *_vector("device_force", "N", "n", "Force that the device applied to the hand; resolution 1/16384 N"),
-    *_vector("undelivered", "N", "n", "Force that the servo commanded and the device did not apply"),
-    *_vector(
-        "withheld",
-        "N",
-        "n",
-        ("Force of the liquid that was withheld: the force of the liquid is device_force + withheld"),
-    ),
-    Column("buttons", "integer", "Pressed buttons of the device, as bits."),
-    Column("limiters", "integer", "Limiters that acted, as bits in the order of the trial's limiter columns."),
-    Column("delay_ticks", "integer", "Estimated delay of the force, in ticks.", minimum=0, maximum=4),
-    Column("scene", "integer", "Number of the presented scene; 0 is none.", minimum=0),
-    Column(
-        "status",
-        "integer",
-        "State of the servo.",
-        levels=(
-            ("0", "running normally"),
-            ("1", "no usable sample for 50 ms"),
-            ("2", "device lost"),
-            ("3", "a non-finite force (NaN or infinite)"),
-        ),
-    ),
-    Column(
-        "measured",
-        "integer",
-        "What the device measured itself, as bits: 1 velocity, 2 orientation, 4 gripper, 8 time.",
-        minimum=0,
-        maximum=15,
-    ),
-    *_vector("device_velocity", "m/s", "mps", "Velocity of the hand, as the device measured it (NaN if not measured)"),
-    *(
-        Column(
-            f"orientation_{part}",
-            "number",
-            f"Orientation of the handle in the hand frame: {part} of a unit quaternion; NaN if not measured.",
-        )
-        for part in "wxyz"
-    ),
-    Column("gripper_m", "number", "Opening of the gripper; NaN if not measured.", "m"),
-    Column("device_time_ns", "integer", "Time of the sample on the device's clock; 0 if not measured.", "ns"),
-)
+SAMPLES = tuple(column for field in RECORDED for column in _columns(field))
+_STORED = {
+    **{name: pa.from_numpy_dtype(field.stored) for field in RECORDED for name in field.named(field.column)},
+    **{column.name: pa.int64() for column in FRAMES},
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,23 +112,15 @@ def read_samples(path: Path) -> Any:
     """
     columns, facts = _read(path, "samples")
     samples = records(SAMPLE, len(columns["tick"]))
-    for name in ("tick", "time_ns", "fresh", "buttons", "limiters", "scene", "status"):
-        samples[name] = columns[name]
-    samples["delay_ticks"] = columns.get("delay_ticks", ASSUMED_TICKS)
-    samples["lateness_ns"] = columns["time_ns"] - columns["due_ns"]
-    for i, axis in enumerate(AXES):
-        samples["position_m"][:, i] = columns[f"position_{axis}_m"]
-        samples["velocity_mps"][:, i] = columns[f"velocity_{axis}_mps"]
-        samples["wake_mps"][:, i] = columns[f"wake_{axis}_mps"]
-        device = columns[f"device_force_{axis}_n"].astype(np.float64)
-        samples["device_force_n"][:, i] = device
-        samples["command_n"][:, i] = device + columns.get(f"undelivered_{axis}_n", 0.0)
-        samples["force_n"][:, i] = device + columns[f"withheld_{axis}_n"]
-    if "measured" in columns and len(samples):
-        samples["measured"], samples["device_time_ns"] = columns["measured"], columns["device_time_ns"]
-        for name, (field, component, bit) in MEASURED.items():
-            values = np.where(columns["measured"] & bit, columns[name], 0.0)
-            samples[field][... if component is None else (..., component)] = values
+    for field in RECORDED:
+        values: Any = field.before
+        if field.since <= facts["format"]:
+            values = np.column_stack([columns[name] for name in field.named(field.column)])
+            if field.measured:
+                values = np.where(columns["measured"][:, np.newaxis] & field.measured, values, 0.0)
+        if field.beside:
+            values = _rows(samples, field.beside) + field.sign * values
+        _rows(samples, field.name)[:] = values
     if len(samples) and None not in facts["first_device_force_n"]:
         samples["device_force_n"][0] = facts["first_device_force_n"]
         samples["command_n"][0] = facts.get("first_command_n", facts["first_device_force_n"])
@@ -250,15 +174,6 @@ def crcs(forces: NDArray[np.float64], rows: int) -> list[int]:
     return [zlib.crc32(exact[first : first + rows].tobytes()) for first in range(0, len(exact), rows)]
 
 
-def column_type(column: Column) -> pa.DataType:
-    """Return how a column is stored."""
-    if column.kind == "flag":
-        return pa.bool_()
-    if column.kind == "integer":
-        return pa.int32() if column.name in SHORT else pa.int64()
-    return pa.float64() if column.name.startswith(("position_", "device_velocity_")) else pa.float32()
-
-
 def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     try:
         with parquet.ParquetFile(path) as file:
@@ -270,17 +185,19 @@ def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any
         raise cannot_read(path, error) from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
         raise _damaged(path, error) from error
-    lacking = _LACKING[facts["format"]]
-    every = FRAMES if kind == "frames" else SAMPLES
-    columns = [column for column in every if column.name not in lacking]
+    held = facts["format"]
+    if kind == "frames":
+        columns = [column.name for column in FRAMES if held >= _VIDEO_SINCE or column.name not in NO_VIDEO]
+    else:
+        columns = [name for field in RECORDED if field.since <= held for name in field.named(field.column)]
     if not _are_of(table, columns, facts["rows"]):
         raise StoreError(f"{path} is damaged (its columns differ from those of {kind}): restore it from a copy")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
 
 
-def _are_of(table: pa.Table, columns: Sequence[Column], rows: int) -> bool:
+def _are_of(table: pa.Table, columns: Sequence[str], rows: int) -> bool:
     """Return whether a table has these columns and no others, each once and whole."""
-    expected = {column.name: column_type(column) for column in columns}
+    expected = {name: _STORED[name] for name in columns}
     held = {field.name: field.type for field in table.schema}
     return (
         table.num_rows == rows
@@ -292,7 +209,7 @@ def _are_of(table: pa.Table, columns: Sequence[Column], rows: int) -> bool:
 
 def _numbers(column: pa.ChunkedArray, rows: int) -> NDArray[Any]:
     if rows == 0:
-        return np.empty(0)
+        return np.empty(0, column.type.to_pandas_dtype())
     array = column.chunk(0)
     raw, end = array.buffers()[1], array.offset + rows
     if pa.types.is_boolean(array.type):
@@ -395,32 +312,26 @@ def write_frames(path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any]
 
 def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
     """Return the columns of ``samples`` as they are kept: times and positions exact, the rest rounded."""
-    columns: dict[str, NDArray[Any]] = {
-        "tick": samples["tick"],
-        "time_ns": samples["time_ns"],
-        "due_ns": samples["time_ns"] - samples["lateness_ns"],
-        **{name: samples[name] for name in ("fresh", *sorted(SHORT), "device_time_ns")},
-    }
+    columns: dict[str, NDArray[Any]] = {}
     with np.errstate(invalid="ignore", over="ignore"):  # values of a fault are stored unchanged
-        device = _rounded(samples["device_force_n"], FORCE_STEP_N)
-        undelivered = _rounded(samples["command_n"], FORCE_STEP_N) - device
-        withheld = _rounded(samples["force_n"], FORCE_STEP_N) - device
-        for i, axis in enumerate(AXES):
-            columns[f"position_{axis}_m"] = samples["position_m"][:, i]
-            columns[f"velocity_{axis}_mps"] = _rounded(samples["velocity_mps"][:, i], SPEED_STEP_MPS)
-            columns[f"wake_{axis}_mps"] = _rounded(samples["wake_mps"][:, i], SPEED_STEP_MPS)
-            columns[f"device_force_{axis}_n"] = device[:, i]
-            columns[f"undelivered_{axis}_n"] = undelivered[:, i]
-            columns[f"withheld_{axis}_n"] = withheld[:, i]
-        for name, (field, component, bit) in MEASURED.items():
-            values = samples[field] if component is None else samples[field][:, component]
-            columns[name] = np.where(samples["measured"] & bit, values, np.nan)
-        return {name: np.ascontiguousarray(column, _NUMPY_TYPES[name]) for name, column in columns.items()}
+        for field in RECORDED:
+            values = _rounded(_rows(samples, field.name), field.step)
+            if field.beside:
+                values = field.sign * (values - _rounded(_rows(samples, field.beside), field.step))
+            if field.measured:
+                values = np.where(samples["measured"][:, np.newaxis] & field.measured, values, np.nan)
+            for name, column in zip(field.named(field.column), values.T, strict=True):
+                columns[name] = np.ascontiguousarray(column, field.stored)
+    return columns
 
 
-def _rounded(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    rounded: NDArray[np.float64] = np.rint(values / step) * step
-    return rounded
+def _rows(samples: Any, name: str) -> NDArray[Any]:
+    """Return a field of samples as an array of shape (samples, components), which is a view."""
+    return np.reshape(samples[name], (len(samples), SAMPLE[name].shape[0] if SAMPLE[name].shape else 1))
+
+
+def _rounded(values: NDArray[Any], step: float) -> NDArray[Any]:
+    return np.asarray(np.rint(values / step) * step) if step else values
 
 
 class _Half:
@@ -475,11 +386,8 @@ def _schema(columns: Sequence[Column]) -> pa.Schema:
     fields = []
     for column in columns:
         metadata = {"description": column.description, **({"unit": column.unit} if column.unit else {})}
-        fields.append(pa.field(column.name, column_type(column), nullable=False, metadata=metadata))
+        fields.append(pa.field(column.name, _STORED[column.name], nullable=False, metadata=metadata))
     return pa.schema(fields)
-
-
-_NUMPY_TYPES = {column.name: column_type(column).to_pandas_dtype() for column in (*SAMPLES, *FRAMES)}
 
 
 def _encoding(of: pa.DataType) -> str:

@@ -13,6 +13,7 @@ from pyarrow import parquet
 
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import SAMPLE
+from study_app.store import recordings
 from study_app.store.recordings import (
     SamplesFile,
     Written,
@@ -223,3 +224,9 @@ def test_half_an_hour_takes_at_most_sixty_megabytes(tmp_path: Path, samples_of: 
     """Of places with every digit at random, as an analogue device has them; encoders take half of it."""
     size = write(tmp_path / "trial-003.parquet", samples_of(90_000)).path.stat().st_size
     assert size / 90_000 * 1_800_000 <= 60e6
+
+
+def test_a_recorded_column_is_named_by_its_declaration_and_the_kernel_that_fills_it_alone() -> None:
+    program = Path(recordings.__file__).parents[1]
+    naming = {file.name for file in program.rglob("*.py") if "device_time_ns" in file.read_text("utf-8")}
+    assert naming == {"layout.py", "loop.py"}

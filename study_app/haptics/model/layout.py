@@ -4,11 +4,14 @@ Records are rows of ``np.recarray``: plain structs in compiled code, objects wit
 (``NUMBA_DISABLE_JIT=1``). Positions and forces are float64; unless a name says otherwise, m, m/s, N, s.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from study_app.haptics.model.device_dynamics import MOST_DELAY
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 from study_app.haptics.model.effect import Fields
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.estimators import ESTIMATORS
@@ -91,41 +94,200 @@ BUTTON_STOP = 1 << 3
 
 FORCE_STEP_N = 2.0**-14
 """Resolution of forces in recordings [N]; checks round forces to it, both live and afterwards."""
-
-SAMPLE = np.dtype(
-    [
-        ("tick", np.int64),  # counts ticks of the servo since it started
-        ("time_ns", np.int64),  # when the device was read, on the servo's monotonic clock
-        ("lateness_ns", np.int64),  # how late the tick began after its deadline
-        ("busy_ns", np.int64),  # how long the tick took, from reading to writing
-        ("scene", np.int64),  # serial number of the active scene; 0 is rest (no liquid, no force)
-        ("position_m", np.float64, (3,)),  # device, hand frame
-        ("velocity_mps", np.float64, (3,)),  # scene frame, after estimator and knee
-        ("wake_mps", np.float64, (3,)),  # scene frame, as used by this tick's drag
-        ("force_n", np.float64, (3,)),  # sum of the effects on the body, before slope limit and safety
-        ("command_n", np.float64, (3,)),  # the force on the hand that the servo commanded
-        ("device_force_n", np.float64, (3,)),  # the force on the hand that the device sent
-        ("permitted_n", np.float64),  # size of the force of the effects after norm and fades
-        ("withheld_n", np.float64),  # size of its change by slope limits, passivity controller, slew limit and device
-        ("delay_ticks", np.int64),  # assumed delay of a force, in writes
-        ("buttons", np.int64),  # bit set: button 1 is bit 0
-        ("limiters", np.int64),  # LIMITER_* bits that acted
-        ("fresh", np.int64),  # 1 where the device reported a new sample
-        ("status", np.int64),  # STATUS_*
-        ("measured", np.int64),  # MEASURED_* bits: which of the following the device measured; the others are 0
-        ("device_velocity_mps", np.float64, (3,)),  # hand frame, as the device measured it
-        ("orientation", np.float64, (4,)),  # unit quaternion w, x, y, z: from the handle's frame to the hand frame
-        ("gripper_m", np.float64),  # opening of the gripper
-        ("device_time_ns", np.int64),  # time of the sample on the device's own clock
-    ],
-    align=True,
-)
+SPEED_STEP_MPS = 2.0**-12
+"""Resolution of computed velocities in recordings [m/s]."""
 
 # What a device may measure besides position and buttons, as bits of Reading.measured.
 MEASURED_VELOCITY = 1 << 0
 MEASURED_ORIENTATION = 1 << 1
 MEASURED_GRIPPER = 1 << 2
 MEASURED_TIME = 1 << 3
+
+_AXES: Final = {"x": "to the right", "y": "up", "z": "toward the participant"}
+_QUATERNION: Final = {part: part for part in "wxyz"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampleField:
+    """A field of `SAMPLE`, and the columns that recordings and streams have of it.
+
+    Attributes
+    ----------
+    name : of the field
+    kind : type of its numbers
+    parts : of a vector: the letter of each component, and its words
+    column : its name in a recording, with ``*`` for the letter; "": it is not recorded
+    words : meaning of the column, with ``*`` for the words of the component
+    unit : of the column, "" without one
+    stored : type of the column's numbers
+    step : to which the column is rounded; 0: exact
+    beside : the field from which the column is the difference, ``sign`` (this - beside), "": it is no difference
+    measured : MEASURED_* bit without which the column is NaN, 0: it is always known
+    since, before : first format of recordings that has the column, and the value in earlier ones
+    minimum, maximum, levels : of the column, as in ``csv_files.Column``
+    stream : its channel in a stream, with ``*`` for the letter; "": it is not streamed
+    """
+
+    name: str
+    kind: type = np.int64
+    parts: Mapping[str, str] = field(default_factory=dict)
+    column: str = ""
+    words: str = ""
+    unit: str = ""
+    stored: type = np.int64
+    step: float = 0.0
+    beside: str = ""
+    sign: int = 1
+    measured: int = 0
+    since: int = 1
+    before: float = 0
+    minimum: float | None = None
+    maximum: float | None = None
+    levels: tuple[tuple[str, str], ...] = ()
+    stream: str = ""
+
+    def named(self, pattern: str) -> list[str]:
+        """Return a name for each component, or one for a number."""
+        return [pattern.replace("*", part) for part in self.parts] or [pattern]
+
+
+_VECTOR: Final = partial(SampleField, kind=np.float64, parts=_AXES, stored=np.float32)
+_SPEED: Final = partial(_VECTOR, unit="m/s", step=SPEED_STEP_MPS)
+_FORCE: Final = partial(_VECTOR, unit="N", step=FORCE_STEP_N)
+_CODE: Final = partial(SampleField, stored=np.int32)
+
+SAMPLE_FIELDS: Final = (
+    SampleField(name="tick", column="tick", words="Number of the servo's tick since its start; gaps are lost samples."),
+    SampleField(
+        name="time_ns", column="time_ns", words="Time when the device was read, on the servo's clock.", unit="ns"
+    ),
+    SampleField(
+        name="lateness_ns",
+        column="due_ns",
+        words="Time when the tick was due; its lateness is time_ns - due_ns.",
+        unit="ns",
+        beside="time_ns",
+        sign=-1,
+    ),
+    SampleField(name="fresh", column="fresh", words="true where the device reported a new sample.", stored=np.bool_),
+    _VECTOR(
+        name="position_m",  # device, hand frame
+        column="position_*_m",
+        words="Position of the hand, exact, *.",
+        unit="m",
+        stored=np.float64,
+        stream="position_*",
+    ),
+    _SPEED(
+        name="velocity_mps",  # after estimator and compression
+        column="velocity_*_mps",
+        words="Velocity in the scene from which the force was computed; resolution 1/4096 m/s, *.",
+        stream="velocity_*",
+    ),
+    _SPEED(
+        name="wake_mps",  # as used by this tick's drag
+        column="wake_*_mps",
+        words="Velocity of the liquid's wake in the scene; resolution 1/4096 m/s, *.",
+    ),
+    _FORCE(
+        name="device_force_n",
+        column="device_force_*_n",
+        words="Force that the device applied to the hand; resolution 1/16384 N, *.",
+        stream="force_*",
+    ),
+    _FORCE(
+        name="command_n",
+        column="undelivered_*_n",
+        words="Force that the servo commanded and the device did not apply, *.",
+        beside="device_force_n",
+        since=2,
+    ),
+    _FORCE(
+        name="force_n",  # sum of the effects on the body, before slope limit and safety
+        column="withheld_*_n",
+        words="Force of the liquid that was withheld: the force of the liquid is device_force + withheld, *.",
+        beside="device_force_n",
+    ),
+    _CODE(name="buttons", column="buttons", words="Pressed buttons of the device, as bits."),  # button 1 is bit 0
+    _CODE(
+        name="limiters",
+        column="limiters",
+        words="Limiters that acted, as bits in the order of the trial's limiter columns.",
+        stream="limiters",
+    ),
+    _CODE(
+        name="delay_ticks",  # in writes
+        column="delay_ticks",
+        words="Estimated delay of the force, in ticks.",
+        minimum=0,
+        maximum=MOST_DELAY,
+        since=2,
+        before=ASSUMED_TICKS,
+    ),
+    _CODE(name="scene", column="scene", words="Number of the presented scene; 0 is none.", minimum=0),
+    _CODE(
+        name="status",
+        column="status",
+        words="State of the servo.",
+        levels=(
+            ("0", "running normally"),
+            ("1", "no usable sample for 50 ms"),
+            ("2", "device lost"),
+            ("3", "a non-finite force (NaN or infinite)"),
+        ),
+    ),
+    _CODE(
+        name="measured",
+        column="measured",
+        words="What the device measured itself, as bits: 1 velocity, 2 orientation, 4 gripper, 8 time.",
+        minimum=0,
+        maximum=15,
+        since=3,
+    ),
+    _VECTOR(
+        name="device_velocity_mps",
+        column="device_velocity_*_mps",
+        words="Velocity of the hand, as the device measured it (NaN if not measured), *.",
+        unit="m/s",
+        stored=np.float64,
+        measured=MEASURED_VELOCITY,
+        since=3,
+    ),
+    _VECTOR(
+        name="orientation",
+        parts=_QUATERNION,
+        column="orientation_*",
+        words="Orientation of the handle in the hand frame: * of a unit quaternion; NaN if not measured.",
+        measured=MEASURED_ORIENTATION,
+        since=3,
+    ),
+    SampleField(
+        name="gripper_m",
+        kind=np.float64,
+        column="gripper_m",
+        words="Opening of the gripper; NaN if not measured.",
+        unit="m",
+        stored=np.float32,
+        measured=MEASURED_GRIPPER,
+        since=3,
+    ),
+    SampleField(
+        name="device_time_ns",
+        column="device_time_ns",
+        words="Time of the sample on the device's clock; 0 if not measured.",
+        unit="ns",
+        since=3,
+    ),
+    SampleField(name="busy_ns"),  # how long the tick took, from reading to writing
+    SampleField(name="permitted_n", kind=np.float64),  # size of the force of the effects after norm and fades
+    SampleField(name="withheld_n", kind=np.float64),  # size of its change by slope limits, passivity, slew and device
+)
+"""What a tick tells: recorded columns, their dictionary and the channels of a stream follow from it, in this order.
+
+Vectors are in the hand frame (position, device_velocity, forces) or in the scene frame (velocity, wake).
+"""
+
+SAMPLE = np.dtype([(it.name, it.kind, (len(it.parts),) if it.parts else ()) for it in SAMPLE_FIELDS], align=True)
 
 CONTRACT_VERSION = 2
 """Of `READING` and `COMMAND`. Later versions append fields: a driver uses those that fit into ``size_bytes``."""
