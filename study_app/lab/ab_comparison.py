@@ -93,7 +93,7 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Workbench:
-    """Settings A and B; ``felt`` is the one presented to the hand.
+    """Settings A and B; ``presented`` is the one that the hand feels.
 
     While ``blind`` the assignment is hidden: ``first`` is the one called "setting 1", and nothing can be edited.
     ``held`` is the parameter whose slider is being dragged.
@@ -101,7 +101,7 @@ class Workbench:
 
     a: Setting
     b: Setting
-    felt: Side = "A"
+    presented: Side = "A"
     blind: bool = False
     first: Side = "A"
     past: tuple[tuple[Setting, Setting], ...] = ()
@@ -115,7 +115,7 @@ class Workbench:
     @property
     def in_hand(self) -> Setting:
         """The presented setting, which edits change."""
-        return self.setting(self.felt)
+        return self.setting(self.presented)
 
     @property
     def may_undo(self) -> bool:
@@ -148,13 +148,13 @@ class Workbench:
             The value is not permitted, with the reason; or nothing may be edited now.
         """
         self._refuse_blind("edited")
-        key = (self.felt, name)
+        key = (self.presented, name)
         goes_on = self.held == key
         it = self.in_hand
         edited = replace(it, scene=changed(it.scene, name, value))
         if edited == it:
             return replace(self, held=key if held and goes_on else None)
-        return self._edited(self.felt, edited, held=key if held else None, goes_on=goes_on)
+        return self._edited(self.presented, edited, held=key if held else None, goes_on=goes_on)
 
     def put(self, scene: Scene, key: str | None = None) -> Workbench:
         """Return a copy with another scene selected; successive changes of one ``key`` are one undo step.
@@ -165,11 +165,14 @@ class Workbench:
             Nothing may be edited now.
         """
         self._refuse_blind("edited")
-        held = None if key is None else (self.felt, key)
+        held = None if key is None else (self.presented, key)
         if scene == self.in_hand.scene:
             return replace(self, held=held)
         return self._edited(
-            self.felt, replace(self.in_hand, scene=scene), held=held, goes_on=held is not None and self.held == held
+            self.presented,
+            replace(self.in_hand, scene=scene),
+            held=held,
+            goes_on=held is not None and self.held == held,
         )
 
     def choose(self, side: Side, name: str, scene: Scene) -> Workbench:
@@ -184,10 +187,10 @@ class Workbench:
         the_liquid(scene)
         return self._edited(side, Setting(name, scene, scene))
 
-    def copy_felt_to_other(self) -> Workbench:
+    def copy_to_other(self) -> Workbench:
         """Return a copy with the presented setting on both sides."""
         self._refuse_blind("copied")
-        return self._edited(other(self.felt), self.in_hand)
+        return self._edited(other(self.presented), self.in_hand)
 
     def undo(self) -> Workbench:
         """Return a copy with the last edit undone; the same if there is none."""
@@ -205,15 +208,15 @@ class Workbench:
 
     def switch(self) -> Workbench:
         """Return a copy that presents the other setting."""
-        return replace(self, felt=other(self.felt), held=None)
+        return replace(self, presented=other(self.presented), held=None)
 
     def blinded(self, chance: Random) -> Workbench:
         """Return a blind copy: setting 1 and the presented setting are drawn at random."""
         if self.blind:
             return self
         drawn = [chance.random() < _SWITCHES_BY_CHANCE for _ in range(2)]
-        first, felt = (other("A") if it else "A" for it in drawn)
-        return replace(self, blind=True, first=first, felt=felt, held=None)
+        first, presented = (other("A") if it else "A" for it in drawn)
+        return replace(self, blind=True, first=first, presented=presented, held=None)
 
     def revealed(self) -> Workbench:
         """Return a copy that is no longer blind."""

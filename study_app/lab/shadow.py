@@ -88,7 +88,7 @@ _ROW: Final = np.dtype(
         ("body_mps", np.float64),
         ("wake_a_mps", np.float64),
         ("wake_b_mps", np.float64),
-        ("felt_a", np.bool_),
+        ("presented_a", np.bool_),
     ]
 )
 
@@ -98,8 +98,8 @@ class Trace:
     """The last 2.5 s of one motion for A and for B; ``t_s`` (n,) ends at 0, the newest sample.
 
     ``force_a_n``, ``force_b_n`` (n, 3) are the forces on the hand, sent by the servo or, for the side not presented, as
-    they would have been sent; ``body_mps``, ``wake_a_mps`` and ``wake_b_mps`` (n,) speeds in the scene; ``felt_a`` (n,)
-    tells where A was presented.
+    they would have been sent; ``body_mps``, ``wake_a_mps`` and ``wake_b_mps`` (n,) speeds in the scene;
+    ``presented_a`` (n,) tells where A was presented.
     """
 
     t_s: Floats
@@ -108,14 +108,14 @@ class Trace:
     body_mps: Floats
     wake_a_mps: Floats
     wake_b_mps: Floats
-    felt_a: NDArray[np.bool_]
+    presented_a: NDArray[np.bool_]
 
 
 @dataclass(slots=True)
 class _Presented:
     """The side and scene that the servo presents from the scene's first sample on."""
 
-    felt: Side
+    side: Side
     scenes: dict[Side, Scene]
     goes_on: bool
 
@@ -126,8 +126,10 @@ class Shadow:
     Parameters
     ----------
     rest : the scene without liquids that the servo begins with
-    elements : capacity for wake elements limit_n : the device's own force limit [N] dynamics : of the device alone :
-    the samples are not from a servo: both sides show recomputed results
+    elements : capacity for wake elements
+    limit_n : the device's own force limit [N]
+    dynamics : of the device
+    alone : the samples are not from a servo: both sides show recomputed results
     """
 
     def __init__(
@@ -135,7 +137,7 @@ class Shadow:
     ) -> None:
         self._alone = alone
         self._sides = {side: _Half(rest, elements, limit_n, dynamics) for side in _SIDES}
-        self._felt: Side = "A"
+        self._presented: Side = "A"
         self._serial = 0
         self._expected: dict[int, _Presented] = {}
         self._recent = _Recent()
@@ -146,14 +148,14 @@ class Shadow:
         """Compile all functions that run later, or load them from the cache."""
         for half in self._sides.values():
             half.begin(half.scene)
-            half.answer(records(SAMPLE, 0), felt=True)
+            half.answer(records(SAMPLE, 0), presented=True)
             half.restart()
 
-    def expect(self, serial: int, felt: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
+    def expect(self, serial: int, side: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
         """Note what the servo will present as scene ``serial``; ``goes_on`` if it only adjusts."""
-        self._expected[serial] = _Presented(felt, {"A": a, "B": b}, goes_on)
+        self._expected[serial] = _Presented(side, {"A": a, "B": b}, goes_on)
 
-    def put_unfelt(self, side: Side, scene: Scene) -> None:
+    def put_other(self, side: Side, scene: Scene) -> None:
         """Set the scene of the side not presented, if it differs."""
         for it in self._expected.values():
             it.scenes[side] = scene
@@ -181,7 +183,7 @@ class Shadow:
         return self._sides[side].tail()
 
     def _change_to(self, serial: int) -> None:
-        """Follow the servo to this scene: restart the felt side, and the other side if it changed."""
+        """Follow the servo to this scene: restart its side, and the other side if it changed."""
         if serial == self._serial:
             return
         self._serial = serial
@@ -190,23 +192,23 @@ class Shadow:
         if presented is None:  # rest: a servo that ends, or presents nothing
             return
         self._expected = {number: it for number, it in self._expected.items() if number > serial}
-        felt, unfelt = self._sides[presented.felt], self._sides[other(presented.felt)]
-        if self._felt != presented.felt:
-            felt.safety, unfelt.safety = unfelt.safety, unfelt.safety.copy()  # the servo's own goes with what is felt
-        goes_on = all(it.goes_on for it in missed)
-        (felt.go_on if goes_on else felt.begin)(presented.scenes[presented.felt])
-        if unfelt.scene != presented.scenes[other(presented.felt)]:
-            unfelt.begin(presented.scenes[other(presented.felt)])
-        self._felt = presented.felt
+        side, scenes = presented.side, presented.scenes
+        shown, hidden = self._sides[side], self._sides[other(side)]
+        if self._presented != side:
+            shown.safety, hidden.safety = hidden.safety, shown.safety.copy()  # the servo's own goes with the force
+        (shown.go_on if all(it.goes_on for it in missed) else shown.begin)(scenes[side])
+        if hidden.scene != scenes[other(side)]:
+            hidden.begin(scenes[other(side)])
+        self._presented = side
 
     def _follow(self, samples: Any) -> None:
         """Recompute both sides for samples of one scene; show the servo's own forces for the presented side."""
-        out = {side: half.answer(samples, felt=side == self._felt) for side, half in self._sides.items()}
+        out = {side: half.answer(samples, presented=side == self._presented) for side, half in self._sides.items()}
         if not self._alone:
-            again, out[self._felt] = out[self._felt], samples
+            again, out[self._presented] = out[self._presented], samples
             self.followed += len(samples)
             self.differing += int(np.count_nonzero((again.device_force_n != samples.device_force_n).any(axis=1)))
-        self._recent.add(samples.time_ns, out["A"], out["B"], felt_a=self._felt == "A")
+        self._recent.add(samples.time_ns, out["A"], out["B"], presented_a=self._presented == "A")
 
 
 class _Half:
@@ -235,10 +237,10 @@ class _Half:
         self.scene = scene
         adjust_into(self._model, scene, dynamics=self._dynamics)
 
-    def answer(self, samples: Any, *, felt: bool) -> Any:
-        """Return the samples with recomputed results; ``felt`` if the device was sent this side's force."""
+    def answer(self, samples: Any, *, presented: bool) -> Any:
+        """Return the samples with recomputed results; ``presented`` if the device was sent this side's force."""
         out = samples.copy()
-        recompute_sample(self._model, self.safety[0], out, self._trail[0], self._places, felt)
+        recompute_sample(self._model, self.safety[0], out, self._trail[0], self._places, presented)
         return out
 
     def tail(self) -> Tail | None:
@@ -259,14 +261,14 @@ class _Recent:
     def __init__(self) -> None:
         self._rows: Any = records(_ROW, 0)
 
-    def add(self, time_ns: Any, a: Any, b: Any, *, felt_a: bool) -> None:
+    def add(self, time_ns: Any, a: Any, b: Any, *, presented_a: bool) -> None:
         """Add samples of the same times, one array per side."""
         rows = records(_ROW, len(time_ns))
         rows.time_ns, rows.force_a_n, rows.force_b_n = time_ns, a.device_force_n, b.device_force_n
-        rows.body_mps = np.linalg.norm((a if felt_a else b).velocity_mps, axis=1)
+        rows.body_mps = np.linalg.norm((a if presented_a else b).velocity_mps, axis=1)
         rows.wake_a_mps = np.linalg.norm(a.wake_mps, axis=1)
         rows.wake_b_mps = np.linalg.norm(b.wake_mps, axis=1)
-        rows.felt_a = felt_a
+        rows.presented_a = presented_a
         joined = np.concatenate([self._rows, rows])
         self._rows = joined[joined["time_ns"] > time_ns[-1] - round(SPAN_S * 1e9)].view(np.recarray)
 
@@ -282,5 +284,5 @@ class _Recent:
             body_mps=rows.body_mps,
             wake_a_mps=rows.wake_a_mps,
             wake_b_mps=rows.wake_b_mps,
-            felt_a=rows.felt_a,
+            presented_a=rows.presented_a,
         )

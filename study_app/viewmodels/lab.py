@@ -158,7 +158,7 @@ class LabView:
 
     @property
     def felt(self) -> Side:
-        return self.workbench.felt
+        return self.workbench.presented
 
     @property
     def tail(self) -> Tail | None:

@@ -67,7 +67,7 @@ def test_undo_takes_everything_back_and_redo_makes_it_again(steps: list[tuple[st
             case "switch":
                 it = it.switch()
             case "copy":
-                it = it.copy_felt_to_other()
+                it = it.copy_to_other()
             case "undo":
                 it = it.undo()
             case _:
@@ -89,7 +89,7 @@ def test_blinding_hides_names_and_edits_and_draws_both_sides() -> None:
     seen: set[tuple[Side, Side]] = set()
     for seed in range(40):
         blind = bench().blinded(Random(seed))  # noqa: S311 - a test draws
-        seen.add((blind.first, blind.felt))
+        seen.add((blind.first, blind.presented))
         assert {blind.shown_name("A"), blind.shown_name("B")} == {"Setting 1", "Setting 2"}
         assert blind.shown_name(blind.first) == "Setting 1"
         assert (blind.a, blind.b) == (bench().a, bench().b)
@@ -102,13 +102,13 @@ def test_while_blind_nothing_can_be_edited_and_switching_goes_on() -> None:
     for what in (
         lambda: blind.change("wake.exponent", 2.0),
         lambda: blind.choose("A", "Honey", SCENES["honey"]),
-        blind.copy_felt_to_other,
+        blind.copy_to_other,
     ):
         with pytest.raises(StudyError, match="during a blind comparison"):
             what()
     assert blind.undo() == blind
     assert blind.changed_names("A") == ()
-    assert blind.switch().felt == other(blind.felt)
+    assert blind.switch().presented == other(blind.presented)
     assert blind.blinded(Random(2)) == blind  # noqa: S311 - a test draws
     revealed = blind.revealed()
     assert revealed.shown_name("A") == "Water, edited"

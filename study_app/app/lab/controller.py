@@ -248,7 +248,7 @@ class LabController(QObject):
 
     @guarded
     def _copy(self) -> None:
-        self._try(self.bench.copy_felt_to_other, "")
+        self._try(self.bench.copy_to_other, "")
 
     def _try(self, edit: Callable[[], Workbench], name: str) -> None:
         """Make an edit, or keep why it was refused, for its parameter."""
@@ -352,7 +352,7 @@ class LabController(QObject):
         except StudyError as error:
             self.trouble = str(error)
             return
-        self._choose(self.bench.felt, first)
+        self._choose(self.bench.presented, first)
 
     @guarded
     def _could_not_save(self, error: Exception) -> None:

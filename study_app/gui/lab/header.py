@@ -127,8 +127,8 @@ class SideSwitch(Themed, QWidget):
         for number, (place, side) in enumerate(zip(SIDES, order, strict=True), 1):
             segment = self.segments[place]
             segment.show_name(bench.shown_name(side), str(number) if bench.blind else side)
-            segment.setChecked(side == bench.felt)
-            felt = ", felt now" if side == bench.felt else ""
+            segment.setChecked(side == bench.presented)
+            felt = ", felt now" if side == bench.presented else ""
             segment.setAccessibleName(f"{'' if bench.blind else side + ': '}{bench.shown_name(side)}{felt}")
 
     def paintEvent(self, _event: QPaintEvent) -> None:

@@ -346,9 +346,9 @@ class FormPanel(Card):
         self.back.setVisible(bool(view.study))
         self.back.setToolTip(f"{view.study} is open in the study designer")
         setting = bench.in_hand
-        if setting != self._setting or bench.felt != self._side:
-            refused = self._side != bench.felt
-            self._setting, self._side = setting, bench.felt
+        if setting != self._setting or bench.presented != self._side:
+            refused = self._side != bench.presented
+            self._setting, self._side = setting, bench.presented
             self._show_form(form(setting), forget=refused)
         if view.refused is not self._refused:
             self._refused = view.refused
@@ -363,12 +363,12 @@ class FormPanel(Card):
             self.liquid.clear()
             for liquid in view.liquids:
                 self.liquid.addItem(liquid.title)
-        self.badge.show_side(bench.felt)
-        self.liquid.setAccessibleName(f"Liquid of {bench.felt}")
+        self.badge.show_side(bench.presented)
+        self.liquid.setAccessibleName(f"Liquid of {bench.presented}")
         index = self.liquid.findText(bench.in_hand.name)
         self.liquid.setCurrentIndex(index)
         self.liquid.setPlaceholderText(bench.in_hand.name)
-        words = f"Copy to {other(bench.felt)}"
+        words = f"Copy to {other(bench.presented)}"
         self.copy.show_action("copy", words)
 
     def _show_form(self, sections: tuple[FormSection, ...], *, forget: bool) -> None:

@@ -23,7 +23,7 @@ from typing import Any, Final
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import clear, copy, norm, square
 from study_app.haptics.model import estimators
-from study_app.haptics.model.layout import KNEE_SQRT, KNEE_SQUARE, Record
+from study_app.haptics.model.layout import COMPRESSION_SQRT, COMPRESSION_SQUARE, Record
 
 JERK_M2PS5: Final = 0.5
 JERK_OF_ACCELERATION_PS: Final = 10.0
@@ -103,13 +103,13 @@ def _compress_speed(parameters: Record, state: Record) -> None:
     literal "squaring the part above" of Rek 2024, which raises any excess over 1 m/s.
     """
     share = 1.0
-    if square(state.estimate_mps) > parameters.knee_threshold_mps * parameters.knee_threshold_mps:
+    if square(state.estimate_mps) > parameters.compression_threshold_mps * parameters.compression_threshold_mps:
         speed_mps = norm(state.estimate_mps)
-        excess_mps = speed_mps - parameters.knee_threshold_mps
-        if parameters.knee_law == KNEE_SQRT:
-            share = (parameters.knee_threshold_mps + math.sqrt(1.0 + 2.0 * excess_mps) - 1.0) / speed_mps
-        elif parameters.knee_law == KNEE_SQUARE:
-            share = (parameters.knee_threshold_mps + excess_mps * excess_mps) / speed_mps
+        excess_mps = speed_mps - parameters.compression_threshold_mps
+        if parameters.compression_law == COMPRESSION_SQRT:
+            share = (parameters.compression_threshold_mps + math.sqrt(1.0 + 2.0 * excess_mps) - 1.0) / speed_mps
+        elif parameters.compression_law == COMPRESSION_SQUARE:
+            share = (parameters.compression_threshold_mps + excess_mps * excess_mps) / speed_mps
     for axis in range(3):
         state.velocity_mps[axis] = share * state.estimate_mps[axis]
 

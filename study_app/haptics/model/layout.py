@@ -332,9 +332,9 @@ GROWS_AS_SQUARE = 0
 GROWS_AS_SPEED = 1
 GROWS_LESS = 2
 
-KNEE_NONE = 0
-KNEE_SQRT = 1
-KNEE_SQUARE = 2
+COMPRESSION_NONE = 0
+COMPRESSION_SQRT = 1
+COMPRESSION_SQUARE = 2
 
 # The force link (haptics.kernels.safety).
 LINK = np.dtype(
@@ -370,8 +370,8 @@ PARAMETERS = np.dtype(
         ("weight_n", np.float64),  # of the body
         ("estimator", np.int64),  # code of `estimators`
         ("log_keep_per_s", np.float64),  # ln(1 - α) per second: after t the share of the old velocity is exp of it · t
-        ("knee_law", np.int64),  # KNEE_*
-        ("knee_threshold_mps", np.float64),
+        ("compression_law", np.int64),  # COMPRESSION_*
+        ("compression_threshold_mps", np.float64),
         ("slope_limit_nspm", np.float64, (MOST_DELAY + 1,)),  # greatest |drag| / |w| [N·s/m, scene], by the delay
         ("force_limit_n", np.float64),
         ("fade_s", np.float64),  # duration of the fade-in
@@ -424,8 +424,8 @@ STATE = np.dtype(
         ("weight", np.float64),  # of the newest difference, for an interval of ``weighted_s``
         ("weighted_s", np.float64),
         *((it.name, record_type(it.state)) for it in ESTIMATORS if it.state is not None),
-        ("estimate_mps", np.float64, (3,)),  # the estimator's own velocity, before the knee
-        ("velocity_mps", np.float64, (3,)),  # after the knee
+        ("estimate_mps", np.float64, (3,)),  # the estimator's own velocity, before compression
+        ("velocity_mps", np.float64, (3,)),  # after compression
         ("wake_mps", np.float64, (3,)),  # of the last listed liquid that acts, as used by drag
         ("drift_mps", np.float64, (3,)),  # velocity of the current at the body, of the same liquid
         ("force_n", np.float64, (3,)),  # sum of the effects

@@ -51,11 +51,11 @@ def simulate(scene: Scene, path: Motion | str | os.PathLike[str]) -> Table:
     """Return the forces on a body along a motion (or a CSV file with one): a recarray of n rows, named `COLUMNS`.
 
     Every row is a new accepted sample and one tick. Δt is the time since the row before, clamped as in the servo; the
-    first row takes the scene's nominal period. Velocities given with the motion are used unfiltered, only the knee is
-    applied. ``vx_mps …`` is the velocity after filter and knee, ``wake_x_mps …`` the wake in this tick's drag, ``fx_n
-    …`` the sum of the effects, ``device_fx_n …`` the force that a loop of 1 ms with one tick of delay would send after
-    the start fade; ``limiters`` the ``LIMITER_*`` bits that acted on it. Places and velocities are in the scene frame;
-    a force is the same vector at the hand.
+    first row takes the scene's nominal period. Velocities given with the motion are only compressed, not
+    filtered. ``vx_mps …`` is the velocity after filter and compression, ``wake_x_mps …`` the wake in this tick's drag,
+    ``fx_n …`` the sum of the effects, ``device_fx_n …`` the force that a loop of 1 ms with one tick of delay would send
+    after the start fade; ``limiters`` the ``LIMITER_*`` bits that acted on it. Places and velocities are in the scene
+    frame; a force is the same vector at the hand.
 
     Raises
     ------

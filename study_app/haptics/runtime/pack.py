@@ -41,7 +41,7 @@ Counts: TypeAlias = Mapping[str, int]
 """A number of rows for each of these arrays."""
 RESOLUTION = 1e-6
 """Of the factor of smoothing rates."""
-_KNEES = {"none": layout.KNEE_NONE, "sqrt": layout.KNEE_SQRT, "square": layout.KNEE_SQUARE}
+_COMPRESSIONS = {"none": layout.COMPRESSION_NONE, "sqrt": layout.COMPRESSION_SQRT, "square": layout.COMPRESSION_SQUARE}
 
 
 def rows_needed(scene: Scene) -> Counts:
@@ -282,8 +282,8 @@ def _fill_constants(
     parameters.weight_n = scene.body.density_kg_m3 * scene.body.volume_m3 * GRAVITY_MPS2
     parameters.estimator = ESTIMATORS[scene.velocity.kind].code
     ESTIMATORS[scene.velocity.kind].fill(parameters, scene.velocity)
-    parameters.knee_law = _KNEES[scene.knee.law]
-    parameters.knee_threshold_mps = scene.knee.threshold_mps
+    parameters.compression_law = _COMPRESSIONS[scene.knee.law]
+    parameters.compression_threshold_mps = scene.knee.threshold_mps
     parameters.slope_limit_nspm = [limit.drag_nspm / scene.scale for limit in limits]
     parameters.force_limit_n = scene.force_limit_n
     parameters.fade_s = scene.fade_s

@@ -186,7 +186,7 @@ class LiveEstimation:
     def _begin(self, live: Live | None, bench: Workbench) -> None:
         """Restart if the device or parameters that are not estimated changed."""
         scene = bench.in_hand.scene
-        reference = bench.setting(other(bench.felt)).scene if self.chosen.source == "other" else None
+        reference = bench.setting(other(bench.presented)).scene if self.chosen.source == "other" else None
         basis = (_without(scene, self.chosen.names), reference)
         if basis == self._basis and live is self._live:
             return

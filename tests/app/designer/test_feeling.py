@@ -90,7 +90,7 @@ def test_a_block_is_felt_as_two_liquids_and_each_goes_back_to_its_own(qtbot: Any
     assert (lab.bench.a.name, lab.bench.b.name) == ("Thin", "Thick")
     lab.place.switched.emit()
     lab.place.changed.emit("liquid.density_kg_m3", 1700.0, False)
-    qtbot.waitUntil(lambda: lab.place.view.workbench.felt == "B" and lab.place.view.workbench.b.is_edited)
+    qtbot.waitUntil(lambda: lab.place.view.workbench.presented == "B" and lab.place.view.workbench.b.is_edited)
     qtbot.mouseClick(lab.place.form.back, Qt.MouseButton.LeftButton)
     assert both.designer.editing.opened is not None
     liquids = both.designer.editing.opened.study.document["liquids"]

@@ -72,7 +72,7 @@ def short(value: Any) -> str:
     """Return what tells a workbench, a setting or a scene from another."""
     if hasattr(value, "in_hand"):
         first = f", blind of {value.first}" if value.blind else ""
-        return f"{value.felt}: {value.a.name} {short(value.a.scene)}, {value.b.name} {short(value.b.scene)}{first}"
+        return f"{value.presented}: {value.a.name} {short(value.a.scene)}, {value.b.name} {short(value.b.scene)}{first}"
     return (
         f"{value.liquids[0].density_kg_m3:g} cd {value.body.drag_coefficient:g}"
         if hasattr(value, "liquids")

@@ -102,7 +102,7 @@ def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields
     rest = bench.a.scene.model_copy(update={"liquids": ()})
     shadow = Shadow(rest, ELEMENTS, 8.0)
     samples = felt_samples(bench.in_hand.scene, hand()[:cut])
-    shadow.expect(1, bench.felt, bench.a.scene, bench.b.scene)
+    shadow.expect(1, bench.presented, bench.a.scene, bench.b.scene)
     shadow.take(samples)
     counts = LimiterCounts()
     for first in range(0, len(samples), 33):
@@ -120,7 +120,7 @@ def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields
 
 def blind(bench: Workbench, *, first: str = "A", felt: str = "A") -> Workbench:
     drawn = bench.blinded(random.Random(1))  # noqa: S311 - drawn, then set
-    return dataclasses.replace(drawn, first=first, felt=felt)  # type: ignore[arg-type]
+    return dataclasses.replace(drawn, first=first, presented=felt)  # type: ignore[arg-type]
 
 
 def heard(place: Any, name: str) -> list[tuple[Any, ...]]:

@@ -34,7 +34,7 @@ def flowing() -> dict[str, Any]:
     speeds = (0.2 + 0.1 * np.sin(k * t_s) for k in (2, 3, 4))
     acting = still_view().limiters
     return {
-        "trace": Trace(t_s, 3 * wave, 2 * wave[::-1], *speeds, felt_a=t_s < -1.0),
+        "trace": Trace(t_s, 3 * wave, 2 * wave[::-1], *speeds, presented_a=t_s < -1.0),
         "tail_a": tail,
         "tail_b": replace_fields(tail, positions_m=-places, segments=1, breaks=breaks & (share < 0.1)),
         "now": Now((0.01, 0.005, 0.004), (2.0, 1.0, 0.5), (0.3, -0.2, 0.1)),

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.layout import SAMPLE
 from study_app.haptics.model.scene import Box, Knee
 from study_app.haptics.runtime.pack import built_alike
 from study_app.lab.parameters import changed
@@ -40,7 +39,7 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
     "low limit": (EVERYTHING["tail"].model_copy(update={"force_limit_n": 0.5}), {}),
     "slow fade": (THESIS["honey"].model_copy(update={"fade_s": 0.2}), {"faded_in": False}),
 }
-VECTORS = [name for name in SAMPLE.names or () if SAMPLE[name].shape == (3,) and name != "position_m"]
+VECTORS = ("velocity_mps", "wake_mps", "force_n", "command_n", "device_force_n", "device_velocity_mps")
 SCALARS = ("permitted_n", "withheld_n", "delay_ticks", "limiters", "status")
 
 
