@@ -52,15 +52,17 @@ class Table:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a command of evidence prints, what it writes, and whether a limit is missed.
+    """What a command of evidence prints, what it writes, and whether a limit is missed, or undecided.
 
-    ``files`` are texts by file name; ``figures`` draws the others.
+    ``files`` are texts by file name; ``figures`` draws the others; ``closing`` is printed last.
     """
 
     text: str
     files: Mapping[str, str]
     figures: Callable[[], Mapping[str, bytes]] = dict
     missed: bool = False
+    undecided: bool = False
+    closing: str = ""
 
     def write(self, to: Path) -> tuple[Path, ...]:
         """Write all files into the folder ``to``, or none; return their paths.

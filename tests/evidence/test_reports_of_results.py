@@ -18,7 +18,7 @@ from study_app.evidence.report_rates import simulation
 from study_app.evidence.soak import soak
 from study_app.evidence.stability import delivered_force, force_delay, stability_report, velocity, withheld_force
 from study_app.evidence.table import Evidence
-from study_app.evidence.thresholds import known_thresholds, noticed_delays
+from study_app.evidence.thresholds import known_values, noticed_delays
 from study_app.evidence.timing import delays, device_lateness, report
 from study_app.evidence.timing.delays import Shown
 from tests.filled import filled
@@ -79,7 +79,7 @@ QUICK = {
     "timing_report-text": report.evidence, "delay_report-text": delays.evidence,
     "device_lateness-text": device_lateness.evidence, "outlet_report-stream_text": streams.evidence,
     "outlet_report-trigger_text": triggers.evidence,
-    "verdicts-write": known_thresholds.evidence,
+    "verdicts-write": known_values.evidence,
     "noticed_delays-markdown": noticed_delays.evidence,
     "rates-write": simulation.evidence,
     "stability_report-group_table": stability_report.group_table,

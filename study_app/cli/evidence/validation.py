@@ -2,16 +2,13 @@
 
 import os
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from study_app.cli.evidence import present
-from study_app.cli.options import Target, end_if, executor_for, prepare, progress, takes_workers
+from study_app.cli.options import Target, executor_for, prepare, progress, takes_workers
 from study_app.workers.executors import Workers
-
-EXIT_UNDECIDED = 4
 
 
 @click.command("validate-report")
@@ -59,19 +56,6 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     except KeyboardInterrupt:
         click.echo("ended early", err=True)
     present(evidence(rates, f"{done} studies in {time.monotonic() - begun:.0f} s"), to)
-    beyond, undecided = (sum(one.holds == verdict for one in rates) for verdict in ("no", "too few studies"))
-    limited = sum(one.holds != "counted" for one in rates)
-    verdict = "every rate is within its limit"
-    if not limited:
-        verdict = "no rate was counted"
-    elif beyond:
-        verdict = f"{beyond} of {limited} rates exceed their limits, {undecided} undecided"
-    elif undecided:
-        verdict = f"{undecided} of {limited} rates undecided: simulate more studies"
-    click.echo(verdict)
-    end_if(beyond)
-    if undecided or not limited:
-        click.get_current_context().exit(EXIT_UNDECIDED)
 
 
 @click.command()
@@ -94,8 +78,8 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
     participants are rehearsed with servo, files, unblinding and analysis. Every value is printed with its limit. Ends
     with exit code 3 if a value exceeds its limit.
     """
-    from study_app.evidence.thresholds.known_thresholds import Verdict, evidence
-    from study_app.evidence.thresholds.many_studies import NAMES, PEOPLE, judged, known_value, methods_alone, rehearsed
+    from study_app.evidence.thresholds.known_values import NAMES, evidence, known_value
+    from study_app.evidence.thresholds.known_values import validate as validate_values
     from study_app.protocol.load import load, source_bytes
 
     try:
@@ -104,26 +88,11 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
         raise click.UsageError(str(error)) from error
     prepare(to)
     begun = time.monotonic()
-    judgements: list[Verdict] = []
     with progress() as show, executor_for(workers) as executor:
-        rehearsals = [executor.submit(rehearsed, one, source, seed) for source, one in chosen]
-        for (_, one), rehearsal in zip(chosen, rehearsals, strict=True):
-
-            def counted(done: int, name: str = one.name) -> None:
-                show(f"{name}: {done} of {studies} studies", done / studies)
-
-            of_methods, spread = methods_alone(one, studies, seed, executor, counted)
-            show(f"{one.name}: rehearsing {PEOPLE} participants")
-            judgements += [*of_methods, *judged(one, rehearsal.result(), spread)]
+        verdicts = validate_values(chosen, studies, seed, executor, show)
     used_s = sum(os.times()[:4])  # with the workers', which have ended
     took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
-    found = evidence(judgements, f"{studies} studies of each protocol, seed {seed}, in {took}")
-    present(replace(found, missed=False), to)
-    beyond = sum(not one.holds for one in judgements)
-    click.echo(
-        f"{beyond} of {len(judgements)} values exceed their limits" if beyond else "every value is within its limit"
-    )
-    end_if(beyond)
+    present(evidence(verdicts, f"{studies} studies of each protocol, seed {seed}, in {took}"), to)
 
 
 @click.command("delay-thresholds")

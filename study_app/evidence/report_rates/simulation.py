@@ -208,7 +208,17 @@ def evidence(rates: Sequence[Rate], heading: str) -> Evidence:
         for one in rates
     ]
     names = ("studies", "participants", "what", "limit", "hits", "of", "share", "low", "high", "holds")
-    return Evidence(text, {"rates.md": text, "rates.csv": Table(names, cells).csv()})
+    beyond, undecided = (sum(one.holds == verdict for one in rates) for verdict in ("no", "too few studies"))
+    limited = sum(one.holds != "counted" for one in rates)
+    closing = "every rate is within its limit"
+    if not limited:
+        closing = "no rate was counted"
+    elif beyond:
+        closing = f"{beyond} of {limited} rates exceed their limits, {undecided} undecided"
+    elif undecided:
+        closing = f"{undecided} of {limited} rates undecided: simulate more studies"
+    files = {"rates.md": text, "rates.csv": Table(names, cells).csv()}
+    return Evidence(text, files, missed=beyond > 0, undecided=undecided > 0 or not limited, closing=closing)
 
 
 BATCH: Final = 25

@@ -18,7 +18,7 @@ from study_app import figure_style as style
 from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.evidence.table import Evidence, Table
-from study_app.evidence.thresholds.known_thresholds import known_threshold, simulate
+from study_app.evidence.thresholds.known_values import KnownThreshold, known_value
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.simulated import NO_FEATURES, Observer, Rater, normal, rate, rater
@@ -110,8 +110,9 @@ def compare(count: int, seed: int) -> Compared:
 
 def detected(people: Sequence[Person], seed: int) -> tuple[float, float, float]:
     """Return the group's threshold in `FORCED_CHOICE` with the ends of its 95 % interval [ms]."""
-    one = known_threshold(FORCED_CHOICE, load(FORCED_CHOICE))
-    (group,) = simulate(one, 0, seed, observers=[person.observer for person in people]).group
+    one = known_value(FORCED_CHOICE, load(FORCED_CHOICE))
+    assert isinstance(one, KnownThreshold)  # noqa: S101 - it has forced choices alone
+    (group,) = one.simulate(0, seed, observers=[person.observer for person in people]).group
     return group
 
 

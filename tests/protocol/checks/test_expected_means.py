@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.levels.sensitivities import sensitivities
-from study_app.evidence.thresholds.estimated_exponents import known_exponent, simulate_estimates
+from study_app.evidence.thresholds.known_values import known_value
 from study_app.protocol.checks.expected_precision import (
     EstimationPlan,
     MeanPlan,
@@ -110,9 +110,9 @@ def test_the_spread_of_an_exponent_is_that_of_a_least_squares_slope() -> None:
 @pytest.mark.slow
 def test_the_spread_is_that_of_exponents_from_simulated_answers() -> None:
     protocol = load("thickness")
-    planted = known_exponent("thickness", protocol)
-    assert planted is not None
-    found = np.concatenate([simulate_estimates(planted, number, seed=1).own for number in range(30)])
+    known = known_value("thickness", protocol)
+    studies = [known.simulate(number, seed=1) for number in range(30)]
+    found = np.array([one.value for study in studies for own in study.own for one in own])
     expected = expected_mean(plan_of(protocol, "thickness"))
     assert found.std(ddof=1) == pytest.approx(expected.spread, rel=0.12)  # 300 participants: ±4 %
     means = found.reshape(-1, 10).mean(axis=1)

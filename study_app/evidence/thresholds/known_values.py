@@ -1,0 +1,382 @@
+"""Whether known thresholds and exponents are recovered: by methods and analysis alone, and by the whole program.
+
+In many studies of equal observers what is presented is what was requested, so that errors are those of methods and
+estimates. Rehearsed participants pass through servo, store, unblinding and analysis.
+
+In magnitude estimation an observer's estimate is exp(n y + 0.25 N), where y is the logarithm of what reaches the hand:
+mean force over RMS speed. The exponent over the varied number is n times the slope of y over its logarithm at the
+task's pace, from which n follows.
+"""
+
+import math
+import tempfile
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, NamedTuple, TypeAlias
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.levels.thresholds import (
+    ThresholdFound,
+    estimate_slope,
+    estimated_exponents,
+    jnd_slope,
+    thresholds,
+)
+from study_app.analysis.levels.tracks import tracks
+from study_app.analysis.planning.power_curves import interval as wilson_interval
+from study_app.analysis.statistics.outcome import student_interval
+from study_app.evidence.table import Evidence, Table, run
+from study_app.haptics.model.overrides import override
+from study_app.haptics.model.slope_limits import steady
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Follow, Protocol
+from study_app.protocol.simulated import OBSERVER, Observer, simulate_study
+from study_app.protocol.trials.stimuli import DELAYS
+from study_app.protocol.trials.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
+from study_app.psychophysics.precision import ESTIMATE_NOISE
+from study_app.session.replay import replay
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.folders import StudyFolder
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+
+SHIPPED: Final[dict[str, Observer]] = {
+    "viscosityjnd": OBSERVER,
+    "delaydetect": Observer(delay_jnd_s=0.045),
+    "delayjnd": OBSERVER,
+    "forcedelay": Observer(delay_jnd_s=0.015),
+}
+"""The shipped studies with thresholds. Known are a Weber fraction of 0.24 at 75 % correct, which is 0.19 at 71 %
+(Jones, Hunter & Lafontaine 1997), 45 ms (Vogels 2004), 25 ms at every standard (below 33 ms: Ellis et al. 1999),
+and 15 ms of a force (Rank et al. 2010)."""
+NAMES: Final = (*SHIPPED, "thickness")
+"""The shipped studies that are validated."""
+EXPONENT: Final = 0.44
+"""Of perceived thickness over viscosity (Stevens & Guirao 1964)."""
+POINTS: Final = 64
+
+PEOPLE: Final = 10
+REHEARSED: Final = 3
+ERROR_MOST: Final = 0.05
+NEAR: Final = 0.15
+NEAR_SHARE: Final = 0.95
+OWN_COVERAGE: Final = (0.93, 0.99)
+SLOPE_ERROR_MOST: Final = 0.15
+EXPONENT_ERROR_MOST: Final = 0.03
+DELIVERED_LEAST: Final = 0.99
+SPREADS: Final = 3
+
+
+class Verdict(NamedTuple):
+    """One judged value: what it is of, the value and its limit in words, and whether it keeps to the limit."""
+
+    study: str
+    what: str
+    value: str
+    limit: str
+    holds: bool
+
+
+class Estimated(NamedTuple):
+    """A value as the analysis estimates it, with its 95 % interval."""
+
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFound:
+    """What the analysis estimates in one study, at each standard: the group's value, and each participant's."""
+
+    group: tuple[Estimated, ...]
+    own: tuple[tuple[Estimated, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Rehearsed:
+    """The share of intervals delivered as requested, findings of verify, reproduce and replay, and estimated values."""
+
+    delivered: float
+    findings: int
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class KnownValue(ABC):
+    """A study's main block, of which the true value is known."""
+
+    name: str
+    protocol: Protocol
+    block: Block
+
+    @abstractmethod
+    def error(self, values: Sequence[float]) -> float:
+        """Return the mean error of values."""
+
+    def spread(self, studies: Sequence[StudyFound], people: int) -> float:
+        """Return the standard deviation of the error over studies of so many participants."""
+        errors = [self.error([one.value for own in found.own[:people] for one in own]) for found in studies]
+        return float(np.std(errors, ddof=1))
+
+    def _simulated(self, observers: Sequence[Observer], seed: int, number: int, felt: Any = None) -> pd.DataFrame:
+        """Return the answers in the block; ``felt`` is what reaches the hand in place of what is presented."""
+        who = {f"P{at:03d}": observer for at, observer in enumerate(observers, start=1)}
+        reached = () if felt is None else (felt,)
+        rows = pd.DataFrame(simulate_study(self.protocol, who, seed, f"validate/{self.name}/{number}", *reached))
+        return rows[rows["block"] == self.block.id]
+
+    def _coverage(self, studies: Sequence[StudyFound], truth: float) -> Verdict:
+        """Return whether the share of the group's intervals that hold the truth is 95 %, but for chance."""
+        share = float(np.mean([one.low <= truth <= one.high for found in studies for one in found.group]))
+        slack = 3 * math.sqrt(0.95 * 0.05 / len(studies))
+        limit, what = f"95 ± {100 * slack:.1f} %", "coverage of the group's 95 % intervals"
+        return Verdict(self.name, what, f"{100 * share:.1f} %", limit, abs(share - 0.95) <= slack)
+
+
+@dataclass(frozen=True, slots=True)
+class KnownThreshold(KnownValue):
+    """The threshold of a block with an adaptive method, by its observer; errors are of its logarithm."""
+
+    observer: Observer = OBSERVER
+
+    @property
+    def threshold(self) -> float:
+        """The threshold, as a level: a Weber fraction or a difference [ms]."""
+        return 1000 * self.observer.delay_jnd_s if self._of_delay else self.observer.weber_fraction
+
+    @property
+    def _of_delay(self) -> bool:
+        return stimulus_of(self.protocol, self.block).vary in DELAYS
+
+    def error(self, values: Sequence[float]) -> float:
+        """Return the mean of ln value over threshold."""
+        return sum(math.log(value / self.threshold) for value in values) / len(values)
+
+    def simulate(self, number: int, seed: int, people: int = PEOPLE, observers: Sequence[Observer] = ()) -> StudyFound:
+        """Return what a study finds; ``observers`` differ, and take part in place of ``people`` equal ones."""
+        rows = self._simulated(observers or (self.observer,) * people, seed, number)
+        frame = rows.assign(session=1, level_delivered=rows["level"], analysed=True)
+        frame = frame.astype({"level_delivered": "Float64", "success": "boolean"})
+        protocol, block = self.protocol, self.block
+        levels = LevelBlock(
+            id=block.id,
+            title=block.id,
+            phase=block.phase,
+            design=design_of(protocol, block),
+            stimulus=stimulus_of(protocol, block),
+            settings=(),
+            method=method_of(protocol, block),
+        )
+        found: dict[str | None, list[Estimated]] = {}
+        for row in thresholds(levels, frame):
+            found.setdefault(row.participant, []).append(_estimated(row))
+        group = tuple(found.pop(None))
+        return StudyFound(group, tuple(map(tuple, found.values())))
+
+    def verdicts(self, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
+        """Yield error, coverage and, with several standards, the slope of ln JND over ln standard."""
+        errors = np.array([self.error([one.value for one in found.group]) for found in studies])
+        mean = math.expm1(float(errors.mean()))
+        what = "mean error of the threshold"
+        yield Verdict(self.name, what, f"{100 * mean:+.1f} %", "within ±5 %", abs(mean) <= ERROR_MOST)
+        near, n = int((np.abs(np.expm1(errors)) <= NEAR).sum()), len(studies)
+        what, limit = f"studies of {PEOPLE} within ±15 %", "at least 95 % (Wilson interval)"
+        holds = wilson_interval(near / n, n)[1] >= NEAR_SHARE
+        yield Verdict(self.name, what, f"{100 * near / n:.1f} %", limit, holds)
+        yield self._coverage(studies, self.threshold)
+        own = [one for found in studies for person in found.own for one in person]
+        share = sum(one.low <= self.threshold <= one.high for one in own) / len(own)
+        low, high = OWN_COVERAGE
+        what, limit = "coverage of participants' 95 % intervals", f"{100 * low:.0f} to {100 * high:.0f} %"
+        yield Verdict(self.name, what, f"{100 * share:.1f} %", limit, low <= share <= high)
+        standards = np.array([one for one in standards_of(self.protocol, self.block) if one is not None])
+        if len(standards) < 2:
+            return
+        unit = standards if stimulus_of(self.protocol, self.block).level_kind == "weber" else 1.0
+        slopes = [
+            jnd_slope(standards, np.array([one.value for one in person]) * unit)
+            for found in studies
+            for person in found.own
+        ]
+        slope, true = float(np.mean(slopes)), 0.0 if self._of_delay else 1.0  # a constant JND, or Weber's law
+        what, limit = "exponent of JND over standard", f"{true:g} ± {SLOPE_ERROR_MOST:g}"
+        yield Verdict(self.name, what, f"{slope:.3f}", limit, abs(slope - true) <= SLOPE_ERROR_MOST)
+
+    def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
+        """Yield each participant's threshold at each standard."""
+        return (row.threshold for row in thresholds(block, rows) if row.participant is not None)
+
+    def recovered(self, values: Sequence[float], spread: float) -> Verdict:
+        """Return whether rehearsed participants have the threshold."""
+        error = self.error(values)
+        what = f"threshold of {REHEARSED} people, {'ms' if self.threshold > 1 else 'Weber fraction'}"
+        value = f"{self.threshold * math.exp(error):.3g}"
+        limit = f"{self.threshold:g} ± {SPREADS} SD ({100 * SPREADS * spread:.0f} %)"
+        return Verdict(self.name, what, value, limit, abs(error) <= SPREADS * spread)
+
+
+def _estimated(row: ThresholdFound) -> Estimated:
+    assert row.low is not None and row.high is not None  # noqa: S101, PT018 - ten participants have an interval
+    return Estimated(row.threshold, row.low, row.high)
+
+
+@dataclass(frozen=True, slots=True)
+class KnownExponent(KnownValue):
+    """The exponent of a block of magnitude estimation.
+
+    ``resistances`` are those of each level, ascending: mean force over RMS speed at the pace [N·s/m].
+    """
+
+    resistances: tuple[float, ...] = ()
+
+    @property
+    def observer(self) -> Observer:
+        """Who estimates; the slope of ln resistance over ln level is by least squares."""
+        slope = float(np.polyfit(np.log(_levels(self.protocol, self.block)), np.log(self.resistances), 1)[0])
+        return replace(OBSERVER, estimates=(EXPONENT / slope, ESTIMATE_NOISE))
+
+    def error(self, values: Sequence[float]) -> float:
+        """Return the mean less the exponent."""
+        return sum(values) / len(values) - EXPONENT
+
+    def simulate(self, number: int, seed: int, people: int = PEOPLE) -> StudyFound:
+        """Return what a study finds; observers estimate what would reach the hand at the pace."""
+        reached = dict(zip(_levels(self.protocol, self.block), self.resistances, strict=True))
+        frame = self._simulated(
+            (self.observer,) * people, seed, number, lambda presented: reached.get(presented.value, math.nan)
+        )
+        own = np.array([estimate_slope(one["level"], one["answer"]) for _, one in frame.groupby("participant")])
+        low, high = student_interval(own)
+        assert low is not None and high is not None  # noqa: S101, PT018 - several participants have an interval
+        return StudyFound((Estimated(float(own.mean()), low, high),), tuple((Estimated(it),) for it in own.tolist()))
+
+    def verdicts(self, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
+        """Yield mean and coverage."""
+        mean = float(np.mean([found.group[0].value for found in studies]))
+        what = f"exponent over {stimulus_of(self.protocol, self.block).vary}"
+        limit = f"{EXPONENT:g} ± {EXPONENT_ERROR_MOST:g}"
+        yield Verdict(self.name, what, f"{mean:.3f}", limit, abs(mean - EXPONENT) <= EXPONENT_ERROR_MOST)
+        yield self._coverage(studies, EXPONENT)
+
+    def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
+        """Yield each participant's exponent."""
+        return (found.exponent for found in estimated_exponents(block, rows) if found.participant is not None)
+
+    def recovered(self, values: Sequence[float], spread: float) -> Verdict:
+        """Return whether rehearsed participants have the exponent."""
+        mean = float(np.mean(values))
+        what, limit = f"exponent of {len(values)} people", f"{EXPONENT:g} ± {SPREADS} SD ({SPREADS * spread:.3f})"
+        return Verdict(self.name, what, f"{mean:.3f}", limit, abs(mean - EXPONENT) <= SPREADS * spread)
+
+
+Known: TypeAlias = KnownThreshold | KnownExponent
+
+
+def known_value(name: str, protocol: Protocol) -> Known:
+    """Return what is known of a study: the exponent of estimates of a liquid at a pace, or else a threshold.
+
+    Raises
+    ------
+    ValueError
+        Nothing is known of any main block.
+    """
+    blocks = [one for one in protocol.main_blocks if one.stimulus is not None and one.design is not None]
+    for block in blocks:
+        stimulus, task = stimulus_of(protocol, block), protocol.tasks[block.task]
+        if design_of(protocol, block).reply == "number" and stimulus.vary not in DELAYS and isinstance(task, Follow):
+            scene = protocol.scene_for(condition_of(protocol, stimulus))
+            fastest_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
+            of_levels = [override(scene, stimulus.vary, level) for level in _levels(protocol, block)]
+            return KnownExponent(name, protocol, block, tuple(_resistance(it, fastest_mps) for it in of_levels))
+    for block in blocks:
+        standards = standards_of(protocol, block)
+        if stimulus_of(protocol, block).level_kind != "value" and not all(one is None for one in standards):
+            return KnownThreshold(name, protocol, block, SHIPPED.get(name, OBSERVER))
+    raise ValueError(
+        f"{name} has no main block with levels above a standard, or with magnitude estimation of a liquid at a pace: "
+        "nothing is known of it in advance"
+    )
+
+
+def _levels(protocol: Protocol, block: Block) -> list[float]:
+    """Return the levels of a block, ascending, in the unit of the varied number."""
+    return sorted(method_of(protocol, block).levels_of(stimulus_of(protocol, block)))
+
+
+def _resistance(scene: Any, fastest_mps: float) -> float:
+    """Return mean force over RMS speed [N·s/m] in a sinusoidal motion with this peak speed."""
+    speeds = [fastest_mps * math.sin(math.pi * (point + 0.5) / POINTS) for point in range(POINTS)]
+    mean_n = sum(steady(scene, speed).drag_n for speed in speeds) / POINTS
+    return mean_n / (fastest_mps / math.sqrt(2))
+
+
+def rehearsed(one: Known, source: bytes, seed: int) -> Rehearsed:
+    """Rehearse `REHEARSED` participants in a temporary folder, from the source of a protocol; return what they show."""
+    with tempfile.TemporaryDirectory() as place:
+        file, folder = Path(place) / f"{one.name}.toml", Path(place) / "study"
+        file.write_bytes(source)
+        rehearse(str(file), participants=REHEARSED, seed=seed, results=folder, observer=one.observer)
+        sessions = StudyFolder(folder).sessions()
+        findings = len(verify(folder, None).errors)
+        findings += sum(len(reproduced(session.path).differences) for session in sessions)
+        findings += sum(not replay(session.path).proved for session in sessions)
+        unblind(folder, "validate", "to compare with what is known")
+        study = load_study(folder)
+        intervals = study.intervals[study.intervals["block"] == one.block.id]
+        block = next(block for block in study.levels if block.id == one.block.id)
+        values = tuple(one.values_of(block, tracks(study)))
+        return Rehearsed(float(intervals["invalid_reasons"].isna().mean()), findings, values)
+
+
+def judged(one: Known, found: Rehearsed, spread: float) -> Iterator[Verdict]:
+    """Yield the verdicts on rehearsed participants; ``spread`` is that of studies of as many."""
+    share, findings = found.delivered, found.findings
+    what = "intervals delivered as requested"
+    yield Verdict(one.name, what, f"{100 * share:.2f} %", "at least 99 %", share >= DELIVERED_LEAST)
+    yield Verdict(one.name, "findings of verify, reproduce and replay", str(findings), "0", findings == 0)
+    yield one.recovered(found.values, spread)
+
+
+def validate(
+    known: Sequence[tuple[bytes, Known]],
+    studies: int,
+    seed: int,
+    executor: Executor,
+    progress: Callable[[str, float | None], object],
+) -> list[Verdict]:
+    """Return all verdicts on known values, each with the source of its protocol.
+
+    ``progress`` is called with what is done, and the share of it.
+    """
+    verdicts: list[Verdict] = []
+    rehearsals = [executor.submit(rehearsed, one, source, seed) for source, one in known]
+    for (_, one), rehearsal in zip(known, rehearsals, strict=True):
+
+        def counted(done: int, name: str = one.name) -> None:
+            progress(f"{name}: {done} of {studies} studies", done / studies)
+
+        found = run(partial(one.simulate, seed=seed), [(number,) for number in range(studies)], executor, counted)
+        progress(f"{one.name}: rehearsing {REHEARSED} participants", None)
+        verdicts += [*one.verdicts(found), *judged(one, rehearsal.result(), one.spread(found, REHEARSED))]
+    return verdicts
+
+
+def evidence(verdicts: Sequence[Verdict], heading: str) -> Evidence:
+    """Return a row for each value, with its limit, as Markdown below a heading and as CSV."""
+    table = Table(Verdict._fields, [(*it[:-1], "yes" if it.holds else "no") for it in verdicts], left=5)
+    csv = Table(Verdict._fields, [(*it[:-1], str(it.holds).lower()) for it in verdicts]).csv()
+    text = f"{heading}\n\n{table.markdown()}\n"
+    beyond = sum(not it.holds for it in verdicts)
+    closing = f"{beyond} of {len(verdicts)} values exceed their limits" if beyond else "every value is within its limit"
+    files = {"thresholds.md": text, "thresholds.csv": csv}
+    return Evidence(text, files, missed=beyond > 0, closing=closing)

@@ -1,0 +1,166 @@
+"""Known thresholds and exponents are recovered, and an observer that is wrong is found."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.evidence.thresholds import known_values
+from study_app.evidence.thresholds.known_values import (
+    EXPONENT,
+    Estimated,
+    KnownExponent,
+    KnownThreshold,
+    StudyFound,
+    judged,
+    known_value,
+    rehearsed,
+)
+from study_app.protocol.load import load, parse, source_bytes
+from study_app.protocol.simulated import OBSERVER, Comparison, Observer
+from study_app.protocol.streams import stream
+from study_app.protocol.trials.designs import default_design
+from tests.compiled import needs_servo
+from tests.protocol.trials.level_studies import text_of_damper
+
+SMALL = text_of_damper(
+    "small",
+    """
+[methods.short]
+kind = "questplus"
+trials = 20
+
+[blocks.thicker]
+stimulus = "damping"
+design = "2ifc"
+method = "short"
+""",
+)
+
+
+@pytest.fixture(scope="module")
+def threshold() -> KnownThreshold:
+    found = known_value("small", parse(SMALL.encode(), "small.toml"))
+    assert isinstance(found, KnownThreshold)
+    return found
+
+
+@pytest.fixture(scope="module")
+def thresholds(threshold: KnownThreshold) -> list[StudyFound]:
+    return [threshold.simulate(number, seed=1) for number in range(20)]
+
+
+@pytest.fixture(scope="module")
+def exponent() -> KnownExponent:
+    found = known_value("thickness", load("thickness"))
+    assert isinstance(found, KnownExponent)
+    return found
+
+
+@pytest.fixture(scope="module")
+def exponents(exponent: KnownExponent) -> list[StudyFound]:
+    return [exponent.simulate(number, seed=1) for number in range(12)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("delays", "standard", "difference"),
+    [(False, 8.0, 0.24), (False, 32.0, 0.24), (True, 0.0, 0.025), (True, 0.2, 0.025)],
+)
+def test_an_observer_is_correct_in_75_percent_at_the_known_threshold(
+    delays: bool, standard: float, difference: float
+) -> None:
+    attended = Comparison(delays, smallest=False, observer=replace(OBSERVER, lapses=0.0))
+    comparison = standard + difference if delays else standard * (1 + difference)
+    draw, design = stream(3, "observer").random, default_design("2ifc")
+    n = 20_000
+    correct = sum(attended.choose(design, [standard, comparison], 0.0, draw) == "second" for _ in range(n))
+    assert correct / n == pytest.approx(0.75, abs=0.01)
+
+
+@pytest.mark.slow
+def test_what_has_no_threshold_is_refused() -> None:
+    with pytest.raises(ValueError, match="rek2024 has no main block"):
+        known_value("rek2024", load("rek2024"))
+    ran = CliRunner().invoke(commands, ["validate", "rek2024"])
+    assert ran.exit_code == 2
+    assert "nothing is known of it in advance" in ran.output
+
+
+@pytest.mark.slow
+def test_studies_are_the_same_in_any_order_and_on_any_number_of_workers(
+    threshold: KnownThreshold, thresholds: list[StudyFound]
+) -> None:
+    with ThreadPoolExecutor(2) as executor:
+        again = list(executor.map(partial(threshold.simulate, seed=1), reversed(range(4))))
+    assert again[::-1] == thresholds[:4]
+    assert threshold.simulate(0, seed=2) != thresholds[0]
+    assert threshold.simulate(1, seed=1) != thresholds[0]
+
+
+@pytest.mark.slow
+def test_the_threshold_is_recovered(threshold: KnownThreshold, thresholds: list[StudyFound]) -> None:
+    judged = {row.what: row for row in threshold.verdicts(thresholds)}
+    few = {"studies of 10 within ±15 %"}  # 20 trials are few
+    assert {what for what, row in judged.items() if not row.holds} <= few
+    assert threshold.threshold == 0.24
+    assert 0.1 < threshold.spread(thresholds, 3) < 0.6
+    assert threshold.spread(thresholds, 10) < threshold.spread(thresholds, 3)
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+@needs_servo
+def test_the_whole_program_recovers_it_and_another_observer_is_found(threshold: KnownThreshold) -> None:
+    rows = list(judged(threshold, rehearsed(threshold, SMALL.encode(), seed=1), 0.25))
+    assert [row.holds for row in rows] == [True, True, True], rows
+    assert rows[0].what == "intervals delivered as requested"
+    dull = replace(threshold, observer=Observer(weber_fraction=2.0))
+    other = list(judged(dull, rehearsed(dull, SMALL.encode(), seed=1), 0.05))
+    assert other[2].limit.startswith("2 ± 3 SD")
+    assert not other[2].holds, "the levels end at 0.6"
+
+
+def test_without_noise_the_known_exponent_is_found(exponent: KnownExponent, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(known_values, "ESTIMATE_NOISE", 1e-6)
+    found = exponent.simulate(0, seed=1, people=3)
+    assert [own.value for (own,) in found.own] == pytest.approx([EXPONENT] * 3, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_studies_recover_the_exponent_and_a_wrong_one_is_found(
+    exponent: KnownExponent, exponents: list[StudyFound]
+) -> None:
+    judged = list(exponent.verdicts(exponents))
+    assert [row.what for row in judged] == ["exponent over viscosity_pa_s", "coverage of the group's 95 % intervals"]
+    assert all(row.holds for row in judged), judged
+    assert exponent.simulate(0, seed=1).group == exponents[0].group != exponent.simulate(0, seed=2).group
+    means = [found.group[0].value for found in exponents]
+    steeper = [StudyFound((Estimated(1.1 * mean, 0.0, 1.0),), ()) for mean in means]
+    assert not next(iter(exponent.verdicts(steeper))).holds
+    narrow = [StudyFound((Estimated(mean, mean, mean),), ()) for mean in means]
+    assert not list(exponent.verdicts(narrow))[1].holds
+    assert exponent.spread(exponents, 10) < exponent.spread(exponents, 3) < 0.05
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+@needs_servo
+def test_the_whole_program_recovers_the_exponent() -> None:
+    text = source_bytes("thickness").decode()
+    for old, new in (
+        ("levels = 9 ", "levels = 4 "),
+        ("repetitions = 4", "repetitions = 2"),
+        ("cycles = 4", "cycles = 1"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    short = known_value("short", parse(text.encode(), "short.toml"))
+    assert isinstance(short, KnownExponent)
+    spread = short.spread([short.simulate(number, seed=1) for number in range(10)], 3)
+    rows = list(judged(short, rehearsed(short, text.encode(), seed=1), spread))
+    assert [row.holds for row in rows] == [True, True, True], rows
+    assert rows[2].what == "exponent of 3 people"
