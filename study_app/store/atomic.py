@@ -27,13 +27,12 @@ _MOST_LEVELS = 64  # of JSON, so that code may process a value recursively
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # without those of hidden files: markers are created and removed
 
 
-def write_file(path: Path, content: bytes, *, waits: bool = True, changed_ns: int | None = None) -> None:
+def write_file(path: Path, content: bytes, *, waits: bool = True) -> None:
     """Write ``content`` to ``path``, replacing an existing file in one step.
 
     Written under a temporary name, flushed to the disk, renamed over the old file, and the folder's entry flushed. On
     any failure the old file is untouched and no temporary file is left. Without ``waits`` nothing is flushed: for files
-    that can be recreated, since a power cut may then lose them. ``changed_ns`` is the modification time to set [ns
-    since 1970], by default now.
+    that can be recreated, since a power cut may then lose them.
 
     Raises
     ------
@@ -42,8 +41,6 @@ def write_file(path: Path, content: bytes, *, waits: bool = True, changed_ns: in
     """
     with _passing_file(path, path) as half:
         write_through(half, content, waits=waits)
-        if changed_ns is not None:
-            os.utime(half, ns=(changed_ns, changed_ns))
         _replace(half, path)
         if waits:
             sync_folder(path.parent)
@@ -210,13 +207,6 @@ def probe(folder: Path) -> int:
     with _passing_file(place / "probe", folder) as path:
         write_through(path, b"probe\n")
         return shutil.disk_usage(place).free
-
-
-def disk_time_ns(folder: Path) -> int:
-    """Return the present time by the clock of the disk of ``folder``, which stamps its files [ns since 1970]."""
-    with _passing_file(folder / "time", folder) as path:
-        path.touch(exist_ok=False)
-        return path.stat().st_mtime_ns
 
 
 def sync_folder(path: Path) -> None:

@@ -15,7 +15,7 @@ from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sites.merged import session_in
 from study_app.store.study_runs import run_of
-from study_app.store.tables.study_files import participants_at_once
+from study_app.store.tables.study_files import participants
 
 Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]
 KINDS: dict[Kind, str] = {"": "Participants", "pilot": "Pilot", "simulated": "Simulated", "sample": "Sample"}
@@ -92,7 +92,7 @@ def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts
     found: list[SessionFacts] = []
     for data in sorted(results.glob("*/data")):
         with contextlib.suppress(StoreError):  # not ours, or not readable: the commands say why when asked about it
-            rows = participants_at_once(StudyFolder(data.parent))
+            rows = participants(StudyFolder(data.parent))
             found += session_facts(data.parent, rows, _exclusions(data.parent), answers_of)
     return tuple(sorted(found, key=lambda session: (not session.needs_care, -session.started.timestamp())))
 

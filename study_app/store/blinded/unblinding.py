@@ -208,7 +208,7 @@ def _open_study(study: StudyFolder) -> None:
     """Bring the table of participants and the description up to date."""
     name = described_study(study)
     if name is not None:
-        write_participants(study, name, whole=True)
+        write_participants(study, name)
     for session in study.sessions():
         with contextlib.suppress(StoreError, KeyError, TypeError, ValueError):  # another receipt is used instead
             protocol = receipt.read(session.receipt)["protocol"]

@@ -212,7 +212,7 @@ def rebuild(session_folder: Path) -> Rebuilt:
             if path in rewritten:
                 write_file(path, content)
         rewritten += _renew_receipt(folder, contents.lines)
-        write_participants(study_folder, place.study, whole=True)
+        write_participants(study_folder, place.study)
         rewritten += [table] if _content(table) != before else []
         ended = isinstance(contents.lines[-1], events.SessionEnded)
         if ended:

@@ -21,7 +21,7 @@ from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import unbundled
 from study_app.store.atomic import cannot_write, create_folder
 from study_app.store.blinded.allocation import allocate
-from study_app.store.blinded.blinding import open_or_draw_key, opened, opened_key, reveals, sealed
+from study_app.store.blinded.blinding import open_or_draw_key, opened_key, reveals, sealed
 from study_app.store.checksums import checksum_bytes, fingerprint, note_fingerprint
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import SessionClock, line_bytes, line_of
@@ -29,7 +29,6 @@ from study_app.store.journals.journal_events import Allocated, Event, SessionEnd
 from study_app.store.sessions.begin import SessionStart, check_participant, first_records, make_folder, used_ids
 from study_app.store.sessions.folder_lock import Opening, open_alone
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.tables import csv_files, session_tables
 from study_app.store.tables.study_files import check_study, write_description, write_participants
 
 
@@ -82,7 +81,6 @@ class SimulatedStudy:
         make_folder(self.folder.path)
         self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random, unbundled(source)[1])
         self.protocol = protocol
-        self._rows: dict[Path, csv_files.Row] = {}
         self._opening: Opening | None = None
         start = SessionStart(
             "",
@@ -130,7 +128,6 @@ class SimulatedStudy:
         if not create_folder(path, {**files, place.folder.checksums.name: checksum_bytes(sums)}, waits=False):
             raise used_ids(self.folder).refusal(place.folder.participant, place.folder.number)
         note_fingerprint(self.folder, place.folder, fingerprint(sums), waits=False)
-        self._rows[path] = session_tables.participant(opened(lines, key))
 
     def __enter__(self) -> Self:
         """Write the study's description, which identifies its folder from the first session on."""
@@ -145,7 +142,7 @@ class SimulatedStudy:
     ) -> None:
         """Bring the table of participants up to date with the sessions that were finished."""
         try:
-            write_participants(self.folder, self.protocol.study.name, self._rows)
+            write_participants(self.folder, self.protocol.study.name)
         finally:
             if self._opening is not None:
                 self._opening.release()

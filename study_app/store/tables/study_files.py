@@ -6,18 +6,16 @@ headers included, before this file.
 """
 
 import contextlib
-import csv
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.table import text_in
 from study_app.store import receipt
-from study_app.store.atomic import disk_time_ns, is_there, parse_json, read_own, write_file
+from study_app.store.atomic import is_there, parse_json, read_own, write_file
 from study_app.store.blinded.blinding import Key, opened, opened_key, reveals
 from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
 from study_app.store.journals import journal
@@ -27,10 +25,8 @@ from study_app.store.tables import csv_files, session_tables
 from study_app.store.tables.columns import LATER, PARTICIPANTS, PARTICIPANTS_2, SEALED, every_column
 from study_app.store.tables.csv_files import Column, Row, header
 
-COARSE_S = 2.0  # modification times closer than this may be in the wrong order
-NONE: Final[Mapping[Path, csv_files.Row]] = MappingProxyType({})
-_Stamp: TypeAlias = tuple[int, int] | None  # when a journal was last changed [ns since 1970], and its size; None: gone
-_Seen: TypeAlias = dict[Path, tuple[_Stamp, list[csv_files.Row]]]
+_READ: Final[dict[Path, tuple[object, list[csv_files.Row]]]] = {}
+"""Rows by the session's folder, with time and size of the journal. Reading a journal takes 5 ms, 200 take a second."""
 # What a study folder holds besides tables; patterns as in .gitignore.
 IGNORED = b"""\
 .psychds-ignore
@@ -50,59 +46,24 @@ rebuilt.txt
 
 
 def participants(folder: StudyFolder) -> list[csv_files.Row]:
-    """Return one row per session that has begun its journal, by participant and number; each journal is read."""
-    return _rows(folder, {}, NONE)
-
-
-def participants_at_once(folder: StudyFolder) -> list[csv_files.Row]:
-    """Return the result of `participants` without reading each journal, for fast lists.
-
-    A session's row in the table is used if neither its journal nor the study's key was changed since the table was
-    made. So it proves nothing: `verify` reads all.
-    """
-    return _rows(folder, _seen_in_table(folder), NONE)
-
-
-def _rows(folder: StudyFolder, seen: _Seen, known: Mapping[Path, csv_files.Row]) -> list[csv_files.Row]:
-    """Return the rows of all sessions; ``seen``, brought up to date, has those of journals that need not be read."""
+    """Return one row per session that has begun its journal, by participant and number."""
     key = opened_or_none(folder)
-    rows: list[csv_files.Row] = []
-    for session in folder.sessions():
-        if session.path in known:
-            rows.append(known[session.path])
-            continue
-        stamp = _stamp(session.journal)
-        if stamp is None or seen.get(session.path, (None, []))[0] != stamp:
-            seen[session.path] = stamp, row_of(session, key)
-        rows += seen[session.path][1]
-    return rows
+    return [row for session in folder.sessions() for row in _row_of(session, key)]
 
 
-def _seen_in_table(folder: StudyFolder) -> _Seen:
-    """Return the rows of the table that no change of a journal or of the key made old; a damaged session has none."""
-    for path in folder.data.glob(folder.participants("*").name):
-        with contextlib.suppress(OSError, StoreError, ValueError, csv.Error):  # then the journals are read
-            made_ns = path.stat().st_mtime_ns - round(COARSE_S * 1e9)
-            if is_there(folder.reveals) and folder.reveals.stat().st_mtime_ns >= made_ns:
-                return {}
-            content = read_own(path, folder.path)
-            second = b"group" in content.partition(b"\n")[0].split(b",")
-            found = csv_files.read_table(content, PARTICIPANTS_2 if second else PARTICIPANTS)
-            sessions = {folder.session(row["participant"], row["session"]): row for row in found}
-            return {
-                session.path: (stamp, [row])
-                for session, row in sessions.items()
-                if row["status"] != "damaged" and (stamp := _stamp(session.journal)) is not None and stamp[0] < made_ns
-            }
-    return {}
-
-
-def _stamp(path: Path) -> _Stamp:
+def _row_of(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
+    """Return the row of one session as `row_of`; a journal that this program has read is not read again."""
     try:
-        found = path.stat()
+        found = session.journal.lstat()
     except OSError:
-        return None
-    return found.st_mtime_ns, found.st_size
+        return row_of(session, key)
+    stamp = found.st_mtime_ns, found.st_size, None if key is None else key.hash
+    if (held := _READ.get(session.path)) is not None and held[0] == stamp:
+        return held[1]
+    rows = row_of(session, key)
+    if all(row["status"] != "damaged" for row in rows):
+        _READ[session.path] = stamp, rows
+    return rows
 
 
 def opened_or_none(folder: StudyFolder) -> Key | None:
@@ -145,32 +106,22 @@ def _damaged(session: SessionFolder, start: Mapping[str, Any]) -> csv_files.Row:
     return {**dict.fromkeys(header(PARTICIPANTS)), **known, **which, "status": "damaged"}
 
 
-def write_participants(
-    folder: StudyFolder, study: str, known: Mapping[Path, csv_files.Row] = NONE, *, whole: bool = False
-) -> None:
-    """Bring the table up to date with all journals; those that changed since it was made are read.
+def write_participants(folder: StudyFolder, study: str) -> None:
+    """Bring the table up to date with all journals.
 
     Several programs may do so at once on a shared folder: each looks again after it wrote, so that whoever wrote last
-    has seen what the others journalled before they wrote, and the table ends up complete. The table's own time is when
-    its making began, so that a program killed meanwhile leaves none that seems newer than a journal it did not read.
+    has seen what the others journalled before they wrote, and the table ends up complete.
     """
     path = folder.participants(study)
-    seen = {} if whole else _seen_in_table(folder)
-    made_ns, content = _made(folder, seen, known)
+    content = table_bytes(folder, participants(folder))
     if path.is_file() and path.read_bytes() == content:
         return
     while True:
-        write_file(path, content, changed_ns=made_ns)
-        made_ns, again = _made(folder, seen, known)
+        write_file(path, content)
+        again = table_bytes(folder, participants(folder))
         if again == content:
             return
         content = again
-
-
-def _made(folder: StudyFolder, seen: _Seen, known: Mapping[Path, csv_files.Row]) -> tuple[int, bytes]:
-    """Return when the making of the table began [ns since 1970, by the clock of the folder's disk], and the table."""
-    began_ns = disk_time_ns(folder.data)
-    return began_ns, table_bytes(folder, _rows(folder, seen, known))
 
 
 def table_bytes(folder: StudyFolder, rows: Sequence[csv_files.Row]) -> bytes:
