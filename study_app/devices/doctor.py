@@ -1,7 +1,10 @@
 """The diagnosis of a device: its modes of failure as data, and the report. Loads neither compiler nor driver."""
 
+import sys
+import tomllib
 from collections.abc import Container
 from dataclasses import dataclass
+from pathlib import Path
 from textwrap import fill
 from typing import Final, Literal
 
@@ -164,3 +167,20 @@ class FailureTable:
             return Finding(number, mode.id, mode.tested, mode.symptom, state, *texts)
 
         return tuple(finding(number, mode) for number, mode in enumerate(self.modes, start=1))
+
+
+def read_failures(file: Path, platform: str = sys.platform, **words: object) -> FailureTable:
+    """Return the table in a TOML file.
+
+    ``[[mode]]`` has the fields of a `FailureMode`, and the systems that it is ``only`` of. A text that differs is a
+    table by system, with ``other``; braces name ``words``, or those in the file's ``[words]``.
+    """
+
+    def here(text: str | dict[str, str]) -> str:
+        return text if isinstance(text, str) else text.get(platform, text.get("other", ""))
+
+    document = tomllib.loads(file.read_text("utf-8"))
+    words |= {name: here(text) for name, text in document.get("words", {}).items()}
+    modes = [mode for mode in document["mode"] if platform in mode.pop("only", [platform])]
+    filled = [FailureMode(**{name: here(text).format_map(words) for name, text in mode.items()}) for mode in modes]
+    return FailureTable(document["device"], tuple(filled), frozenset(document["not_found"]))
