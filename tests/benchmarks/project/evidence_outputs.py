@@ -2,8 +2,9 @@
 
 ``python tests/benchmarks/project/evidence_outputs.py CHECKOUT FOLDER [--only NAME ...]`` runs every command in both
 with small sizes and equal seeds, and prints "equal" or the difference. Left out are numbers that a clock or the memory
-of the process gives, what the other checkout has of removed models and estimators, and figures of such numbers. The
-other checkout's outputs stay in FOLDER and are used again.
+of the process gives, what the other checkout has of removed models and estimators, figures of such numbers, and the
+width of separators in Markdown. The other checkout's outputs stay in FOLDER and are used again. Cases of `stability`
+whose estimator the other checkout draws from others differ.
 """
 
 import argparse
@@ -51,7 +52,7 @@ class Compared(NamedTuple):
 ACCURACY: Final = Compared("", r"^●?(?= \|)|\d\.?\d*e-1\d", MEASURED_COLUMNS, REMOVED, timed=True)
 """Marks of the fastest models, and errors of rounding, are masked."""
 TIMES: Final = Compared("", rf"{NUMBERS}|{VERDICTS}|\b(n/a|nan|inf|–)\b|\s+|-{{3,}}", timed=True)
-SOAK: Final = r"[\d.]+ s, \d+ times|\"took_s\".*|growth.*|  [\d. ]+;|^    \d+,?$"
+SOAK: Final = r"[\d.]+ s, \d+ times|[\d.]+ MiB|\"took_s\".*|growth.*|  [\d. ]+;|^    \d+,?$"
 COMMANDS: Final = {
     "accuracy": ACCURACY._replace(arguments="accuracy --to out"),
     "accuracy of a file": ACCURACY._replace(arguments="accuracy physical2 --liquid glycerin --path circle --to out"),
@@ -61,7 +62,7 @@ COMMANDS: Final = {
     "cfd --refit": Compared("cfd --refit --to out"),
     "delay-thresholds": Compared("delay-thresholds --people 5 --to out"),
     "figures": Compared("figures --to out"),
-    "scene": Compared("scene rek2024 --liquid water", r"[\d.]+ (ns|%)"),
+    "scene": Compared("scene rek2024 --liquid water", r"[\d.]+ ns|[\d.]+ % of the tick|\s+\d+(?=  (in|out))"),
     "soak": Compared("soak --hours 0.004 --virtual --to out", SOAK),
     "stability": Compared("stability --cases 2 --to out", SECONDS),
     "stability --case": Compared("stability --case liquid=honey"),
@@ -145,7 +146,7 @@ def _compared_lines(compared: Compared, file: Path) -> Iterator[str]:
     for line in file.read_text().split("\n"):
         if compared.lines and re.search(compared.lines, line):
             continue
-        kept = line
+        kept = re.sub("-+", "-", line.replace(" ", "")) if re.fullmatch(r"\|[-:| ]+\|", line) else line
         if compared.columns:
             cells = _cells(line, file.suffix)
             dropped = [k for k, cell in enumerate(cells) if cell in compared.columns] or dropped
