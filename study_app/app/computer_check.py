@@ -8,11 +8,10 @@ from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QWidget
 
 from study_app.errors import StudyError
-from study_app.gui.preflight.window import ComputerWindow
+from study_app.gui.preflight.window import ComputerWindow, computer_checks
 from study_app.gui.theme.theme import Theme
 from study_app.gui.widgets.background import Background
 from study_app.session.preflight import Check, Screen
-from study_app.viewmodels.preflight import computer_checks
 
 MEASURED_S = 2.0
 STUDY = "demo"

@@ -32,7 +32,8 @@ from study_app.evidence.computer import machine as machine_here
 from study_app.evidence.timing.delays import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import WITHOUT_OPENGL, choose_screens, place
-from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.servo_health import ServoHealth
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.runtime.clocks.clock import VirtualClock
@@ -47,7 +48,6 @@ from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
 from study_app.store.recordings import read_frames
 from study_app.store.sessions.open_session import SessionStore
-from study_app.viewmodels.servo_health import ServoHealth
 
 SIZE_PX: Final = (1920, 1080)
 OPERATOR_PX: Final = (1600, 900)

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from study_app.designer.place.controller import DesignerController
     from study_app.designer.place.view import DesignerPlace
     from study_app.gui.lab.view import LabPlace
+    from study_app.gui.sessions.session_facts import SessionFacts
     from study_app.lab.ab_comparison import Setting, Side
-    from study_app.viewmodels.sessions import SessionFacts
 
 
 class LabAndDesigner(QObject):

@@ -15,13 +15,13 @@ from study_app.errors import StoreError
 from study_app.gui.application import open_here
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.devices.view import DevicesPlace
+from study_app.gui.kit.devices import DeviceShown, benches_shown, device_named, devices_shown
 from study_app.gui.kit.workstation import settings_here
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.theme.theme import Theme
 from study_app.store import workstation
 from study_app.store.workstation import DisplayOffset, MachineSettings
 from study_app.user_folder import settings_file
-from study_app.viewmodels.devices import DeviceShown, benches_shown, device_named, devices_shown
 from study_app.workspace import workspace
 
 CALLED: Final = {

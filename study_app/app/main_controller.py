@@ -19,12 +19,12 @@ from study_app.gui.application import application_here
 from study_app.gui.display.screens import place
 from study_app.gui.home.dialogs import WorkspaceDialog
 from study_app.gui.home.main_window import MainWindow, bug_words
+from study_app.gui.home.study_facts import DraftWords
 from study_app.gui.home.view import HomePlace
 from study_app.gui.kit.workstation import screen_number, theme_named
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.session.start import NewSession
 from study_app.store.workstation import MachineSettings, create_workspace
-from study_app.viewmodels.help import FIRST_PAGE, PAGES_OF_PLACES
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
 
 LOOK_AFTER_MS = 300  # the window stands by then
@@ -153,7 +153,7 @@ class MainController(QObject):
         return made
 
     def _home(self) -> HomePlace:
-        made = HomePlace(self.results)
+        made = HomePlace(self.results, _draft_words)
         made.session_asked.connect(self._start)
         made.results_asked.connect(self._show_study)
         made.protocol_opened.connect(self.machine.remember_protocol)
@@ -210,10 +210,7 @@ class MainController(QObject):
         here = self.window.here
         self.window.place("help")
         assert self.help is not None  # noqa: S101 - made with its place
-        if here == "help":
-            self.help.open_page(FIRST_PAGE)
-        else:
-            self.help.open_from(here, PAGES_OF_PLACES[here])
+        self.help.open_from(here)
         self.window.go("help")
 
     def _show_saved(self) -> None:
@@ -271,3 +268,9 @@ class MainController(QObject):
     def _leave(self) -> None:
         if self.live is None:
             self.loop.quit()
+
+
+def _draft_words() -> DraftWords:
+    from study_app.designer.versions import draft_words  # noqa: PLC0415 - only where there is a draft
+
+    return draft_words

@@ -33,12 +33,12 @@ from study_app.analysis.worker_messages import (
     start_analysis_worker,
 )
 from study_app.errors import AnalysisError, StoreError
+from study_app.gui.sessions.session_facts import session_facts
 from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.sites.merge import merge
-from study_app.viewmodels.sessions import session_facts
 from study_app.workers.server import Refused, Stopped
 from tests.studies import made_up, rehearsed
 

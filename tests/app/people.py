@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app import app
 from study_app.gui.home.main_window import MainWindow
-from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import parse, source_bytes
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage

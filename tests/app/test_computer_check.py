@@ -7,7 +7,7 @@ import pytest
 
 from study_app.app.computer_check import ComputerCheck
 from study_app.app.main_controller import MainController
-from study_app.viewmodels.preflight import OF_THE_COMPUTER
+from study_app.gui.preflight.window import OF_THE_COMPUTER
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo]

@@ -7,7 +7,8 @@ import numpy as np
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.operator import Parts, WatchedJournal
 from study_app.errors import StoreError
-from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.operator_view import Session, stages
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
@@ -16,8 +17,6 @@ from study_app.session.pages import TaskPage
 from study_app.session.transitions.events import Continue
 from study_app.store.journals import journal_events
 from study_app.store.progress import Progress
-from study_app.viewmodels.operator import Session
-from study_app.viewmodels.session import stages
 
 
 class World:

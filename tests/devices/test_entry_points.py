@@ -13,10 +13,10 @@ from study_app.devices.registry import backends, discover, list_devices, open_de
 from study_app.errors import DeviceError
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.home.dialogs import NewSessionDialog
+from study_app.gui.home.study_facts import study_facts
+from study_app.gui.kit.devices import devices_shown
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.viewmodels.devices import devices_shown
-from study_app.viewmodels.home import study_facts
 from tests.compiled import needs_servo
 from tests.devices.packages import install_metadata
 

@@ -17,7 +17,7 @@ from study_app.gui.home.cards import StudyCard
 from study_app.gui.home.dialogs import NewSessionDialog
 from study_app.gui.home.main_window import FULL as HOME
 from study_app.gui.home.view import HomePlace
-from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
 from study_app.user_folder import settings_file
 from tests.compiled import needs_servo

@@ -10,12 +10,12 @@ from study_app.app.main_controller import MainController
 from study_app.app.session.entry import run
 from study_app.cli.options import keep_offered_workspace
 from study_app.errors import StoreError
+from study_app.gui.home.study_facts import sources, study_facts
 from study_app.protocol.load import load as load_protocol
 from study_app.protocol.load import source_bytes
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import keep_workspace, load, recent_protocols, remember_protocol
 from study_app.user_folder import settings_file
-from study_app.viewmodels.home import sources, study_facts
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
 
 

@@ -19,6 +19,8 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.gui.operator.operator_view import OperatorView, Session, operator_view, stages
+from study_app.gui.operator.servo_health import ServoHealth
 from study_app.protocol.load import parse
 from study_app.protocol.model import Explore, Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
@@ -38,9 +40,6 @@ from study_app.session.transitions.events import (
 from study_app.session.transitions.state import FINAL
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.progress import Progress
-from study_app.viewmodels.operator import OperatorView, Session, operator_view
-from study_app.viewmodels.servo_health import ServoHealth
-from study_app.viewmodels.session import stages
 from tests.end_to_end.real_windows import Program, wait_for
 
 SHORTER = {

@@ -10,8 +10,8 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from study_app import app
-from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.plots import ForceCard, HiddenForceCard
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import load
 from study_app.session import start

@@ -13,7 +13,7 @@ from study_app import app
 from study_app.app.session import live_session
 from study_app.devices.rig import Rig
 from study_app.errors import StudyError
-from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage

@@ -17,14 +17,14 @@ from study_app.devices.falcon.failures import failures_on
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.home.dialogs import NewSessionDialog
 from study_app.gui.home.startup_window import OpeningWindow
+from study_app.gui.home.study_facts import Interrupted
+from study_app.gui.kit.devices import BenchShown, devices_shown
+from study_app.gui.preflight.window import computer_checks
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.protocol.load import load
 from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings
-from study_app.viewmodels.devices import BenchShown, devices_shown
-from study_app.viewmodels.home import Interrupted
-from study_app.viewmodels.preflight import computer_checks
 from study_app.workers.server import Refused
 from tests.gui import windows
 from tests.gui.home.home_window import open_home

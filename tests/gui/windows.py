@@ -17,9 +17,12 @@ from study_app.gui.help.view import HelpPlace
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.startup_window import OpeningWindow
+from study_app.gui.home.study_facts import study_facts
+from study_app.gui.kit.devices import devices_shown
 from study_app.gui.lab.view import LabPlace
-from study_app.gui.preflight import PreflightWindow
 from study_app.gui.preflight.window import LEAST as LEAST_PREFLIGHT
+from study_app.gui.preflight.window import PreflightView, PreflightWindow, preflight_view
+from study_app.gui.results.results_state import Opened
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.settings import view as settings_view
 from study_app.gui.settings.display_test import DisplayTest
@@ -32,10 +35,6 @@ from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
 from study_app.session.preflight import Measurements, Screen, checks
 from study_app.store.workstation import DEFAULTS, MachineSettings
-from study_app.viewmodels.devices import devices_shown
-from study_app.viewmodels.home import study_facts
-from study_app.viewmodels.preflight import PreflightView, preflight_view
-from study_app.viewmodels.results import Opened
 from tests.gui.home.home_window import open_home
 from tests.gui.lab.sample import still_view
 from tests.gui.results.sample import LEFT_OUT, view

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from study_app.gui.home.study_facts import is_shipped
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.protocol.load import load, load_scene, load_scenes
@@ -13,7 +14,6 @@ from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from study_app.protocol.source import files
 from study_app.protocol.source.files import at_hand, shipped
-from study_app.viewmodels.home import is_shipped
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))

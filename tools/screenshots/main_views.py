@@ -7,9 +7,9 @@ from PySide6.QtWidgets import QDialog
 
 from study_app.app.main_controller import MainController
 from study_app.devices.registry import discover
+from study_app.gui.home.study_facts import StudyFacts, study_facts
 from study_app.gui.settings.display_test import DisplayTest
 from study_app.gui.theme.theme import Theme
-from study_app.viewmodels.home import StudyFacts, study_facts
 from tools.screenshots.capture import Camera, shown
 from tools.screenshots.example_study import STUDY
 

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.live_session import LiveSession
-from study_app.gui.preflight import PreflightWindow
+from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
 from study_app.protocol.model import Reach

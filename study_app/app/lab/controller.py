@@ -24,10 +24,10 @@ from study_app.devices import DEFAULT_DEVICE
 from study_app.errors import StudyError
 from study_app.evidence.appraisal import AppraisalClient, start_appraisal_worker
 from study_app.gui.home.startup_window import LONG_AFTER_S
+from study_app.gui.lab.lab_state import LabView
 from study_app.gui.lab.view import LabPlace
 from study_app.lab.ab_comparison import Setting, Side, Workbench
 from study_app.lab.presets import Choice, liquids_at_hand, spoken
-from study_app.viewmodels.lab import LabView
 
 if TYPE_CHECKING:
     from study_app.lab.live import Live

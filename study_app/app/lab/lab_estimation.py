@@ -12,11 +12,11 @@ from PySide6.QtCore import QObject
 
 from study_app.app.failures import guarded
 from study_app.errors import StudyError
+from study_app.gui.lab.lab_state import DRAG, LSL, OFF, SOURCES, WAKE, EstimateRow, EstimateShown
 from study_app.gui.lab.view import LabPlace
 from study_app.lab.ab_comparison import Workbench
 from study_app.lab.estimation.sources import available
 from study_app.protocol.quantities import QUANTITIES
-from study_app.viewmodels.lab import DRAG, LSL, OFF, SOURCES, WAKE, EstimateRow, EstimateShown
 
 if TYPE_CHECKING:
     from study_app.lab.estimation.live_estimation import LiveEstimation

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from study_app.devices.registry import descriptor_of, list_devices, title_of
 from study_app.evidence.appraisal import Costs, Errors
+from study_app.gui.kit.devices import device_label
+from study_app.gui.lab.lab_state import CostRow, DeviceShown, ErrorRow, EstimateShown, LabView, Now
 from study_app.haptics.model.effects import NAMED
 from study_app.lab.programmed_paths import TITLES
-from study_app.viewmodels.devices import device_label
-from study_app.viewmodels.lab import CostRow, DeviceShown, ErrorRow, EstimateShown, LabView, Now
 
 if TYPE_CHECKING:
     from study_app.app.lab.jobs import Prices

@@ -19,6 +19,7 @@ from study_app.app.session.timing import FrameBudget, ThreadPriority, freeze_gar
 from study_app.errors import DeviceError, ServoFault, StudyError, VideoError
 from study_app.gui.display.frame_clock import Frames
 from study_app.gui.operator.header import Strip
+from study_app.gui.operator.operator_view import OperatorView
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import Page, TaskPage
@@ -35,7 +36,6 @@ from study_app.session.transitions.events import (
     broken,
 )
 from study_app.store.program_log import DEVICE_FAILED
-from study_app.viewmodels.operator import OperatorView
 
 TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
 TILES_S = 0.5

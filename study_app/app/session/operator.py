@@ -12,7 +12,9 @@ from PySide6.QtCore import QObject, Qt, Signal
 from study_app.app.failures import guarded_session_slot
 from study_app.errors import StudyError
 from study_app.gui.operator.header import Strip
+from study_app.gui.operator.operator_view import OperatorView, Session, operator_view
 from study_app.gui.operator.plots import ForceCard
+from study_app.gui.operator.servo_health import Forces, ServoHealth
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import Page
@@ -30,8 +32,6 @@ from study_app.session.transitions.events import (
 from study_app.store.journals.journal_events import Event, SessionEnded
 from study_app.store.progress import Progress
 from study_app.video.sources import Videos
-from study_app.viewmodels.operator import OperatorView, Session, operator_view
-from study_app.viewmodels.servo_health import Forces, ServoHealth
 
 if TYPE_CHECKING:
     from study_app.haptics.runtime.servo import Servo

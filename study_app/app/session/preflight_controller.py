@@ -13,7 +13,7 @@ from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
 from study_app.evidence.appraisal import Costs, Errors, Question, start_appraisal_worker
 from study_app.gui.display.screens import place
-from study_app.gui.preflight.window import PreflightWindow
+from study_app.gui.preflight.window import PreflightWindow, preflight_view, resumed_rows
 from study_app.gui.theme.theme import Theme
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
@@ -24,7 +24,6 @@ from study_app.session.start import NewSession, Ready, measured
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.folders import StudyFolder, locate
 from study_app.store.journals import journal
-from study_app.viewmodels.preflight import preflight_view, resumed_rows
 
 LOOK_MS = 100
 PATIENCE_S = 10.0

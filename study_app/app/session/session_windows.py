@@ -11,8 +11,9 @@ from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
 from study_app.errors import DisplayError
 from study_app.gui.display.screens import has_card, place
-from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.header import Strip
+from study_app.gui.operator.operator_view import Session, stages
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
@@ -28,8 +29,6 @@ from study_app.store.blinded.blinding import opened
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.progress import progress_of
-from study_app.viewmodels.operator import Session
-from study_app.viewmodels.session import stages
 
 if TYPE_CHECKING:
     from PySide6.QtGui import QScreen

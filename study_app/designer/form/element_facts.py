@@ -8,9 +8,8 @@ from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.initial_values import counted_elements, singular
 from study_app.designer.document.names import ITEMS, uses
-from study_app.number_text import counted
+from study_app.number_text import counted, exact_duration
 from study_app.protocol.source.document import Path, value_at
-from study_app.viewmodels.number_words import exact_duration
 
 USED: Final = frozenset({"liquids", "conditions", "tasks", "questionnaires", "scales", "stimuli", "designs", "methods"})
 """Sections whose elements other elements use; pages and blocks are steps of the session."""

@@ -26,7 +26,7 @@ from study_app.designer.measures.observers import Observed
 from study_app.designer.measures.planned import ENOUGH, Simulated
 from study_app.designer.problems.problem_rows import ProblemRow
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
-from study_app.number_text import counted
+from study_app.number_text import counted, duration_figure
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.force_limits import clipped, clipped_unpaced
 from study_app.protocol.model import Protocol
@@ -41,7 +41,6 @@ from study_app.protocol.trials.presented_levels import (
     standard_of,
 )
 from study_app.protocol.trials.tracks import design_of, stimulus_of
-from study_app.viewmodels.number_words import duration_figure
 
 MOST_LABELS: Final = 9
 CLIPPED: Final[Verdict] = ("bad", "warning", "levels are clipped")

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
+from study_app.gui.theme.theme import Tone
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.tones import Tone
 
 UNKNOWN: Final = "–"
 Limit: TypeAlias = Literal["norm", "slope"]

@@ -18,13 +18,12 @@ from study_app.designer.measures.number_cards import (
     Verdict,
 )
 from study_app.designer.outline.outline_rows import ElementPath
-from study_app.gui.theme.theme import font
+from study_app.gui.theme.theme import Tone, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
-from study_app.viewmodels.tones import Tone
 
 INKS: dict[Tone, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}
 NAME_PX = 132

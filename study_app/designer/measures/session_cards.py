@@ -30,14 +30,13 @@ from study_app.designer.measures.planned import Simulated
 from study_app.designer.measures.valid_part import valid_part
 from study_app.haptics.model.gate import calls_for
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
-from study_app.number_text import counted
+from study_app.number_text import counted, duration, duration_figure, duration_range
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.orders.durations import answering_s
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import language_name
-from study_app.viewmodels.number_words import duration, duration_figure, duration_range
 
 SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
 MOST_CODES: Final = 8

@@ -23,13 +23,13 @@ from study_app.designer.place.designer_view import HeaderState, StudyChoice, pro
 from study_app.designer.place.open_study import OpenStudy
 from study_app.designer.versions.version_rows import VersionChip
 from study_app.errors import StudyError
+from study_app.gui.home.study_facts import holds_liquids_alone, is_shipped, sources
 from study_app.protocol.load import read_document
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import has
 from study_app.protocol.source.files import find, shipped, shipped_file
 from study_app.store.drafts import draft_of, drafted_files, unsaved_files
 from study_app.store.study_settings import kept_original
-from study_app.viewmodels.home import holds_liquids_alone, is_shipped, sources
 from study_app.workspace import workspace
 
 

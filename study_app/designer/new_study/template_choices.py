@@ -14,13 +14,12 @@ from study_app.designer.new_study.new_study import Answers
 from study_app.designer.new_study.templates import QUESTIONS
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
-from study_app.number_text import counted
+from study_app.number_text import counted, duration
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.wording.languages import LANGUAGES
-from study_app.viewmodels.number_words import duration
 
 __all__ = [
     "Answers", "OwnQuestion", "Recovery", "TemplateChoice", "copy_choice", "languages_offered", "template_choice",

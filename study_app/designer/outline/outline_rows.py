@@ -9,9 +9,8 @@ from study_app.designer.document.elements import Element, found, outline, title_
 from study_app.designer.document.initial_values import singular
 from study_app.designer.form.element_facts import brief
 from study_app.designer.problems.finding import LABEL, FoundField, found_in_elements
-from study_app.number_text import counted
+from study_app.number_text import counted, duration
 from study_app.protocol.source.document import Path, entries, names, value_at
-from study_app.viewmodels.number_words import duration
 
 ICONS: Final = {
     "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from study_app.viewmodels.tones import Tone
+from study_app.gui.theme.theme import Tone
 
 PlayAction: TypeAlias = Literal["play", "stop", "keep", "delete", "problems", "close"]
 

@@ -8,7 +8,7 @@ from study_app.designer.new_study.study_list import StudyList
 from study_app.designer.participant.play_controls import PlayControls
 from study_app.designer.participant.play_strip import PlayStrip
 from study_app.designer.place.designer_view import HeaderState
-from study_app.gui.theme.theme import font
+from study_app.gui.theme.theme import Tone, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
@@ -17,7 +17,6 @@ from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEn
 from study_app.gui.widgets.dialogs import choose_protocol
 from study_app.gui.widgets.keys import tip, with_key
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.tones import Tone
 
 NEW, OPEN = "\0new", "\0open"
 WIDE_FROM = 1180

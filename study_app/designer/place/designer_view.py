@@ -7,8 +7,8 @@ from study_app.designer.form.form_rows import Form
 from study_app.designer.place.file_text import FileText
 from study_app.designer.problems.problem_rows import ProblemRow
 from study_app.designer.versions.version_rows import VersionChip
+from study_app.gui.theme.theme import Tone
 from study_app.number_text import counted
-from study_app.viewmodels.tones import Tone
 
 BETWEEN: Final = "  ·  "
 """What is between the title of a study and its file."""

@@ -20,11 +20,11 @@ from study_app.designer.versions.standing import Standing, check_version
 from study_app.designer.versions.version_rows import FILE, Comparison, save_prompt
 from study_app.designer.versions.versions_page import SaveCard
 from study_app.errors import StudyError
+from study_app.gui.home.study_facts import time_words
 from study_app.number_text import counted
 from study_app.store.drafts import draft_of
 from study_app.store.study_settings import begin_settings
 from study_app.store.study_versions import ChangedOutsideError, kept_versions
-from study_app.viewmodels.home import time_words
 
 DRAFT_MS: Final = 50
 RETRY_MS: Final = 2_000

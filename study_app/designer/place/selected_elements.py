@@ -14,7 +14,7 @@ from study_app.designer.place.requests import AskSeries, DuplicateElement, MoveE
 class SelectedElements(QObject):
     """The element of the form, and those that the outline selects with it.
 
-    ``asked`` carries a request of `viewmodels.designer.requests`, ``delete_asked`` the element and the others; before
+    ``asked`` carries a request of `requests`, ``delete_asked`` the element and the others; before
     each request, ``typed`` asks to hand on what is being typed. ``selected`` carries another element.
     """
 

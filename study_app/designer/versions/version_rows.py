@@ -8,11 +8,11 @@ from functools import lru_cache
 from typing import Final
 
 from study_app.designer.versions.standing import Standing
+from study_app.gui.sessions.session_facts import started_words
+from study_app.gui.theme.theme import Tone
 from study_app.number_text import counted
 from study_app.store.study_runs import Run
 from study_app.store.study_versions import Kept, kept_content
-from study_app.viewmodels.sessions import started_words
-from study_app.viewmodels.tones import Tone
 
 FILE: Final = "file"
 """The key of what the file holds."""

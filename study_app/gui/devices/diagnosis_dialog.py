@@ -12,14 +12,13 @@ from study_app.devices.doctor import Finding, Report, State, lines
 from study_app.devices.doctor_worker import ExaminationClient, start_examination
 from study_app.devices.registry import doctor_of, title_of
 from study_app.errors import StoreError
-from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
+from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label, set_ink
 from study_app.store.support import NAME, write_support
-from study_app.viewmodels.tones import Tone
 from study_app.workers.server import Crashed, Refused
 
 STATES: dict[State, tuple[Tone, str, str]] = {

@@ -12,6 +12,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QLabel, QWidget
 
 from study_app.devices.descriptor import DeviceOption
+from study_app.gui.kit.devices import BenchShown, DeviceShown, remembered_options
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
@@ -19,7 +20,6 @@ from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, Chip, Rul
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.labels import Elided, label, set_ink
 from study_app.gui.widgets.main_view import Place
-from study_app.viewmodels.devices import BenchShown, DeviceShown, remembered_options
 
 LEAST_WORDS = 280  # narrower, wrapped words would ask for room that they do not need
 INSET = 30  # behind a radio's mark

@@ -11,6 +11,9 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPaintEvent, QPen, QRadialGradient
 from PySide6.QtWidgets import QGridLayout, QSizePolicy, QSpacerItem, QWidget
 
+from study_app.gui.home.study_facts import BrokenFacts, DraftFacts, Interrupted, StudyFacts
+from study_app.gui.kit.devices import DeviceShown
+from study_app.gui.sessions.session_facts import KINDS, Column, SessionFacts
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import RADIUS_CARD, TANK, font
 from study_app.gui.theme.themed import Themed, remove_widget
@@ -19,10 +22,6 @@ from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Clamped, Elided, label, set_ink
 from study_app.number_text import counted
-from study_app.viewmodels.devices import DeviceShown
-from study_app.viewmodels.home import BrokenFacts, DraftFacts, Interrupted, StudyFacts
-from study_app.viewmodels.session import Column
-from study_app.viewmodels.sessions import KINDS, SessionFacts
 
 PICTURE, INSET = 56, 8
 WAKE_POINTS = 48

@@ -12,6 +12,8 @@ from PySide6.QtWidgets import QDialog, QGridLayout, QLineEdit, QProgressBar, QWi
 from study_app.devices.registry import descriptor_of, list_devices
 from study_app.errors import StoreError, StudyError
 from study_app.gui.display.screens import screens_shown
+from study_app.gui.home.study_facts import StudyFacts
+from study_app.gui.kit.devices import device_label, device_or_default, window_options
 from study_app.gui.kit.fields import Editor, Field, choice, seed
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
@@ -31,8 +33,6 @@ from study_app.store.folders import StudyFolder, rehearsal_folder
 from study_app.store.sessions.begin import MAX_SESSION, UsedIds, check_participant, used_ids
 from study_app.store.tables.study_files import check_study
 from study_app.store.workstation import DEFAULTS, MachineSettings
-from study_app.viewmodels.devices import device_label, device_or_default, window_options
-from study_app.viewmodels.home import StudyFacts
 from study_app.workers.client import WorkerClient
 from study_app.workspace import workspace
 

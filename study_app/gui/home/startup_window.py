@@ -14,7 +14,7 @@ from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Logo
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
-from study_app.viewmodels.number_words import minutes
+from study_app.number_text import minutes
 
 LONG_AFTER_S = 4.0
 STEP = "Opening the device and the force model …"

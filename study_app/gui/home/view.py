@@ -25,6 +25,20 @@ from study_app.gui.home.cards import (
     StudyCard,
 )
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
+from study_app.gui.home.study_facts import (
+    SHIPPED,
+    DraftFacts,
+    Interrupted,
+    LoadWords,
+    StudyFacts,
+    file_states,
+    held,
+    holds_liquids_alone,
+    interrupted,
+    read_studies,
+)
+from study_app.gui.kit.devices import DeviceShown, looking
+from study_app.gui.sessions.session_facts import SessionFacts, extent_of, sessions
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background
@@ -37,20 +51,6 @@ from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place, make_shortcuts
 from study_app.session.start import resumed
 from study_app.store.workstation import DEFAULTS, MachineSettings
-from study_app.viewmodels.devices import DeviceShown, looking
-from study_app.viewmodels.home import (
-    SHIPPED,
-    DraftFacts,
-    Interrupted,
-    StudyFacts,
-    extent_of,
-    file_states,
-    held,
-    holds_liquids_alone,
-    interrupted,
-    read_studies,
-)
-from study_app.viewmodels.sessions import SessionFacts, sessions
 from study_app.workspace import workspace
 
 STACKED_BELOW = 1080
@@ -73,6 +73,8 @@ class HomePlace(Place):
     ----------
     results
         Folder that holds the studies' folders; it need not exist.
+    draft_words
+        Loads what describes a draft.
     """
 
     session_asked = Signal(object)
@@ -81,9 +83,10 @@ class HomePlace(Place):
     edit_asked = Signal(str)
     new_asked = Signal(str)
 
-    def __init__(self, results: Path) -> None:
+    def __init__(self, results: Path, draft_words: LoadWords = None) -> None:
         super().__init__()
         self.results = results
+        self._draft_words = draft_words
         self.machine = DEFAULTS
         self.dialog: NewSessionDialog | RehearsalDialog | SessionPage | None = None
         self._opened: list[str] = []
@@ -196,7 +199,7 @@ class HomePlace(Place):
         """Read the protocols at hand, outside the window's thread; show a card for each, and the sessions."""
         self.folder.show_text(f"Workspace: {workspace().folder}")
         self._files, self._unread = file_states(self._opened), False
-        self._studies.run(partial(read_studies, tuple(self._opened)))
+        self._studies.run(partial(read_studies, tuple(self._opened), self._draft_words))
 
     def _show_studies(self, read: tuple[Facts, ...]) -> None:
         self.waiting.hide()

@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QStackedLayout, QVBoxLayout, QWidget
 
 from study_app.gui.lab.lab_plots import DASH, LIMIT, A, B, CurvePlot, PlotCard
+from study_app.gui.lab.lab_state import OFF, PARAMETERS, Choices, CostRow, ErrorRow, EstimateRow, Floats, LabView
 from study_app.gui.lab.parameters import HIDDEN
 from study_app.gui.theme.theme import LIGHT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
@@ -21,8 +22,7 @@ from study_app.gui.widgets.live_plots import Plot, draw_quickly, number
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import RATES_PER_S, SPEEDS_MPS, SteadyCurves, has_flow_curve, steady_curves
 from study_app.lab.live import LimiterCount
-from study_app.viewmodels.lab import OFF, PARAMETERS, Choices, CostRow, ErrorRow, EstimateRow, Floats, LabView
-from study_app.viewmodels.number_words import grouped
+from study_app.number_text import grouped
 
 NAME_WIDTH = 84
 LINE = 26

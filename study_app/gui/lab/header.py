@@ -4,6 +4,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
+from study_app.gui.lab.lab_state import SIDES, Choices, LabView
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
@@ -11,7 +12,6 @@ from study_app.gui.widgets.boxes import add_layout, add_parts, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, CompactStop, IconButton, Toggle
 from study_app.gui.widgets.labels import label
 from study_app.lab.ab_comparison import Side
-from study_app.viewmodels.lab import SIDES, Choices, LabView
 
 HEIGHT = 44
 WIDEST = 190

@@ -9,6 +9,7 @@ from PySide6.QtCore import QPointF, QSize
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QStackedLayout, QWidget
 
+from study_app.gui.lab.lab_state import SPAN_S, Floats, LabView
 from study_app.gui.lab.parameters import HIDDEN
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import Themed
@@ -17,7 +18,6 @@ from study_app.gui.widgets.boxes import add_layout, vbox
 from study_app.gui.widgets.cards import Card, MaskedPanel
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, number, pen
-from study_app.viewmodels.lab import SPAN_S, Floats, LabView
 
 POINTS = 240  # of a curve: one for one to two pixels; painting takes as long as there are points
 STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)

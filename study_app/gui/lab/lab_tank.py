@@ -28,6 +28,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 
+from study_app.gui.lab.lab_state import Floats, LabView, Point
 from study_app.gui.participant.pointer_capture import PointerCapture
 from study_app.gui.participant.tank import sprites
 from study_app.gui.participant.tank.backdrop import Backdrop, backdrop
@@ -41,8 +42,7 @@ from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Ink, label
 from study_app.lab.shadow import Tail
-from study_app.viewmodels.lab import Floats, LabView, Point
-from study_app.viewmodels.number_words import grouped
+from study_app.number_text import grouped
 
 SHADES = 14  # steps of age that are distinguished
 THICKEST_PX, THINNEST_PX = 5.0, 1.6

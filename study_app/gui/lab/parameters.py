@@ -4,6 +4,7 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QGridLayout, QLabel, QStackedLayout, QWidget
 
 from study_app.gui.lab.header import Badge
+from study_app.gui.lab.lab_state import FormRow, FormSection, LabView, form
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
@@ -15,7 +16,6 @@ from study_app.gui.widgets.sliders import Range, Slider
 from study_app.haptics.model.effect import Parameter, Value
 from study_app.lab.ab_comparison import Setting, other
 from study_app.lab.parameters import OFF, ON
-from study_app.viewmodels.lab import FormRow, FormSection, LabView, form
 
 LABEL_WIDTH, FIELD_WIDTH, UNIT_WIDTH = 108, 86, 44
 GAP = 8

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QFileDialog, QGridLayout
 from study_app.gui.lab.cards import CostCard, ErrorCard, EstimateCard, FlowCurveRow, LimiterCard
 from study_app.gui.lab.header import KEY, LabHeader
 from study_app.gui.lab.lab_plots import ForceCard, SpeedCard
+from study_app.gui.lab.lab_state import FILE, LabView
 from study_app.gui.lab.lab_tank import LabTank, TankNote
 from study_app.gui.lab.parameters import FormPanel
 from study_app.gui.theme.theme import SPACE
@@ -20,7 +21,6 @@ from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.escape_key import EscapeKey
 from study_app.gui.widgets.main_view import Place
 from study_app.lab.ab_comparison import Setting
-from study_app.viewmodels.lab import FILE, LabView
 from study_app.workspace import workspace
 
 FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 388, 300

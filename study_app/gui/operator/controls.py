@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from study_app.gui.operator.operator_view import NOTES_SHOWN, DeviceView, OperatorView
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
@@ -27,8 +28,7 @@ from study_app.gui.widgets.cards import Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label
-from study_app.viewmodels.number_words import minutes
-from study_app.viewmodels.operator import NOTES_SHOWN, DeviceView, OperatorView
+from study_app.number_text import minutes
 
 
 class Actions(Card):

@@ -5,6 +5,8 @@ from PySide6.QtCore import QPointF, QSize, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QGridLayout, QWidget
 
+from study_app.gui.operator.operator_view import OperatorView
+from study_app.gui.operator.servo_health import TRACE_WINDOW_S, Forces, ServoHealth, Tile, Verdict
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
@@ -25,8 +27,6 @@ from study_app.gui.widgets.live_plots import (
     step_for,
     time_ticks,
 )
-from study_app.viewmodels.operator import OperatorView
-from study_app.viewmodels.servo_health import TRACE_WINDOW_S, Forces, ServoHealth, Tile, Verdict
 
 FIELD = QSize(320, 210)
 """What the card asks for, whether it shows the force or hides it."""

@@ -4,14 +4,14 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
+from study_app.gui.operator.operator_view import OperatorView, StepRow
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Rule, scrolled
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
-from study_app.viewmodels.number_words import minutes
-from study_app.viewmodels.operator import OperatorView, StepRow
+from study_app.number_text import minutes
 
 HEADINGS: tuple[TypeRole, ...] = ("display", "title", "title_dense", "card")
 

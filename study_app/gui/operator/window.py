@@ -14,7 +14,9 @@ from PySide6.QtWidgets import QGridLayout, QMainWindow, QWidget
 
 from study_app.gui.operator.controls import ALL_ROWS, Actions, DeviceCard, NotesCard, ReasonQuestion, StopPanel
 from study_app.gui.operator.header import Banner, Header
+from study_app.gui.operator.operator_view import NOTES_SHOWN, OperatorView
 from study_app.gui.operator.plots import ForceCard, HiddenForceCard, LatenessCard, PositionCard, Tiles
+from study_app.gui.operator.servo_health import Forces, ServoHealth
 from study_app.gui.operator.steps import NARROW, SLIM, WIDTH, Rail
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
@@ -24,8 +26,6 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.escape_key import EscapeKey
 from study_app.gui.widgets.failed_panel import Panels
-from study_app.viewmodels.operator import NOTES_SHOWN, OperatorView
-from study_app.viewmodels.servo_health import Forces, ServoHealth
 
 Width = Literal["wide", "narrow", "slim"]
 Height = Literal["high", "low", "lower", "least"]

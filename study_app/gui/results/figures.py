@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QWidget
 
+from study_app.gui.results.results_state import FigureShown, Going, Remedy, ResultsView, Trouble
 from study_app.gui.theme.fonts import FAMILIES
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
@@ -17,7 +18,6 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vb
 from study_app.gui.widgets.cards import SHADOW, Bar, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
-from study_app.viewmodels.results import FigureShown, Going, Remedy, ResultsView, Trouble
 
 LOOK_MS = 15
 LETTERS = re.compile(rb"(<text.*?</text>)", re.DOTALL)

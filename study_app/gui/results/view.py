@@ -11,6 +11,8 @@ from PySide6.QtWidgets import QBoxLayout, QDialog, QLineEdit, QScrollArea, QSize
 
 from study_app.gui.results.export_dialog import Extra, WriteDialog
 from study_app.gui.results.figures import FiguresPanel
+from study_app.gui.results.results_state import LeftOut, ResultsView, in_figures
+from study_app.gui.sessions.session_facts import Column, SessionFacts, matching, started_words, states_of
 from study_app.gui.sessions.session_page import LeaveOutDialog, SessionPage, TakeBackDialog, UnblindDialog
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import font
@@ -20,9 +22,6 @@ from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, Chip, Rul
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
-from study_app.viewmodels.results import LeftOut, ResultsView, in_figures
-from study_app.viewmodels.session import Column, matching, states_of
-from study_app.viewmodels.sessions import SessionFacts, started_words
 
 COLUMNS = (
     Column("participant", "Participant", 90, 76),

@@ -12,6 +12,8 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QDialog, QGridLayout, QLineEdit, QScrollArea, QSizePolicy, QWidget
 
 from study_app.errors import StoreError
+from study_app.gui.sessions.session_facts import VALIDITY, SessionFacts, status_chip, validity_chip
+from study_app.gui.sessions.session_record import NO_MOTION, SessionRecord, TrialRecord, motion, read_record
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import describe_plot
@@ -23,17 +25,6 @@ from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.row_table import CHIP_ROLE, Index, Table
 from study_app.store.exclusions import Exclusion, exclude, include
-from study_app.viewmodels.session import (
-    NO_MOTION,
-    VALIDITY,
-    SessionRecord,
-    TrialRecord,
-    motion,
-    read_record,
-    status_chip,
-    validity_chip,
-)
-from study_app.viewmodels.sessions import SessionFacts
 
 WIDTH = 560
 

@@ -7,12 +7,19 @@ from typing import Any
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
 from PySide6.QtWidgets import QWidget
 
+from study_app.gui.sessions.session_facts import (
+    Column,
+    SessionFacts,
+    answers_words,
+    incidents,
+    started_words,
+    status_chip,
+    validity_chip,
+)
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.row_table import BELOW_ROLE, CARE_ROLE, CHIP_ROLE, MARGIN, Index, Table
-from study_app.viewmodels.session import Column, answers_words, incidents, status_chip, validity_chip
-from study_app.viewmodels.sessions import SessionFacts, started_words
 
 NOWHERE = QModelIndex()
 

@@ -6,13 +6,17 @@ colour **and** icon **and** word.
 """
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 from study_app.gui.theme.fonts import TYPE, Type, TypeRole, font, load_fonts
 
 __all__ = [
     "DARK", "GRID", "LIGHT", "PARTICIPANT", "RADIUS_CARD", "RADIUS_CONTROL", "SPACE", "TANK", "TYPE",
-    "TankColours", "Theme", "Type", "TypeRole", "font", "load_fonts", "stylesheet",
+    "TankColours", "Theme", "Tone", "Type", "TypeRole", "font", "load_fonts", "stylesheet",
 ]  # fmt: skip
+
+Tone: TypeAlias = Literal["ok", "warn", "bad", "accent", "neutral"]
+"""The tone of a message."""
 
 GRID = 4
 SPACE = (4, 8, 12, 16, 24, 32, 40)

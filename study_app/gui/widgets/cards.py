@@ -7,11 +7,10 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, 
 from PySide6.QtWidgets import QLayout, QScrollArea, QSizePolicy, QWidget
 
 from study_app.gui.theme.icons import draw_icon, draw_logo
-from study_app.gui.theme.theme import RADIUS_CARD, RADIUS_CONTROL, Theme, font
+from study_app.gui.theme.theme import RADIUS_CARD, RADIUS_CONTROL, Theme, Tone, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
 from study_app.gui.widgets.labels import Ink, label
-from study_app.viewmodels.tones import Tone
 
 QWIDGETSIZE_MAX = (1 << 24) - 1
 """Of Qt; PySide does not offer it."""

@@ -7,8 +7,8 @@ from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
-from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.plots import ForceCard
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import ChoicePage, EndPage, QuestionnairePage, TextPage

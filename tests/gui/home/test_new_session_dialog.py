@@ -10,12 +10,12 @@ from PySide6.QtWidgets import QWidget
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.home import dialogs
 from study_app.gui.home.dialogs import NewSessionDialog
+from study_app.gui.home.study_facts import study_facts
 from study_app.gui.widgets.background import Background
 from study_app.protocol.load import source_bytes
 from study_app.session.start import MAX_SEED
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.workstation import MachineSettings
-from study_app.viewmodels.home import study_facts
 from tests.protocol.groups.grouped import STUDY
 
 pytestmark = pytest.mark.slow

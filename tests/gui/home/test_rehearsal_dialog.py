@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 
 from study_app.gui.home import dialogs
 from study_app.gui.home.dialogs import RehearsalDialog
-from study_app.viewmodels.home import study_facts
+from study_app.gui.home.study_facts import study_facts
 
 pytestmark = pytest.mark.slow
 

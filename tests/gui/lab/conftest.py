@@ -5,8 +5,8 @@ from typing import Any
 import numba
 import pytest
 
+from study_app.gui.lab.lab_state import LabView
 from study_app.gui.lab.view import LabPlace
-from study_app.viewmodels.lab import LabView
 from tests.gui import windows
 from tests.gui.lab.sample import lab_view, still_view
 

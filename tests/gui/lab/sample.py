@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from study_app.gui.lab.lab_state import CostRow, DeviceShown, ErrorRow, LabView, Now
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
@@ -17,7 +18,6 @@ from study_app.lab.live import LimiterCounts
 from study_app.lab.presets import spoken
 from study_app.lab.shadow import Shadow
 from study_app.protocol.load import load_scene
-from study_app.viewmodels.lab import CostRow, DeviceShown, ErrorRow, LabView, Now
 
 RATE_HZ = 1000
 ELEMENTS = 6000

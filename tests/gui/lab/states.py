@@ -11,13 +11,13 @@ from PySide6.QtCore import QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
+from study_app.gui.lab.lab_state import LSL, SOURCES, EstimateRow, EstimateShown, Now
 from study_app.gui.theme.theme import DARK
 from study_app.gui.theme.themed import apply_theme
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.presets import spoken
 from study_app.lab.shadow import Trace
 from study_app.protocol.load import load_scene
-from study_app.viewmodels.lab import LSL, SOURCES, EstimateRow, EstimateShown, Now
 from tests.gui.lab.sample import blind, still_view, workbench
 from tests.gui.transcript import Actions, clicked, in_turn
 

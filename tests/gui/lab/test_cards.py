@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtWidgets import QFileDialog
 
 from study_app.gui.lab.lab_plots import thinned
-from study_app.viewmodels.lab import LSL, SOURCES, EstimateRow, EstimateShown, LabView
+from study_app.gui.lab.lab_state import LSL, SOURCES, EstimateRow, EstimateShown, LabView
 from tests.gui.lab.sample import heard
 
 pytestmark = pytest.mark.slow

@@ -8,9 +8,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
+from study_app.gui.lab.lab_state import LabView
 from study_app.gui.lab.parameters import OFF, NumberRow
 from study_app.gui.widgets.escape_key import HOLD_MS, EscapeKey
-from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import blind, heard
 from tests.gui.walk import settle
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from PySide6.QtCore import QPointF
 
+from study_app.gui.lab.lab_state import Floats, LabView
 from study_app.gui.lab.lab_tank import tail_places
 from study_app.gui.participant.tank.frame import Box, Camera
-from study_app.viewmodels.lab import Floats, LabView
 
 BOX = Box.around((0.1, 0.06, 0.06), 0.0034)
 CAMERA = Camera.fitted(BOX, 30, 30, 700, 420, pitch=0.5)

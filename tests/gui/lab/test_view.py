@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QLabel, QLineEdit, QWidget
 
-from study_app.viewmodels.lab import LabView
+from study_app.gui.lab.lab_state import LabView
 from tests.gui.lab.sample import blind, heard, workbench
 from tests.gui.walk import settle
 

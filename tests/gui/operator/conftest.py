@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.viewmodels.servo_health import ServoHealth
+from study_app.gui.operator.servo_health import ServoHealth
 from tests.gui.operator.session import Told, measured_health, new_session
 
 

@@ -5,15 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from study_app.gui.operator.operator_view import OperatorView, Session, operator_view, stages
+from study_app.gui.operator.servo_health import ServoHealth
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
 from study_app.store.progress import Progress
-from study_app.viewmodels.operator import OperatorView, Session, operator_view
-from study_app.viewmodels.servo_health import ServoHealth
-from study_app.viewmodels.session import stages
 from tests.journal_lines import event_of
 
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.header import Strip
+from study_app.gui.operator.servo_health import Forces
+from study_app.gui.operator.window import OperatorWindow
 from study_app.haptics.model.layout import LIMITER_NORM, SAMPLE, records
-from study_app.viewmodels.servo_health import Forces
 from tests.gui.operator.session import measured_health, new_session
 from tests.gui.transcript import Actions, clicked, in_turn, typed
 from tests.gui.windows import shown

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.controls import LEAST_HEIGHT, LEAST_WIDTH
 from study_app.gui.operator.plots import ForceCard
+from study_app.gui.operator.servo_health import Forces
+from study_app.gui.operator.window import OperatorWindow
 from study_app.haptics.model.layout import LIMITER_NORM, SAMPLE, records
-from study_app.viewmodels.servo_health import Forces
 from tests.gui.walk import cut, dead, place_of, scrolls, settle, unnamed
 
 pytestmark = pytest.mark.slow

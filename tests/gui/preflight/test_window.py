@@ -5,11 +5,10 @@ from dataclasses import replace
 import pytest
 from PySide6.QtCore import Qt
 
-from study_app.gui.preflight import PreflightWindow
+from study_app.gui.preflight.window import PreflightWindow, resumed_rows
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.preflight import Masking
-from study_app.viewmodels.preflight import resumed_rows
 from tests.gui.windows import SCALED, WELL, checked, preflight
 from tests.journal_lines import event_from
 

@@ -10,12 +10,12 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from study_app.errors import StoreError
+from study_app.gui.results.results_state import FigureShown, Going, Opened, Trouble
 from study_app.gui.sessions.session_page import SessionPage
+from study_app.gui.sessions.session_record import MOTION_HIDDEN, SessionRecord, TrialRecord
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
 from study_app.store.exclusions import Exclusion
-from study_app.viewmodels.results import FigureShown, Going, Opened, Trouble
-from study_app.viewmodels.session import MOTION_HIDDEN, SessionRecord, TrialRecord
 from tests.gui.results.sample import LEFT_OUT, SVG, facts, view
 from tests.gui.transcript import Actions, clicked, in_turn
 from tests.gui.windows import results, shown

@@ -8,7 +8,9 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 
+from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.sessions.session_page import SessionPage
+from study_app.gui.sessions.session_record import MOTION_HIDDEN, read_record
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load, source_bytes
 from study_app.session.simulated.rehearsal import rehearse
@@ -17,8 +19,6 @@ from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
 from study_app.store.sessions.begin import SessionStart, begin
-from study_app.viewmodels.session import MOTION_HIDDEN, read_record
-from study_app.viewmodels.sessions import sessions
 from tests.journal_lines import event_of
 
 pytestmark = pytest.mark.slow

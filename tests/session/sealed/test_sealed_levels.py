@@ -9,6 +9,8 @@ from typing import Any, TypeAlias
 
 import pytest
 
+from study_app.gui.operator.operator_view import Session, operator_view, stages
+from study_app.gui.operator.servo_health import Vitals
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
@@ -23,9 +25,6 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.progress import Progress
 from study_app.store.tables.columns import SEALED
-from study_app.viewmodels.operator import Session, operator_view
-from study_app.viewmodels.servo_health import Vitals
-from study_app.viewmodels.session import stages
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 from tests.outlets.collector import collecting

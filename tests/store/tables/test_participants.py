@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 
 from study_app.errors import StoreError
+from study_app.gui.sessions.session_facts import sessions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.recovery import rebuild
 from study_app.store.tables import study_files
 from study_app.store.verification.verify_study import verify
-from study_app.viewmodels.sessions import sessions
 from tests.journal_lines import raw
 from tests.store.conftest import Start
 

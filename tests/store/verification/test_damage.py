@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from study_app.errors import StudyError
+from study_app.gui.sessions.session_facts import sessions
 from study_app.protocol.model import Protocol
 from study_app.store import recordings
 from study_app.store.blinded import blinding
@@ -20,7 +21,6 @@ from study_app.store.journals.journal import scan
 from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
-from study_app.viewmodels.sessions import sessions
 from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting
 from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Attend, Make, Start

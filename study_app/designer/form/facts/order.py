@@ -7,9 +7,9 @@ from typing import Any, Final, Literal
 from study_app.designer.document.edited_study import Study
 from study_app.designer.document.fields import Row
 from study_app.designer.form.row_facts import RowFacts
+from study_app.gui.theme.theme import Tone
 from study_app.protocol.orders.sequences import borders_even, row_count
 from study_app.protocol.source.document import value_at
-from study_app.viewmodels.tones import Tone
 
 ROUNDS: Final = 3
 SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "williams", "latin": "latin"}

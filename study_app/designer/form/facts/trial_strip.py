@@ -6,6 +6,7 @@ from typing import Final, Literal, TypeAlias
 from study_app.designer.document.edited_study import Study
 from study_app.designer.document.fields import Row, label_of
 from study_app.designer.form.row_facts import RowFacts
+from study_app.number_text import duration, exact_duration
 from study_app.protocol.model import Follow, Reach
 from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
 from study_app.protocol.source.document import Path
@@ -13,7 +14,6 @@ from study_app.protocol.trials.designs import ORDINALS
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.tasks import AnyTask
 from study_app.protocol.trials.tracks import design_of, method_of
-from study_app.viewmodels.number_words import duration, exact_duration
 
 PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]
 

@@ -21,11 +21,11 @@ from study_app.designer.participant.shown_step import StepPosition
 from study_app.errors import DeviceLost
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
+from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.widgets.controls import CompactStop
 from study_app.session.pages import ChoicePage, FeedbackPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.transitions.page_builder import preview
 from study_app.store.verification.verify_study import verify
-from study_app.viewmodels.sessions import sessions
 from tests.app.people import window
 from tests.compiled import needs_servo
 

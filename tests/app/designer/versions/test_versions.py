@@ -16,12 +16,12 @@ from study_app.app.main_controller import MainController
 from study_app.designer.place.controller import DesignerController
 from study_app.designer.place.requests import SetText, SetValue
 from study_app.errors import StoreError
+from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.drafts import draft_of
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.study_settings import keep_setting, kept_original, kept_participants
 from study_app.store.study_versions import kept_content, kept_versions
-from study_app.viewmodels.sessions import SessionFacts
 from tests.app.designer.support.designer import Designer
 from tests.app.designer.versions.conftest import REPETITIONS, click, lines, run, version_of
 

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.window import OperatorWindow
 from study_app.outlets.markers import CODES
 from study_app.store import workstation
 from study_app.store.verification.verify_study import verify

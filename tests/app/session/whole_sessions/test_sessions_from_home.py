@@ -9,8 +9,8 @@ from PySide6.QtTest import QTest
 from study_app import app
 from study_app.errors import StoreError
 from study_app.gui.home.main_window import MainWindow
-from study_app.gui.operator import OperatorWindow
-from study_app.gui.preflight import PreflightWindow
+from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.preflight.window import PreflightWindow
 from study_app.session.pages import PausePage
 from tests.app.people import Leaver, Person, attended, events, looking, place_at_home, receipt_of, rows, window
 from tests.compiled import needs_servo

@@ -14,7 +14,7 @@ from PySide6.QtTest import QTest
 from study_app.app.session.bridge import SessionBridge
 from study_app.devices.rig import Rig
 from study_app.errors import SessionError, VideoError
-from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import PausePage, TroublePage
 from study_app.store import workstation

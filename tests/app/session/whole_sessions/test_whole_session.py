@@ -19,7 +19,7 @@ from study_app.app import failures
 from study_app.app.session import live_session
 from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError, StudyError
 from study_app.gui.home.startup_window import OpeningWindow
-from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.store import workstation
 from study_app.store.exclusions import exclusions

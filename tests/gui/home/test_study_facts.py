@@ -7,17 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from study_app.designer.versions import draft_words
 from study_app.errors import ProtocolError
-from study_app.protocol.load import load, source_bytes
-from study_app.protocol.orders.schedule import PageStep, build_schedule
-from study_app.session.resume import REHEARSED_SCREENS
-from study_app.store.drafts import Draft, draft_files, keep
-from study_app.store.exclusions import exclude
-from study_app.store.journals import journal_events
-from study_app.store.sessions.begin import SessionStart, begin
-from study_app.store.sessions.folder_lock import open_alone
-from study_app.store.study_settings import begin_settings
-from study_app.viewmodels.home import (
+from study_app.gui.home.study_facts import (
     BrokenFacts,
     StudyFacts,
     held,
@@ -27,8 +19,25 @@ from study_app.viewmodels.home import (
     sources,
     study_facts,
 )
-from study_app.viewmodels.session import incidents, matching, read_record, states_of, status_chip, validity_chip
-from study_app.viewmodels.sessions import sessions, started_words
+from study_app.gui.sessions.session_facts import (
+    incidents,
+    matching,
+    sessions,
+    started_words,
+    states_of,
+    status_chip,
+    validity_chip,
+)
+from study_app.gui.sessions.session_record import read_record
+from study_app.protocol.load import load, source_bytes
+from study_app.protocol.orders.schedule import PageStep, build_schedule
+from study_app.session.resume import REHEARSED_SCREENS
+from study_app.store.drafts import Draft, draft_files, keep
+from study_app.store.exclusions import exclude
+from study_app.store.journals import journal_events
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.study_settings import begin_settings
 from tests.journal_lines import event_of
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
@@ -255,7 +264,7 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
         (kept,) = (file for file in draft_files() if f"{name}.toml" in file.read_text(encoding="utf-8"))
         kept.write_text(json.dumps(json.loads(kept.read_bytes()) | {"kept_at": at}), encoding="utf-8")
     begin_settings(protocols / "older.toml", "demo")
-    found = read_studies(())
+    found = read_studies((), lambda: draft_words)
     assert [(Path(it.source).stem, it.origin) for it in found[2:5]] == [
         ("newer", "Own study"),
         ("older", "Copy of demo"),

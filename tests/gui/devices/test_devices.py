@@ -7,8 +7,8 @@ import pytest
 
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
 from study_app.devices.registry import backends, list_devices
+from study_app.gui.kit.devices import benches_shown, device_named, devices_shown, looking
 from study_app.store.workstation import DEFAULTS, DeviceBench
-from study_app.viewmodels.devices import benches_shown, device_named, devices_shown, looking
 
 MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
 EMULATED = Backend("falcon-emulated", "the program", READY, "by command")

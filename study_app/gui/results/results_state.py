@@ -7,8 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
+from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.number_text import counted
-from study_app.viewmodels.sessions import SessionFacts
 
 NAMED: int = 5
 """Of so many sessions that are not in the figures each is named."""

@@ -4,9 +4,9 @@ import pytest
 from PySide6.QtCore import QSize
 
 from study_app.gui.results.figures import drawn, themed_svg
+from study_app.gui.results.results_state import in_figures
+from study_app.gui.sessions.session_facts import matching, states_of
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.viewmodels.results import in_figures
-from study_app.viewmodels.session import matching, states_of
 from tests.gui.results.sample import COLOURS, SVG, facts
 
 

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from study_app.devices.descriptor import NOT_AVAILABLE, READY, Backend
+from study_app.gui.preflight.window import OF_THE_COMPUTER, computer_checks
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.session.preflight import Check, Screen
-from study_app.viewmodels.preflight import OF_THE_COMPUTER, computer_checks
 from tests.session import small
 
 FALCON = Backend("falcon", "libusb", "connected: 1", "force")

@@ -5,15 +5,14 @@ from pathlib import Path
 
 import pytest
 
+from study_app.gui.operator.operator_view import MEASURES, stages
+from study_app.gui.operator.servo_health import ForceFigures, ServoHealth
+from study_app.number_text import duration, duration_range, duration_words, grouped, minutes
 from study_app.protocol.model import Limits
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.delivered import beyond_limits
 from study_app.store.tables.columns import TRIALS
 from study_app.store.tables.csv_files import header
-from study_app.viewmodels.number_words import duration, duration_range, duration_words, grouped, minutes
-from study_app.viewmodels.operator import MEASURES
-from study_app.viewmodels.servo_health import ForceFigures, ServoHealth
-from study_app.viewmodels.session import stages
 from tests.golden import compare
 from tests.golden_values import changed, value_lines
 from tests.gui.operator.session import ticks

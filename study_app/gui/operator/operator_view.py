@@ -3,22 +3,25 @@
 Nothing here says a liquid, a parameter or a delay; nor, in a double-blind study, a force or what a limiter did.
 """
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from itertools import groupby
+from statistics import median
+from typing import Final, Literal
 
 from study_app.devices.descriptor import Icon
+from study_app.gui.operator.servo_health import ForceFigures, Tile, Vitals, force_rows, health_tiles
+from study_app.gui.sessions.session_facts import operator_language, step_title
+from study_app.number_text import counted, grouped, minutes
 from study_app.protocol.model import Explore, Protocol, Reach
-from study_app.protocol.orders.schedule import FormStep, Schedule, Trial
+from study_app.protocol.orders.schedule import FormStep, Schedule, Step, Trial
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import words
 from study_app.store.delivered import Broken
 from study_app.store.journals.journal_events import Note
-from study_app.store.progress import Progress
+from study_app.store.progress import Progress, TrialAnswer
 from study_app.store.tables.columns import SEALED
-from study_app.viewmodels.number_words import grouped, minutes
-from study_app.viewmodels.servo_health import ForceFigures, Tile, Vitals, force_rows, health_tiles
-from study_app.viewmodels.session import Stage, operator_language, track_words, unanswered_words
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
 StepState = Literal["done", "now", "open"]
@@ -121,6 +124,19 @@ class OperatorView:
         """How far the session is: "2 of 10 trials"."""
         done, of = (sum(counts) for counts in zip(*self.main_trials, strict=True)) if self.main_trials else (0, 0)
         return f"{done} of {of} {'trial' if of == 1 else 'trials'}"
+
+
+# A block of more trials than this is one row of the rail ("Delay settings 1 to 7"), so that a day's study fits it.
+ROWS_PER_BLOCK = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One row of the rail: the schedule's steps ``first`` to ``last`` under one neutral ``label``."""
+
+    label: str
+    first: int
+    last: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -401,3 +417,91 @@ def _beyond(session: Session, progress: Progress) -> tuple[str, ...]:
 
 def _unit(measure: str) -> str:
     return "%" if measure in {"withheld_share", "targets_reached"} else "ms"
+
+
+def stages(protocol: Protocol, schedule: Schedule) -> tuple[Stage, ...]:
+    """Return the rows of the rail: pages and settings one by one, longer blocks as one row."""
+    language = operator_language(protocol)
+    rows: list[Stage] = []
+    index = 0
+    while index < len(schedule.steps):
+        step = schedule.steps[index]
+        if not isinstance(step, Trial):
+            rows.append(Stage(step_title(protocol, step, language), index, index))
+            index += 1
+            continue
+        last = index
+        while last + 1 < len(schedule.steps) and _same_block(step, schedule.steps[last + 1]):
+            last += 1
+        rows.extend(_block_rows(protocol, schedule, index, last, language))
+        index = last + 1
+    return tuple(rows)
+
+
+def _same_block(trial: Trial, other: Step) -> bool:
+    return isinstance(other, Trial) and other.block == trial.block
+
+
+def _block_rows(protocol: Protocol, schedule: Schedule, first: int, last: int, language: str) -> list[Stage]:
+    trials = [step for step in schedule.steps[first : last + 1] if isinstance(step, Trial)]
+    if len(trials) <= ROWS_PER_BLOCK:
+        return [Stage(trial.label(protocol, language), first + i, first + i) for i, trial in enumerate(trials)]
+    label = protocol.text(protocol.blocks[trials[0].block].setting_label, language)
+    return [Stage(f"{label} {trials[0].index} to {trials[-1].index}", first, last)]
+
+
+LONG_RUN: Final = 8
+"""So many equal answers in a row are marked."""
+UNDELIVERED: Final[Mapping[str, str]] = {
+    "lateness_ms": "the servo was late",
+    "worst_gap_ms": "the servo missed ticks",
+    "delay_error_ms": "the visual delay was not kept",
+    "frame_gap_ms": "frames were late or missing",
+    "withheld_percent": "force was withheld for safety",
+    "targets_percent": "too few targets were reached",
+    "level_error_percent": "the force was not as requested",
+    "level_error_ms": "the visual delays did not differ as requested",
+    "pace_error_percent": "the hand did not keep the pace",
+    "force_limit_n": "the force limit was reached",
+}
+"""Why an interval was invalid, by the key of the limit that it broke."""
+FAST_S: Final = 0.3
+"""A median time to answer below this is marked [s]."""
+
+
+def track_words(progress: Progress, schedule: Schedule, trial: Trial, choices: Mapping[str, str]) -> tuple[str, ...]:
+    """Return lines on the track of ``trial``; ``choices`` are its answers in words.
+
+    A line that ends in "check" deserves attention.
+    """
+    own = [one.number for one in schedule.trials if (one.block, one.code) == (trial.block, trial.code)]
+    answers = [progress.trial_answers[number] for number in own if number in progress.trial_answers]
+    limits = Counter(limit for number in own for limit in progress.undelivered.get(number, ()))
+    behind = [number for number in own if progress.steps.get(number, progress.here) < progress.here]
+    given_up = [number for number in behind if number in progress.undelivered and number not in progress.trial_answers]
+    reasons = Counter(reason for number in own for reason in progress.repeated.get(number, ()))
+    return (
+        f"Track {trial.code}: {len(answers)} of at most {grouped(len(own))} answered",
+        *(_of_answers(answers, choices) if answers else ()),
+        *(f"repeated {count}: {reason}" for reason, count in reasons.items()),
+        *(f"not delivered {count}: {UNDELIVERED.get(limit, limit)}" for limit, count in limits.items()),
+        *([f"{len(given_up)} unanswered: no attempt was delivered"] if given_up else []),
+    )
+
+
+def unanswered_words(progress: Progress) -> str:
+    """Return how many trials an ended session left unanswered since no attempt was delivered; "" for none."""
+    count = sum(number not in progress.trial_answers for number in progress.undelivered)
+    return f"{counted(count, 'trial')} unanswered: no attempt was delivered" if count else ""
+
+
+def _of_answers(answers: Sequence[TrialAnswer], choices: Mapping[str, str]) -> list[str]:
+    given = [str(one.value) for one in answers]
+    shares = ", ".join(f"{words} {100 * given.count(choice) / len(given):.0f} %" for choice, words in choices.items())
+    run = max(len(list(same)) for _, same in groupby(given))
+    lines = [*([shares] if shares else []), f"longest run {run}" + (": check" if run >= LONG_RUN else "")]
+    seconds = [one.seconds for one in answers if one.seconds is not None]
+    if seconds:
+        middle = median(seconds)
+        lines.append(f"median answer time {middle:.2f} s" + (": check" if middle < FAST_S else ""))
+    return lines

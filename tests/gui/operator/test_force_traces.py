@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from study_app.gui.operator.servo_health import ROWS, STEP_NS, TRACE_WINDOW_S, Forces
 from study_app.haptics.model.layout import (
     LIMITER_FADE,
     LIMITER_NORM,
@@ -14,7 +15,6 @@ from study_app.haptics.model.layout import (
     SAMPLE,
     records,
 )
-from study_app.viewmodels.servo_health import ROWS, STEP_NS, TRACE_WINDOW_S, Forces
 
 MS = 1_000_000
 

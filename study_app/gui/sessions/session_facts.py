@@ -1,13 +1,20 @@
-"""What a row says of a session, as values. No Qt here."""
+"""What is said of sessions: the rows of their tables, with chips and filters, and how much a session asks."""
 
 import contextlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from study_app.errors import StoreError
+from study_app.gui.theme.theme import Tone
+from study_app.number_text import counted, duration_range
+from study_app.protocol.describe import spread
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.durations import expected_duration_s, variants
+from study_app.protocol.orders.schedule import FormStep, PageStep
 from study_app.store import receipt
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
@@ -159,3 +166,147 @@ def started_words(started: datetime, now: datetime) -> str:
     day = {0: "Today", 1: "Yesterday"}.get(days, f"{started.day} {started:%b}")
     year = "" if started.year == now.year else f" {started.year}"
     return f"{day}{year} {started:%H:%M}"
+
+
+Name: TypeAlias = Literal["participant", "study", "started", "status", "validity", "answers", "version"]
+Chipped: TypeAlias = tuple[Tone, str, str]
+"""Tone, icon and word of a chip."""
+
+STATUS: dict[str, Chipped] = {
+    "completed": ("ok", "check", "Complete"),
+    "running": ("accent", "play", "Running"),
+    "unfinished": ("warn", "clock", "Interrupted"),
+    "withdrawn": ("neutral", "cross", "Withdrawn"),
+    "aborted": ("neutral", "cross", "Ended early"),
+    "broken": ("bad", "warning", "Fault"),
+    "damaged": ("bad", "warning", "Damaged"),
+}
+VALIDITY: dict[str | None, Chipped] = {
+    "valid": ("ok", "check", "Valid"),
+    "invalid": ("warn", "warning", "Out of limits"),
+    None: ("neutral", "ring", "Open"),
+}
+LOST: Chipped = ("warn", "warning", "Recording lost")
+
+
+class Column(NamedTuple):
+    """What a column holds, its heading, and its share of the width; at least ``least`` px of it."""
+
+    name: Name
+    heading: str
+    width: int
+    least: int
+
+
+def status_chip(facts: SessionFacts) -> Chipped:
+    """Return what the chip says of how a session ended."""
+    return STATUS.get(facts.status, ("neutral", "ring", facts.status.capitalize()))
+
+
+def validity_chip(facts: SessionFacts) -> Chipped:
+    """Return what the chip says of a session's limits and recordings, or that it does not count at all."""
+    if facts.excluded is not None:
+        return "neutral", "cross", "Excluded"
+    if facts.lost and facts.validity != "invalid":
+        return LOST
+    return VALIDITY[None if facts.needs_care or facts.status == "running" else facts.validity]
+
+
+def incidents(facts: SessionFacts) -> str:
+    """Return what happened to device, recordings and outlets: "2 recordings lost, device reconnected", or nothing."""
+    lost = f"{counted(facts.lost, 'recording')} lost" if facts.lost else ""
+    times = "" if facts.reconnected == 1 else f" {facts.reconnected} times"
+    outlets = f"{counted(facts.outlets_lost, 'outlet')} failed" if facts.outlets_lost else ""
+    return ", ".join(filter(None, (lost, f"device reconnected{times}" if facts.reconnected else "", outlets)))
+
+
+def answers_words(facts: SessionFacts) -> str:
+    """Return "12 of 62", or "12" where the whole is not known."""
+    return f"{facts.answers} of {facts.answers_of}" if facts.answers_of is not None else str(facts.answers)
+
+
+def matching(words: str, status: str) -> Callable[[SessionFacts], bool]:
+    """Return whether a session's participant holds ``words`` and its state is ``status`` ("" for any).
+
+    ``status`` is one of `STATUS`, "excluded", "invalid" or "lost".
+    """
+    wanted = words.strip().lower()
+
+    def matches(facts: SessionFacts) -> bool:
+        if wanted not in facts.participant.lower():
+            return False
+        if status == "excluded":
+            return facts.excluded is not None
+        if status == "lost":
+            return facts.lost > 0
+        return status in {"", facts.status} or (status == "invalid" and facts.validity == "invalid")
+
+    return matches
+
+
+def states_of(found: Iterable[SessionFacts]) -> list[tuple[str, str]]:
+    """Return the states that occur among sessions, with their words, in the order of `STATUS`."""
+    there = list(found)
+    states = [(status, word) for status, (_, _, word) in STATUS.items() if any(one.status == status for one in there)]
+    if any(one.validity == "invalid" for one in there):
+        states.append(("invalid", VALIDITY["invalid"][2]))
+    if any(one.lost for one in there):
+        states.append(("lost", LOST[2]))
+    if any(one.excluded is not None for one in there):
+        states.append(("excluded", "Excluded"))
+    return states
+
+
+def operator_language(protocol: Protocol) -> str:
+    """Return the language in which the operator reads a study's own texts: English, or the study's first."""
+    return "en" if "en" in protocol.study.languages else protocol.study.languages[0]
+
+
+def step_title(protocol: Protocol, step: PageStep | FormStep, language: str) -> str:
+    """Return the title of a page or form."""
+    if isinstance(step, FormStep):
+        return form_title(protocol, step.form, language)
+    return protocol.text(protocol.pages[step.page_id].title, language)
+
+
+def form_title(protocol: Protocol, form: str, language: str) -> str:
+    """Return the title of a form, or its id as words."""
+    title = protocol.questionnaires[form].title
+    return form.replace("_", " ").capitalize() if title is None else protocol.text(title, language)
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """Parts, settings, answers and expected duration [s] of each kind of session of a study.
+
+    ``setting`` is the word for what a trial presents: a "setting", or a "trial" where blocks have designs.
+    """
+
+    parts: tuple[int, ...]
+    settings: tuple[int, ...]
+    setting: str
+    answers: tuple[int, ...]
+    expected_s: tuple[float, ...]
+
+    @property
+    def duration(self) -> str:
+        """The expected duration, from that of the shortest kind of session to that of the longest."""
+        return duration_range(min(self.expected_s), max(self.expected_s))
+
+
+def extent_of(protocol: Protocol) -> Extent:
+    """Return how much the sessions of a study ask; of one session where its own protocol is given."""
+    sessions = [one.protocol for one in variants(protocol)]
+    orders = [orders_of(one) for one in sessions]
+    return Extent(
+        parts=tuple(one.parts for one in sessions),
+        settings=tuple(sum(block.trials for block in one.blocks if block.phase == "main") for one in orders),
+        setting="setting" if all(block.design is None for block in protocol.blocks.values()) else "trial",
+        answers=tuple(one.answers for one in orders),
+        expected_s=tuple(expected_duration_s(one) for one in sessions),
+    )
+
+
+def counted_each(numbers: Sequence[int], word: str) -> str:
+    """Return "1 part", "2 parts", or "1 to 2 parts" where sessions differ."""
+    return f"{spread(numbers)} {word}" if set(numbers) == {1} else f"{spread(numbers)} {word}s"

@@ -3,15 +3,9 @@
 import numpy as np
 import pytest
 
+from study_app.gui.operator.servo_health import LATENESS_WINDOW_S, TRACE_WINDOW_S, ServoHealth
+from study_app.gui.settings.display_test import KEPT_S, LEAST_S, FrameTimes
 from study_app.haptics.model.layout import SAMPLE, records
-from study_app.viewmodels.servo_health import (
-    KEPT_S,
-    LATENESS_WINDOW_S,
-    LEAST_S,
-    TRACE_WINDOW_S,
-    FrameTimes,
-    ServoHealth,
-)
 
 
 def samples(count, first=0, lateness_ns=15_000, period_ns=1_000_000):

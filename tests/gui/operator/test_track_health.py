@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
+from study_app.gui.operator.operator_view import UNDELIVERED, track_words, unanswered_words
 from study_app.protocol.model import Limits, Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.progress import Progress
-from study_app.viewmodels.session import UNDELIVERED, track_words, unanswered_words
 from tests.journal_lines import event_of
 from tests.protocol.trials.level_studies import study
 

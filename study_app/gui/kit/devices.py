@@ -14,7 +14,7 @@ from study_app.errors import DeviceError
 from study_app.store.workstation import REMEMBERED_OPTIONS, DeviceBench
 
 if TYPE_CHECKING:
-    from study_app.viewmodels.tones import Tone
+    from study_app.gui.theme.theme import Tone
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 import re
 
 from study_app import documentation
-from study_app.viewmodels.help import anchor_of, entries, found, text_of
+from study_app.gui.help.view import anchor_of, entries, found, text_of
 
 
 def test_every_page_is_listed_once_below_the_heading_of_its_section() -> None:

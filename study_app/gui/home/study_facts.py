@@ -1,21 +1,27 @@
 """What the home window says of protocols and sessions, as values. No Qt here."""
 
 import time
-from collections.abc import Iterable, Sequence
+import typing
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 from study_app.errors import ProtocolError, StudyError
+from study_app.gui.sessions.session_facts import (
+    SessionFacts,
+    counted_each,
+    extent_of,
+    operator_language,
+    started_words,
+    step_title,
+)
 from study_app.number_text import counted
-from study_app.protocol.describe import spread
 from study_app.protocol.load import at_hand, is_scene_file, load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.orders.durations import expected_duration_s, variants
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.protocol.source.files import find, shipped, shipped_file
 from study_app.protocol.wording.languages import language_name
@@ -29,48 +35,7 @@ from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.study_settings import kept_original
 from study_app.store.workstation import recent_protocols
-from study_app.viewmodels.number_words import duration_range
-from study_app.viewmodels.session import operator_language, step_title
-from study_app.viewmodels.sessions import SessionFacts, started_words
 from study_app.workspace import workspace
-
-
-@dataclass(frozen=True, slots=True)
-class Extent:
-    """Parts, settings, answers and expected duration [s] of each kind of session of a study.
-
-    ``setting`` is the word for what a trial presents: a "setting", or a "trial" where blocks have designs.
-    """
-
-    parts: tuple[int, ...]
-    settings: tuple[int, ...]
-    setting: str
-    answers: tuple[int, ...]
-    expected_s: tuple[float, ...]
-
-    @property
-    def duration(self) -> str:
-        """The expected duration, from that of the shortest kind of session to that of the longest."""
-        return duration_range(min(self.expected_s), max(self.expected_s))
-
-
-def extent_of(protocol: Protocol) -> Extent:
-    """Return how much the sessions of a study ask; of one session where its own protocol is given."""
-    sessions = [one.protocol for one in variants(protocol)]
-    orders = [orders_of(one) for one in sessions]
-    return Extent(
-        parts=tuple(one.parts for one in sessions),
-        settings=tuple(sum(block.trials for block in one.blocks if block.phase == "main") for one in orders),
-        setting="setting" if all(block.design is None for block in protocol.blocks.values()) else "trial",
-        answers=tuple(one.answers for one in orders),
-        expected_s=tuple(expected_duration_s(one) for one in sessions),
-    )
-
-
-def counted_each(numbers: Sequence[int], word: str) -> str:
-    """Return "1 part", "2 parts", or "1 to 2 parts" where sessions differ."""
-    return f"{spread(numbers)} {word}" if set(numbers) == {1} else f"{spread(numbers)} {word}s"
-
 
 SHIPPED: Final = "Shipped study"
 
@@ -152,20 +117,35 @@ def file_states(opened: Iterable[str]) -> frozenset[tuple[Path, int, int]]:
     return frozenset(states)
 
 
-def read_studies(opened: Iterable[str]) -> tuple[StudyFacts | BrokenFacts | DraftFacts, ...]:
+class DraftWords(typing.Protocol):
+    """What the study designer says of a draft."""
+
+    def draft_title(self, draft: str, folder: Path) -> str: ...
+
+    def edited_words(self, saved: str, draft: str, folder: Path) -> str: ...
+
+
+LoadWords: TypeAlias = Callable[[], DraftWords] | None
+"""Loads the designer's modules, only where there is a draft; None where a draft's content is not described."""
+
+
+def read_studies(
+    opened: Iterable[str], draft_words: LoadWords = None
+) -> tuple[StudyFacts | BrokenFacts | DraftFacts, ...]:
     """Return what is said of each study at hand: drafts first, the newest first of all, then ``opened`` ones."""
-    drafts = (_of_draft(file) for file in unsaved_files(workspace().protocols))
-    found = (*filter(None, drafts), *(study_facts(source) for source in dict.fromkeys((*opened, *sources()))))
+    drafts = (_of_draft(file, draft_words) for file in unsaved_files(workspace().protocols))
+    found = (
+        *filter(None, drafts),
+        *(study_facts(source, draft_words) for source in dict.fromkeys((*opened, *sources()))),
+    )
     return tuple(sorted(found, key=lambda it: 0.0 if it.draft is None else -_seconds(it.draft.kept_at)))
 
 
-def _of_draft(file: Path) -> DraftFacts | None:
+def _of_draft(file: Path, draft_words: LoadWords) -> DraftFacts | None:
     draft = draft_of(file)
     if draft is None:  # it was saved meanwhile
         return None
-    from study_app.designer.versions.draft_words import draft_title  # noqa: PLC0415 - the designer's modules: only for a draft
-
-    title = draft_title(draft.text, file.parent)
+    title = draft_words().draft_title(draft.text, file.parent) if draft_words else ""
     note = DraftNote(f"Draft of {time_words(draft.kept_at)}, never saved", draft.kept_at)
     return DraftFacts(str(file), title or file.stem, origin_of(str(file)), note)
 
@@ -207,14 +187,14 @@ def origin_of(source: str) -> str:
     return "Own study"
 
 
-def study_facts(source: str) -> StudyFacts | BrokenFacts:
+def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | BrokenFacts:
     """Load the protocol ``source`` and say what a researcher chooses by."""
     try:
         protocol = load(source)
     except ProtocolError as error:
         count = len(error.problems)
         others = f". Open it in the designer to see all {count} problems." if count > 1 else ""
-        return BrokenFacts(source, f"{error.problems[0]}{others}", origin_of(source), _draft_note(source))
+        return BrokenFacts(source, f"{error.problems[0]}{others}", origin_of(source), _draft_note(source, draft_words))
     language = operator_language(protocol)
     extent = extent_of(protocol)
     return StudyFacts(
@@ -233,19 +213,21 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
         duration=f"about {extent.duration}",
         needs=f"Haptic device or mouse; at most {protocol.device.force_limit_n:g} N",
         origin=origin_of(source),
-        draft=_draft_note(source),
+        draft=_draft_note(source, draft_words),
     )
 
 
-def _draft_note(source: str) -> DraftNote | None:
+def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
     """Return what is said of a draft: "Draft of today 14:02, not saved: Water"; None where all of it is saved."""
     with suppress(ProtocolError, OSError):
         file = find(source)
         draft, content = None if is_shipped(source) else draft_of(file), file.read_bytes()
         if draft is not None and draft.text.encode() != content:
-            from study_app.designer.versions.draft_words import edited_words  # noqa: PLC0415 - likewise
-
-            edited = edited_words(content.decode("utf-8", "replace"), draft.text, file.parent)
+            edited = (
+                draft_words().edited_words(content.decode("utf-8", "replace"), draft.text, file.parent)
+                if draft_words
+                else ""
+            )
             return DraftNote(f"Draft of {time_words(draft.kept_at)}, not saved{edited}", draft.kept_at)
     return None
 

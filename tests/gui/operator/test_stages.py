@@ -1,10 +1,10 @@
 """What the operator is told of a session's progress is what its journal holds."""
 
+from study_app.gui.operator.operator_view import stages
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.delivered import within_limits
 from study_app.store.progress import Progress
-from study_app.viewmodels.session import stages
 from tests.journal_lines import event_of
 
 

@@ -1,1 +1,0 @@
-"""What windows show, as values without Qt."""
