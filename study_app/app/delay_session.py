@@ -172,7 +172,6 @@ class _Showing:
         self._ended = False
 
     def run(self) -> tuple[Shown, ...]:
-        """Run the session and return what was shown in it."""
         rig = open_rig(self._chosen.device, study_settings(self._protocol, self._chosen.tremor()))
         schedule = self._chosen.schedule(self._protocol)
         try:
@@ -285,7 +284,6 @@ class WindowsThread(QObject):
 
     @property
     def frames(self) -> int:
-        """How many frames of the tank were painted so far."""
         return self._painting.frames if self._painting is not None else 0
 
     def during(self, work: Callable[[], T]) -> T:
@@ -401,7 +399,6 @@ class Painting(QObject):
         return participant, operator
 
     def begin(self) -> None:
-        """Open the windows and paint from now on."""
         self.operator.show()
         self.participant.open_on(choose_screens(None)[0])
         self.participant.show_page(self._page)

@@ -37,19 +37,15 @@ class UncaughtExceptions:
         self.previous = sys.excepthook
 
     def install(self) -> None:
-        """Replace the hook."""
         self.previous, sys.excepthook = sys.excepthook, self.hook
 
     def remove(self) -> None:
-        """Restore the previous hook."""
         sys.excepthook = self.previous
 
     def __enter__(self) -> None:
-        """Install."""
         self.install()
 
     def __exit__(self, *_: object) -> None:
-        """Remove."""
         self.remove()
 
     def hook(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
@@ -70,11 +66,9 @@ class ThreadExceptions(QObject):
         self._ended.connect(self.ended, Qt.ConnectionType.QueuedConnection)
 
     def install(self) -> None:
-        """Replace the hook."""
         self._previous, threading.excepthook = threading.excepthook, self._hook
 
     def remove(self) -> None:
-        """Restore the previous hook."""
         threading.excepthook = self._previous
 
     def _hook(self, what: threading.ExceptHookArgs) -> None:

@@ -78,7 +78,6 @@ class LabAndDesigner(QObject):
         return self.designer.place
 
     def open_designer(self, source: str) -> None:
-        """Go to the study designer with a study."""
         self._go_to_designer(lambda designer: designer.open(source))
 
     def show_version(self, session: SessionFacts) -> None:
@@ -114,7 +113,6 @@ class LabAndDesigner(QObject):
             self.designer.feeling.put_back(side, setting)
 
     def show_results(self, results: Path) -> None:
-        """Look for the runs of a study in another folder from now on."""
         self._results = results
         if self.designer is not None:
             self.designer.editing.results = results
@@ -127,7 +125,6 @@ class LabAndDesigner(QObject):
             self.lab.end(patience)
 
     def end_by_signal(self, number: int) -> None:
-        """End what plays because the program is being ended from outside."""
         if self.playing is not None:
             self.playing.end_by_signal(number)
 

@@ -87,12 +87,10 @@ class WorkstationController(QObject):
             self._keep(made)
 
     def measured(self, mean_ms: float, spread_ms: float, how: str, screen: str) -> None:
-        """Set the display offset that was measured today on a screen."""
         offset = {"mean_ms": mean_ms, "spread_ms": spread_ms, "how": how, "screen": screen}
         self.change({"display_offset": DisplayOffset.model_validate(offset | {"measured": date.today().isoformat()})})
 
     def undo(self) -> None:
-        """Take the last change back."""
         if self._before:
             kept = {"operator": self.settings.operator, "recent": self.settings.recent}
             self._keep(self._before.pop()[1].model_copy(update=kept))
@@ -159,7 +157,6 @@ class DevicesController(QObject):
         return device_named(self._workstation.settings.device, self.shown)
 
     def make_place(self) -> DevicesPlace:
-        """Return the devices' place."""
         place = self.place = DevicesPlace()
         place.look_asked.connect(self.look)
         place.chosen.connect(lambda name: self._workstation.change({"device": name}))

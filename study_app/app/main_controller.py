@@ -232,7 +232,6 @@ class MainController(QObject):
         wait_for_jobs(min(patience.left_s, JOBS_PATIENCE_S))
 
     def end_by_signal(self, number: int) -> None:
-        """End because the program is being ended from outside."""
         self.code = 128 + number
         if self.live is not None:
             self.live.end_by_signal(number)

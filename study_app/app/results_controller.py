@@ -141,7 +141,6 @@ class ResultsController(QObject):
         return bool(self._orders) or self._writer is not None
 
     def show_results(self, results: Path) -> None:
-        """Look for studies elsewhere from now on."""
         self.results = results
         self.view = ResultsView()
         self.place.hand_to(results.resolve().parent)

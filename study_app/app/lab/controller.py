@@ -168,7 +168,6 @@ class LabController(QObject):
             log.error("the lab failed: %s", error, exc_info=error)
 
     def view(self) -> LabView:
-        """Return what is to be seen now."""
         return lab_view(
             self.bench,
             self.live,
@@ -367,7 +366,6 @@ class LabController(QObject):
             self.trouble = ""
 
     def _let_go(self) -> None:
-        """End with the device in the order of safety."""
         live, self.live = self.live, None
         if live is not None:
             live.close()

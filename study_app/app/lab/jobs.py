@@ -53,7 +53,6 @@ class Prices:
         self._asked, self.waits = self._appraiser.order(Question(scene)), True
 
     def take(self) -> None:
-        """Take what was answered since."""
         for number, answer in () if self._appraiser is None else self._appraiser.answers():
             if number != self._asked:
                 continue
@@ -65,7 +64,6 @@ class Prices:
                 self.waits = False
 
     def close(self) -> None:
-        """End the process."""
         appraiser, self._appraiser, self.waits = self._appraiser, None, False
         if appraiser is not None:
             appraiser.close()
@@ -196,7 +194,6 @@ class LabSaving(QObject):
         self._done.connect(self._tell, Qt.ConnectionType.QueuedConnection)
 
     def save(self, path: Path, setting: Setting) -> None:
-        """Write a setting as a preset to ``path``."""
         self._begin(partial(self._save, path, setting), (str(path),))
 
     def use(self, study: Path, setting: Setting) -> None:

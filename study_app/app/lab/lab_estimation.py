@@ -87,7 +87,6 @@ class LabEstimation(QObject):
             executor.shutdown(wait=False, cancel_futures=True)
 
     def shown(self) -> EstimateShown:
-        """Return what is to be seen now."""
         source, parameters, _ = self._wanted
         shown = EstimateShown(self._sources, source, parameters, message=self._trouble)
         if source == OFF:

@@ -143,7 +143,6 @@ class SessionBridge(QObject):
             self.monitor.health.frames_rest()
 
     def start(self) -> None:
-        """Begin the session."""
         self.uncaught.install()
         self._thread_exceptions.install()
         freeze_garbage()
@@ -257,7 +256,6 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def show_traces(self) -> None:
-        """Draw the newest traces of the hand."""
         self.monitor.show_traces(self.operator)
 
     @guarded_session_slot
@@ -295,7 +293,6 @@ class SessionBridge(QObject):
             self._called = view.state == "trouble"
 
     def view(self) -> OperatorView:
-        """Return what the operator is to see now."""
         trouble = (self.parts.journal.progress.broke and self.runner.cause) or self.trouble
         view, again = self.monitor.view(trouble, self.runner.stalled), self.reconnection
         if again is None or not self.runner.state.lost_device:

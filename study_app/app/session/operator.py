@@ -63,7 +63,6 @@ class WatchedJournal:
         self._store.check_flushed()
 
     def write_tables(self) -> None:
-        """Bring the tables up to date."""
         self._store.write_tables()
 
     def finish(self, status: str, reason: str = "") -> None:
@@ -233,7 +232,6 @@ class OperatorRequests(QObject):
             strip.stop_asked.connect(self._stop_force)
 
     def fail(self, error: BaseException) -> None:
-        """Pass on an exception of a request."""
         self._fail(error)
 
     def record_note(self, text: str) -> None:

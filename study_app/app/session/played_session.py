@@ -28,7 +28,6 @@ class PlayedSession(LiveSession):
 
     @property
     def began(self) -> bool:
-        """Whether its window was shown."""
         return self._shown
 
     def open_windows(self, made: object) -> Iterator[None]:

@@ -86,13 +86,11 @@ class Playing(QObject):
 
     @property
     def under_way(self) -> bool:
-        """Whether a pilot is prepared or played."""
         return self._preparing.busy or (self.pilot is not None and self.pilot.session is not None)
 
     # what is asked for
 
     def choose_device(self, name: str) -> None:
-        """Play with another device from now on."""
         self.device = name
         self._show_devices()
 
@@ -175,7 +173,6 @@ class Playing(QObject):
         pilot.session.open()
 
     def _end(self) -> None:
-        """Ask whether the data of a pilot that began are kept."""
         pilot = self.pilot
         if pilot is None or pilot.session is None:
             return
@@ -192,7 +189,6 @@ class Playing(QObject):
             self._show(None)
 
     def _keep(self) -> None:
-        """Keep the pilot's data in a folder of its own among the results."""
         pilot = self.pilot
         if pilot is None or pilot.choices is None or pilot.session is not None:
             return
@@ -209,7 +205,6 @@ class Playing(QObject):
         self.kept.emit(to)
 
     def end_by_signal(self, number: int) -> None:
-        """End because the program is being ended from outside."""
         if self.pilot is not None and self.pilot.session is not None:
             self.pilot.session.end_by_signal(number)
 
@@ -224,7 +219,6 @@ class Playing(QObject):
         self._delete()
 
     def _forget(self) -> None:
-        """Stop and delete what was played of the study before."""
         self.stop()
         self._delete()
         self._asked = None

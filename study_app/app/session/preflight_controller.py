@@ -90,7 +90,6 @@ class Appraisal:
             self._asked = self.appraiser.order(Question(scene, stroke, self.dynamics))
 
     def close(self) -> None:
-        """Close the appraiser."""
         self.appraiser.close()
 
 
@@ -136,7 +135,6 @@ class Preflight(QObject):
         self._timer.start(LOOK_MS)
 
     def open(self) -> None:
-        """Show what was found."""
         self._show()
         place(self.window, self.window.screen(), corner=False)
         self.window.show()

@@ -104,7 +104,6 @@ class DeviceList(Card):
             row.show_bench(benches.get(name.partition(":")[0]))
 
     def mark(self, kind: str) -> None:
-        """Mark the device that sessions begin with."""
         for name, row in self.rows.items():
             if isinstance(row.title, Radio):
                 row.title.setChecked(name == kind)
@@ -259,7 +258,6 @@ class DevicesPlace(Place):
         self.refresh.show_action("repeat", "Looking …" if looking else "Refresh")
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Make room: move the side column below."""
         super().resizeEvent(event)
         stacked = self.width() < STACKED_BELOW
         way = QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight

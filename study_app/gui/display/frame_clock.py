@@ -38,7 +38,6 @@ class Frames(QObject):
 
     @property
     def locked(self) -> bool:
-        """Whether frames follow the swaps of a surface now."""
         swapped_ns = self._swapped_ns
         return swapped_ns is not None and self._now_ns() - swapped_ns < STALE_REFRESHES * self.period_ns
 
@@ -51,7 +50,6 @@ class Frames(QObject):
         return self._next_ns
 
     def start(self) -> None:
-        """Begin to ask for frames."""
         self._next_ns = self._now_ns() + self.period_ns
         self._arm()
 

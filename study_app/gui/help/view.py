@@ -166,7 +166,6 @@ class PageReader(Themed, QTextBrowser):
             self._scroll_to(anchor)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         self.setStyleSheet(f"QTextBrowser {{ background: {theme.surface}; color: {theme.text}; }}")
         if self.page:
@@ -337,7 +336,6 @@ class HelpPlace(Place):
         vbox(head, (body, 1), spacing=14, margins=(24, 24, 24, 18), parent=self)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         row = f"border-radius: 6px; padding-left: 6px; color: {theme.text};"
         chosen = f"background: {theme.selected}; color: {theme.accent};"

@@ -375,7 +375,6 @@ class CardGrid(QWidget):
 
     @property
     def whole_height(self) -> int:
-        """The height of all rows at the width that they have."""
         grows = self._grid.hasHeightForWidth()
         return self._grid.totalHeightForWidth(self.width()) if grows else self._grid.totalSizeHint().height()
 
@@ -388,7 +387,6 @@ class CardGrid(QWidget):
         self.arrange(self.width())
 
     def leave_room(self, width: int) -> None:
-        """Leave so much room free at the right."""
         self._grid.setContentsMargins(0, 0, width, 0)
 
     def event(self, event: QEvent) -> bool:

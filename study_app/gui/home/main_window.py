@@ -69,7 +69,6 @@ class RailButton(Themed, PressedByEnter):
         self.narrow(False)
 
     def narrow(self, yes: bool) -> None:
-        """Stand in a narrow rail or a wide one."""
         self._narrow = yes
         self.setText(self.short if yes else self.word)
         self.updateGeometry()
@@ -160,7 +159,6 @@ class Rail(Themed, QWidget):
             button.here = other == name
 
     def narrow(self, yes: bool) -> None:
-        """Take less room in a small window."""
         self.setFixedWidth(NARROW_RAIL if yes else WIDE_RAIL)
         margin = NARROW_MARGIN if yes else WIDE_MARGIN
         self._column.setContentsMargins(margin, 20, margin, 16)
@@ -170,7 +168,6 @@ class Rail(Themed, QWidget):
             button.narrow(yes)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme`` and offer the other."""
         super().apply_theme(theme)
         word = "Light" if theme.dark else "Dark"
         self.switch.say("sun" if theme.dark else "moon", f"{word} theme", word)
@@ -330,7 +327,6 @@ class MainWindow(QMainWindow):
             self.notice.accept()
 
     def show_theme(self, theme: Theme) -> None:
-        """Wear a theme from now on."""
         if theme is not self.theme:
             self.theme = theme
             apply_theme(self, theme)
@@ -344,7 +340,6 @@ class MainWindow(QMainWindow):
         self.rail.narrow(self.width() < NARROW_BELOW or (here is not None and here.wants_narrow_rail()))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Make room: the rail becomes narrow in a small window."""
         super().resizeEvent(event)
         self._arrange()
 

@@ -73,7 +73,6 @@ class OpeningWindow(QWidget):
         self.step.setText(line)
 
     def finish(self) -> None:
-        """Close because all is ready."""
         self._done = True
         self._timer.stop()
         self.close()

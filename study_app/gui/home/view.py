@@ -187,7 +187,6 @@ class HomePlace(Place):
 
     @property
     def reading(self) -> bool:
-        """Whether the protocols or the results folder are being read."""
         return self._studies.busy or self._reader.busy
 
     def show_results(self, results: Path) -> None:
@@ -319,7 +318,6 @@ class HomePlace(Place):
         self._open(page)
 
     def end(self) -> None:
-        """Stop a rehearsal that is under way."""
         for dialog in self.findChildren(RehearsalDialog):
             dialog.end()
 
@@ -365,7 +363,6 @@ class HomePlace(Place):
         return moved
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Make room: cards go below each other."""
         super().resizeEvent(event)
         self._arrange()
 

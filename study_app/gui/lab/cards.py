@@ -413,7 +413,6 @@ class FlowCurvePlot(Plot):
             curve.setData(*((EMPTY, EMPTY) if it is None else (np.log10(RATES_PER_S), np.log10(it))))
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         for curve, style in zip(self.curves, STYLES, strict=True):
             curve.setPen(self.stroke(style.colour(theme), style.width, DASH[style.stroke]))
@@ -440,7 +439,6 @@ class FlowCurveCard(PlotCard):
         self.column.addWidget(note)
 
     def show_curves(self, a: SteadyCurves, b: SteadyCurves) -> None:
-        """Draw both flow curves."""
         self.legend.show_entries(((A, _name("A", a)), (B, _name("B", b))))
         self.stresses.show_stresses((b.stress_pa, a.stress_pa))
 
@@ -453,7 +451,6 @@ class SteadyForceCard(PlotCard):
         super().__init__("Force over speed", "N over m/s", self.forces, FORCE_SENTENCE)
 
     def show_curves(self, a: SteadyCurves, b: SteadyCurves, limit_n: float) -> None:
-        """Draw both forces."""
         self.legend.show_entries(((A, "A"), (B, "B"), (LIMIT, f"limit {limit_n:g} N")))
         self.forces.show_curves(SPEEDS_MPS, (b.force_n, a.force_n), limit_n)
 

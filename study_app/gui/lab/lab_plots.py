@@ -54,7 +54,6 @@ class Legend(Themed, QWidget):
         self.setFixedHeight(LEGEND_LINE)
 
     def show_entries(self, entries: tuple[tuple[CurveStyle, str], ...]) -> None:
-        """Name the curves."""
         if entries != self._entries:
             self._entries = entries
             self.setAccessibleName(", ".join(words for _, words in entries))
@@ -129,7 +128,6 @@ class CurvePlot(Plot):
             self.limit.setPos(limit)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         for curve, style in zip(self.curves, self._styles, strict=True):
             curve.setPen(self.stroke(style.colour(theme), style.width, DASH[style.stroke]))
@@ -186,7 +184,6 @@ class ForceCard(PlotCard):
         super().__init__("Force on the hand", f"N, last {SPAN_S:g} s", CurvePlot((B, A), 1.0), FORCE_SENTENCE)
 
     def show_view(self, view: LabView) -> None:
-        """Draw both forces as of now."""
         self.show_blind(view.workbench.blind)
         if view.workbench.blind:
             return
@@ -208,7 +205,6 @@ class SpeedCard(PlotCard):
         self.legend.show_entries(((BODY, "body"), (A, "wake of A"), (B, "wake of B")))
 
     def show_view(self, view: LabView) -> None:
-        """Draw the speeds as of now."""
         self.show_blind(view.workbench.blind)
         if view.workbench.blind:
             return

@@ -230,7 +230,6 @@ class LabTank(Themed, QWidget):
         return QSize(784, 470)
 
     def show_view(self, view: LabView) -> None:
-        """Draw the tank as of now."""
         self._view = view
         if view.workspace_m != self._workspace_m:
             self._workspace_m = view.workspace_m
@@ -244,7 +243,6 @@ class LabTank(Themed, QWidget):
         self.update()
 
     def let_go(self) -> None:
-        """Give the pointer back."""
         if self.pointer.held:
             self.pointer.release()
             self.update()

@@ -126,7 +126,6 @@ class NumberRow(ParameterRow):
         self.slider.let_go()
 
     def parts(self) -> tuple[QWidget, ...]:
-        """Return slider and field."""
         return self.slider, self.field
 
     def _text(self, value: float) -> str:
@@ -194,7 +193,6 @@ class ChoiceRow(ParameterRow):
             part.setFont(font("label", weight=600 if row.changed else None))
 
     def parts(self) -> tuple[QWidget, ...]:
-        """Return the list."""
         return (self.choice,)
 
     def _choose(self, index: int) -> None:
@@ -222,7 +220,6 @@ class SwitchRow(ParameterRow):
         self.toggle.setFont(font("label", weight=600 if row.changed else None))
 
     def parts(self) -> tuple[QWidget, ...]:
-        """Return the switch."""
         return (self.toggle,)
 
     def _switch(self, on: bool) -> None:

@@ -211,7 +211,6 @@ class LabPlace(Place):
         dialog.show()
 
     def ask_which_to_open(self) -> None:
-        """Ask for a preset's file."""
         if self._free_to_ask() is not None:
             dialog = self._file_dialog("Open preset", "Presets and protocols")
             dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
@@ -219,7 +218,6 @@ class LabPlace(Place):
             dialog.show()
 
     def ask_which_study(self) -> None:
-        """Ask for the study that is to use the felt setting."""
         if (setting := self._free_to_ask()) is not None:
             dialog = self._file_dialog(f"Use {setting.title} in a study", "Protocols")
             dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
@@ -227,7 +225,6 @@ class LabPlace(Place):
             dialog.show()
 
     def put_back(self) -> None:
-        """Ask that the study that is edited takes the felt setting back."""
         if (setting := self._free_to_ask()) is not None and self._view is not None:
             self.put_back_asked.emit(self._view.felt, setting)
 

@@ -75,7 +75,6 @@ class Actions(Card):
         self.pause.show_action(sign if self._signs else "", words)
 
     def show_view(self, view: OperatorView) -> None:
-        """Offer what is possible now and say what it does."""
         self._resumes = view.may_resume
         self._show_pause()
         self.pause.setEnabled(view.may_pause or view.may_resume)

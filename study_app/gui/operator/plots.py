@@ -82,7 +82,6 @@ class ForcePlot(TracePlot):
             self.limit_name.setPos(QPointF(-1.01 * self._span_s, self.limit_n))
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         self.curves[3].setPen(self.stroke(theme.text3, 1.4))
         self.ends[3].setColor(QColor(theme.text3))
@@ -141,7 +140,6 @@ class WakePlot(Plot):
         self.box.setXRange(-1.02 * TRACE_WINDOW_S, self._right or 0.08 * TRACE_WINDOW_S, padding=0)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         self.curve.setPen(self.stroke(theme.accent, STROKE))
 
@@ -188,7 +186,6 @@ class LatenessCard(Card):
         add_parts(self.column, (self.plot, 1), axes)
 
     def show_health(self, health: ServoHealth) -> None:
-        """Draw the ticks as of now."""
         edges, counts = health.lateness_histogram()
         p99 = health.vitals().lateness_p99_s
         self.plot.show_histogram(edges, counts, None if p99 is None else p99 * 1e6)
@@ -206,7 +203,6 @@ class PositionCard(Card):
         self.column.addWidget(self.plot, 1)
 
     def show_health(self, health: ServoHealth, now_s: float) -> None:
-        """Draw the curves as of now."""
         times, positions = health.trace(now_s)
         self.plot.show_traces(times, positions * 1000)
 
@@ -274,7 +270,6 @@ class Tiles(QWidget):
         self.narrow(False)
 
     def narrow(self, yes: bool) -> None:
-        """Stand two by two in a small window."""
         self.across = across = 2 if yes else 4
         for index, card in enumerate(self.cards):
             self._grid.addWidget(card, index // across, index % across)

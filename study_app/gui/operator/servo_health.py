@@ -114,7 +114,6 @@ class ServoHealth:
         self._last_frame_ns = 0
 
     def vitals(self) -> Vitals:
-        """Return the figures as of now."""
         gaps = self._frame_gaps_ns[: min(self._frames, len(self._frame_gaps_ns))]
         return Vitals(
             rate_hz=self._rate(),
@@ -279,7 +278,6 @@ class Forces:
         return times_s[recent], rows[:, : SIZE + 1], rows[:, WAKE]
 
     def figures(self) -> ForceFigures:
-        """Return shares and counts as of now."""
         counted = tuple(
             (limiter.label.lower(), int(count)) for limiter, count in zip(LIMITERS, self._limited, strict=True) if count
         )

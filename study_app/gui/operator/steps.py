@@ -43,7 +43,6 @@ class Now(QWidget):
         self.lie_flat(False)
 
     def lie_flat(self, yes: bool) -> None:
-        """Put the time next to the words instead of under them."""
         self._grid.addWidget(self._words, 0, 0)
         self._grid.addWidget(self._time, 0 if yes else 1, 1 if yes else 0)
         self._grid.setColumnStretch(0, 3)
@@ -96,7 +95,6 @@ class Tally(QWidget):
         self._grid.setVerticalSpacing(8)
 
     def lie_flat(self, yes: bool) -> None:
-        """Stand in one row instead of one below the other."""
         self._flat = yes
         self._place()
 
@@ -234,7 +232,6 @@ class Rail(Card):
         self._be(slim=True)
 
     def narrow(self, yes: bool) -> None:
-        """Take less room in a smaller window."""
         self.setFixedWidth(SLIM if self._slim else NARROW if yes else WIDTH)
 
     def _be(self, *, slim: bool) -> None:

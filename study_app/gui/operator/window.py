@@ -338,7 +338,6 @@ class OperatorWindow(QMainWindow):
         notice.show()
 
     def ask_to_end(self) -> None:
-        """Ask whether and why the session is to end now."""
         if self._already_asked() or self._view is None or self._view.over:
             return
         question = ReasonQuestion(
@@ -365,7 +364,6 @@ class OperatorWindow(QMainWindow):
         question.show()
 
     def come_forward(self) -> None:
-        """Move the window in front of every other window of its screen."""
         self.raise_()
         self.activateWindow()
 

@@ -69,7 +69,6 @@ class ChoiceField(OptionsField):
 
     @property
     def note(self) -> str:
-        """The small line under the words says that several can be chosen."""
         note = super().note
         return " · ".join(filter(None, (self._words.several_possible, note))) if self.several else note
 
@@ -79,16 +78,13 @@ class ChoiceField(OptionsField):
 
     @property
     def chosen(self) -> tuple[int, ...]:
-        """The places of the options that are chosen."""
         given = self.value if isinstance(self.value, tuple) else (self.value,)
         return tuple(place for place, one in enumerate(self._ids) if one in given)
 
     def value_at(self, place: int) -> Value:
-        """Return the option."""
         return self._ids[place]
 
     def spoken(self) -> str:
-        """Return the words of what was chosen."""
         return self._words.joined([self._texts[self._ids[place]] for place in self.chosen])
 
     def height_in(self, width: int, room: int) -> int:
@@ -106,7 +102,6 @@ class ChoiceField(OptionsField):
             self._cells.setColumnStretch(column, 1 if column < across else 0)
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         super().set_scale(scale)
         self._cells.setSpacing(round(8 * scale))
 
@@ -175,13 +170,11 @@ class NumberField(TypedField):
             self._write(write_number(value, 9))
 
     def clear(self) -> None:
-        """Empty the field."""
         self._timer.stop()
         self._write("")
         self._say("")
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         super().set_scale(scale)
         side = round(target_px(scale))
         self.entry.setFont(font("cell", scale=scale, tabular=True))
@@ -202,7 +195,6 @@ class NumberField(TypedField):
         return height
 
     def typed(self) -> str:
-        """Return what was typed."""
         return self.entry.text()
 
     def finish(self) -> bool:
@@ -299,7 +291,6 @@ class RatingField(ScaleField):
         self._name_points()
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         super().set_scale(scale)
         self.cells.setSpacing(round(6 * scale))
         self.row.setSpacing(round(14 * scale))
@@ -362,7 +353,6 @@ class Line(QSlider):
         self.valueChanged.connect(self._hear)
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         self._scale = scale
         self.setFixedHeight(round(target_px(scale)))
 
@@ -494,18 +484,15 @@ class SliderField(QuestionField):
         self._tell_line()
 
     def clear(self) -> None:
-        """Take the handle away."""
         self.line.touched = False
         self.line.update()
         self._tell_line()
 
     def give(self, value: Value) -> None:
-        """Take the place of the handle."""
         super().give(value)
         self._tell_line()
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         super().set_scale(scale)
         self.line.set_scale(scale)
         for end in self._ends:
@@ -561,14 +548,12 @@ class TextField(TypedField):
         self.entry.blockSignals(False)
 
     def clear(self) -> None:
-        """Empty the field."""
         self.entry.blockSignals(True)
         self.entry.clear()
         self.entry.blockSignals(False)
         self._timer.stop()
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         super().set_scale(scale)
         face = font("statement", scale=scale)
         self.entry.setFont(face)
@@ -586,7 +571,6 @@ class TextField(TypedField):
         return True
 
     def typed(self) -> str:
-        """Return what was typed."""
         return self.entry.toPlainText()
 
     def _edit(self) -> None:

@@ -127,7 +127,6 @@ class TankWidget(QWidget):
 
     @property
     def resting(self) -> bool:
-        """Whether a rest between two intervals is shown."""
         return self._page.interval is not None and self._page.interval.resting
 
     @property
@@ -143,7 +142,6 @@ class TankWidget(QWidget):
 
     @property
     def time_is_up(self) -> bool:
-        """Whether the task shown ended because its time is over."""
         return self.view is not None and self.view.task.elapsed_s >= self._page.task.limit_s
 
     def sizeHint(self) -> QSize:

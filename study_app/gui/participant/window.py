@@ -175,7 +175,6 @@ class ParticipantWindow(QWidget):
         self.activateWindow()
 
     def come_forward(self) -> None:
-        """Move the window in front of every other window of its screen."""
         self.raise_()
         self.activateWindow()
 

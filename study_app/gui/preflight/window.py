@@ -378,7 +378,6 @@ class PreflightWindow(QWidget):
             self._values[name].setText(words)
 
     def values(self) -> tuple[QLabel, ...]:
-        """Return the values of what will run."""
         return tuple(self._values.values())
 
     def _start(self) -> None:
@@ -432,7 +431,6 @@ class MaskingQuestion(QWidget):
         return bool(self.means.currentData() == "noise")
 
     def answer(self) -> Masking:
-        """Return what was chosen."""
         return Masking(self.means.currentData(), self.noise_db.value() if self._is_noise else None)
 
 

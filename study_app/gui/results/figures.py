@@ -93,7 +93,6 @@ class FigureView(Themed, QWidget):
 
     @property
     def settled(self) -> bool:
-        """Whether what is shown is what was asked for last."""
         return self._drawing is None and not self._image.isNull()
 
     def show_figure(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
@@ -107,7 +106,6 @@ class FigureView(Themed, QWidget):
         self._ask()
 
     def apply_theme(self, theme: Theme) -> None:
-        """Draw in the colours of ``theme``."""
         super().apply_theme(theme)
         self._ask()
 
@@ -224,7 +222,6 @@ class FigureCard(Card):
             self.more.raise_()
 
     def fit(self, width: int) -> None:
-        """Draw the figure so wide."""
         size = QSize(width, 0 if self.drawing is None else self.drawing.heightForWidth(width))
         if self.drawing is not None and self.drawing.maximumSize() != size:
             self.drawing.setFixedSize(size)

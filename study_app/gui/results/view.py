@@ -255,7 +255,6 @@ class ResultsPlace(Place):
         vbox(self.area, margins=0, parent=self)
 
     def hand_to(self, folder: Path) -> None:
-        """Suggest another folder to write into from now on."""
         self._handed_to = folder
 
     def enter(self) -> None:
@@ -263,11 +262,9 @@ class ResultsPlace(Place):
         self.entered.emit()
 
     def leave(self) -> None:
-        """Let go of everything that is being read."""
         self.left.emit()
 
     def wants_narrow_rail(self) -> bool:
-        """Return that the figures need the width."""
         return True
 
     def show_view(self, view: ResultsView) -> None:

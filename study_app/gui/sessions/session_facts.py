@@ -77,12 +77,10 @@ class SessionFacts:
 
     @property
     def needs_care(self) -> bool:
-        """Whether it was begun and never ended."""
         return self.status in {"unfinished", "damaged"}
 
     @property
     def counts(self) -> bool:
-        """Whether its answers enter measures and figures."""
         return self.status == "completed" and self.excluded is None
 
     @property

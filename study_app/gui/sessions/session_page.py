@@ -270,7 +270,6 @@ class TrialsModel(QAbstractTableModel):
         self.trials: tuple[TrialRecord, ...] = ()
 
     def show(self, trials: tuple[TrialRecord, ...]) -> None:
-        """Hold these trials in place of those before."""
         self.beginResetModel()
         self.trials = trials
         self.endResetModel()
@@ -286,7 +285,6 @@ class TrialsModel(QAbstractTableModel):
         return HEADINGS[section] if across else None
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Return what a cell says."""
         trial, heading = self.trials[index.row()], HEADINGS[index.column()]
         chip = trial_chip(trial) if heading == "Limits" else None
         if role == CHIP_ROLE:

@@ -36,7 +36,6 @@ class SessionsModel(QAbstractTableModel):
         self.shown: tuple[SessionFacts, ...] = ()
 
     def show(self, found: Sequence[SessionFacts], now: datetime) -> None:
-        """Hold these sessions in place of those before."""
         self._every, self._now = tuple(found), now
         self.keep(self._matches)
 
@@ -60,7 +59,6 @@ class SessionsModel(QAbstractTableModel):
         return None
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Return what a cell says."""
         facts, name = self.shown[index.row()], self.columns[index.column()].name
         chip = {"status": status_chip, "validity": validity_chip}.get(name)
         match role:
@@ -162,12 +160,10 @@ class SessionsTable(QWidget):
         self._choose(before)
 
     def open_chosen(self) -> None:
-        """Open the row that is chosen."""
         if self.chosen is not None:
             self.opened.emit(self.chosen)
 
     def ask_for_version(self) -> None:
-        """Ask for the version of the row that is chosen."""
         if self.chosen is not None and self.chosen.version:
             self.version_asked.emit(self.chosen)
 

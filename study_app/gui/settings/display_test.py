@@ -344,7 +344,6 @@ class DisplayTest(QWidget):
         self.offset.forgotten.connect(self.forgotten)
 
     def open_on(self, screen: QScreen) -> None:
-        """Fill a screen and begin."""
         self.setScreen(screen)
         self.setGeometry(screen.geometry())
         self.showFullScreen()
@@ -352,7 +351,6 @@ class DisplayTest(QWidget):
         self.begin()
 
     def begin(self) -> None:
-        """Begin to paint and to count."""
         self._toggled_ns = self._now_ns()
         self.frames.start()
         self.report_timer.start()

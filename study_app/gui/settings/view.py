@@ -240,7 +240,6 @@ class MachinePlace(Place):
         self._show()
 
     def leave(self) -> None:
-        """Take the numbers and the test off the screens."""
         for one in self.numbers:
             one.close()
             one.deleteLater()
@@ -293,7 +292,6 @@ class MachinePlace(Place):
             one.showFullScreen()
 
     def open_test(self) -> None:
-        """Fill the participant's screen with the display test."""
         if self.test is not None:
             return
         there, screens = self.participants, QGuiApplication.screens()

@@ -12,7 +12,6 @@ class Themed:
     theme: Theme = LIGHT
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme`` from now on."""
         self.theme = theme
         if isinstance(self, QWidget):
             self.update()

@@ -93,7 +93,6 @@ class Icon(Themed, QWidget):
         self.setFixedSize(size, size)
 
     def show_icon(self, name: str, ink: Ink) -> None:
-        """Draw another icon from now on."""
         if (name, ink) != (self.name, self.ink):
             self.name, self.ink = name, ink
             self.update()
@@ -126,7 +125,6 @@ class Chip(Themed, QWidget):
         return chip_size(self.word, small=self._small)
 
     def minimumSizeHint(self) -> QSize:
-        """Return the same as the hint: a chip is never cut."""
         return self.sizeHint()
 
     def paintEvent(self, _event: QPaintEvent) -> None:

@@ -101,7 +101,6 @@ class ActionButton(Themed, PressedByEnter):
         return QSize(round(self._content_width()) + 36, self.minimumHeight())
 
     def minimumSizeHint(self) -> QSize:
-        """Return the same room less some padding: words are never cut."""
         return QSize(round(self._content_width()) + 20, self.minimumHeight())
 
     def _content_width(self) -> float:
@@ -160,7 +159,6 @@ class CompactStop(Themed, QPushButton):
         return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.words)) + 62 + keys, STOP_HEIGHT)
 
     def minimumSizeHint(self) -> QSize:
-        """Return the same: it is never cut."""
         return self.sizeHint()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -223,7 +221,6 @@ class Choice(Themed, QComboBox):
         self._named.setBuddy(self)
 
     def event(self, event: QEvent) -> bool:
-        """Keep the label next to it."""
         if event.type() == QEvent.Type.ParentChange:
             self._named.setParent(self.parentWidget())
             self._named.hide()
@@ -238,7 +235,6 @@ class Choice(Themed, QComboBox):
         event.ignore()
 
     def fitted(self, words: str, room_px: int) -> str:
-        """Return as much of the chosen words as there is room for."""
         return self.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, room_px)
 
     def paintEvent(self, _event: QPaintEvent) -> None:

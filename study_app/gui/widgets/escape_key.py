@@ -41,7 +41,6 @@ class EscapeKey(QObject):
             self._watch(QGuiApplication.focusWindow())
 
     def leave_to(self, window: QWidget) -> None:
-        """Let ``window`` hear its own."""
         self._aside = window
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:

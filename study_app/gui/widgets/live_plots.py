@@ -101,7 +101,6 @@ class Plot(Themed, pg.GraphicsView):
         return pen(colour, width * self.devicePixelRatioF(), dash)
 
     def event(self, event: QEvent) -> bool:
-        """Draw with pens for the screen that the window was moved to."""
         if event.type() == QEvent.Type.DevicePixelRatioChange:
             self.apply_theme(self.theme)
         return bool(super().event(event))
@@ -127,7 +126,6 @@ class Plot(Themed, pg.GraphicsView):
                 self.box.addItem(line, ignoreBounds=True)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         self.setBackground(theme.surface)
         for axis in self.axes.values():
@@ -211,7 +209,6 @@ class TracePlot(Plot):
             end.setPos(QPointF(self._names_after_s, height))
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         colours = (theme.trace_x, theme.trace_y, theme.trace_z)
         for curve, end, colour, dash in zip(self.curves, self.ends, colours, DASHES, strict=False):
@@ -281,7 +278,6 @@ class LatenessPlot(Plot):
             self.p99_name.setText(f"p99 {number(round(p99_us))}")
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         super().apply_theme(theme)
         self.bars.setOpts(brush=QColor(theme.accent), pen=QPen(Qt.PenStyle.NoPen))
         self.p99_line.setPen(self.stroke(theme.text, 1.4))

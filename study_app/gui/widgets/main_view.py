@@ -28,7 +28,6 @@ class Place(Themed, QWidget):
         """React to the place being hidden: release at once every device that acts on the hand."""
 
     def wants_narrow_rail(self) -> bool:
-        """Return whether the place needs the width that a wide rail takes."""
         return False
 
 

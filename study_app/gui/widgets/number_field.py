@@ -68,7 +68,6 @@ class NumberField(QLineEdit):
         self.style().polish(self)
 
     def put_back(self) -> None:
-        """Show the number that counts in place of what was typed."""
         self.setText(self._shown)
         self.setModified(False)
 

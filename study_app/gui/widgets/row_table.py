@@ -117,7 +117,6 @@ class Table(Themed, QTableView):
         return chosen[0].row() if chosen else None
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of ``theme``."""
         self.theme = theme
         self.viewport().update()
 

@@ -28,7 +28,6 @@ class Range:
 
     @property
     def steps(self) -> int:
-        """How many steps of the keyboard lead from end to end."""
         if self.whole and not self.logarithmic:
             return max(1, min(STEPS, round(self.most - self.least)))
         return STEPS

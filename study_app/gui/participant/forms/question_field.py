@@ -232,7 +232,6 @@ class QuestionField(QWidget):
         raise NotImplementedError
 
     def spoken(self) -> str:
-        """Return the answer as a screen reader says it."""
         return str(self.value)
 
     def finish(self) -> bool:
@@ -240,7 +239,6 @@ class QuestionField(QWidget):
         return True
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         self.scale = scale
         self.set_fonts(font("statement", scale=scale), font("label", scale=scale, weight=600), scale)
         margin, gap = self.horizontal_margin, round(8 * scale)
@@ -276,7 +274,6 @@ class QuestionField(QWidget):
         """Point at an answer, at none with -1; what is typed cannot be pointed at."""
 
     def ask(self, *, missing: bool) -> None:
-        """Mark the question as still to be answered."""
         self.missing = missing and not self.is_answered
         self._tell()
 
@@ -415,7 +412,6 @@ class OpenLook(NamedTuple):
     strong: bool
 
     def paint(self, painter: QPainter) -> None:
-        """Draw it."""
         theme, scale, pointed = PARTICIPANT, self.scale, self.pointed
         inset = 0.75 if pointed else 0.5
         body = QRectF(0, 0, self.width, self.height).adjusted(inset, inset, -inset, -inset)
@@ -464,7 +460,6 @@ class OptionLook(Button):
         self.setSizePolicy(GROWS)
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         self._scale = scale
         self.updateGeometry()
         self.update()
@@ -610,7 +605,6 @@ class OptionsField(QuestionField):
 
     @property
     def chosen(self) -> tuple[int, ...]:
-        """The places of the options that are chosen."""
         raise NotImplementedError
 
     def value_at(self, place: int) -> Value:
@@ -628,7 +622,6 @@ class OptionsField(QuestionField):
         self._group.setExclusive(not self.several)
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         super().set_scale(scale)
         for option in self.options:
             option.set_scale(scale)
@@ -734,7 +727,6 @@ class ScaleField(OptionsField):
         return place + 1 if place < len(self.points) else None
 
     def spoken(self) -> str:
-        """Return the point and its name."""
         return self.options[self.chosen[0]].accessibleName()
 
 
@@ -782,7 +774,6 @@ class TypedField(QuestionField):
         self._timer.timeout.connect(take)
 
     def typed(self) -> str:
-        """Return what was typed."""
         raise NotImplementedError
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

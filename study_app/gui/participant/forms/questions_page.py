@@ -53,7 +53,6 @@ class Foot(QWidget):
         give_role(self, QAccessible.Role.StaticText)
 
     def set_scale(self, scale: float, margin: int, *, tight: bool) -> None:
-        """Grow with the page."""
         self._scale = scale
         self._strong = font("statement", scale=scale, weight=600)
         self._small = font("body", scale=scale * 0.94)
@@ -218,7 +217,6 @@ class QuestionsPage(PageWidget):
             field.seen.connect(lambda field=field: self._saw(field))
 
     def made_field(self, item: ItemView) -> QuestionField:
-        """Return the widget of a question."""
         raise NotImplementedError
 
     def arranged(self, asked: Sequence[QuestionField]) -> list[list[QuestionField]]:
@@ -226,7 +224,6 @@ class QuestionsPage(PageWidget):
         raise NotImplementedError
 
     def missing_words(self, numbers: Sequence[int]) -> str:
-        """Return the sentence that names what still needs an answer."""
         raise NotImplementedError
 
     def _lay_out_once(self) -> None:
@@ -396,7 +393,6 @@ class QuestionsPage(PageWidget):
         self.foot.show_state(self.message, sum(field.is_answered for field in asked), len(asked), keys)
 
     def go_to(self, field: QuestionField) -> None:
-        """Show the part with a field and put the keyboard on it."""
         index = next((n for n, part in enumerate(self.parts) if field in part), self._part)
         if index != self._part:
             self._show(index)
@@ -465,11 +461,9 @@ class FormWidget(QuestionsPage):
     """Questions of any kind, each as high as it needs."""
 
     def made_field(self, item: ItemView) -> QuestionField:
-        """Return the widget that the kind of a question names."""
         return FIELDS[item.widget](item, self._words, self)
 
     def missing_words(self, numbers: Sequence[int]) -> str:
-        """Return the sentence that names what still needs an answer."""
         return self._words.questions_missing(numbers)
 
     def arranged(self, asked: Sequence[QuestionField]) -> Parts:

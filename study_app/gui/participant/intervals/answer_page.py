@@ -183,7 +183,6 @@ class FeedbackWidget(PageWidget):
         self._column = vbox((STRETCH, 2), badge, word, (STRETCH, 3), parent=self)
 
     def lay_out(self, _scale: float) -> None:
-        """Grow with the page."""
         self._badge.set_scale(BADGE_SCALE * self.words_scale)
         self._word.setFont(font("display", scale=self.words_scale))
         self._column.setSpacing(round(14 * self.words_scale))
@@ -285,7 +284,6 @@ class NumberWidget(AnswerPage):
         self._pad.set_size(width, height, round(KEY_GAP_PX * scale), sized(20 * scale))
 
     def focus_first(self) -> None:
-        """Put the keyboard into the field."""
         self.field.setFocus()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -390,7 +388,6 @@ class SettingControls(QWidget):
         return True
 
     def release(self, event: QKeyEvent) -> None:
-        """Let go of a key."""
         if not event.isAutoRepeat() and KEYS.get(Qt.Key(event.key()), 0) == self._held:
             self._let_go()
 

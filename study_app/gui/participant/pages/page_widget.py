@@ -107,7 +107,6 @@ class PageWidget(QWidget):
 
     @property
     def mirrored(self) -> bool:
-        """Whether the page is read from right to left."""
         return self.layoutDirection() == Qt.LayoutDirection.RightToLeft
 
     @property
@@ -217,7 +216,6 @@ class ProgressLine(QWidget):
         self.set_scale(1.0)
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         self._scale = scale
         self.setFixedHeight(round(QFontMetricsF(font("statement", scale=scale)).height()))
         self.update()
@@ -324,7 +322,6 @@ class GoButton(LitButton, QPushButton):
         self.set_scale(1.0)
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         self._scale = scale
         self.setFont(font("card", scale=scale * 1.0625, weight=500))
         self.setFixedSize(self.sizeHint())
@@ -386,7 +383,6 @@ class LanguageButton(LitButton, QRadioButton):
         )
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         self._scale = scale
         self.setFont(font("body", scale=scale, weight=600 if self.isChecked() else 500))
         self.setFixedSize(self.sizeHint())
@@ -450,7 +446,6 @@ class LanguageSwitch(QGroupBox):
             button.clicked.connect(lambda _=False, code=button.language: self._choose(code, present))
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         x = 0
         flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
         for button in reversed(self.buttons) if flip else self.buttons:

@@ -73,7 +73,6 @@ class Grid:
 
     @property
     def holds(self) -> bool:
-        """Whether the cells are large enough to be hit."""
         return min(self.cell_height, self.cell_width) >= LEAST_CELL * self.scale - 0.01
 
     def with_rows(self, room: float, per_page: int) -> Grid:
@@ -175,7 +174,6 @@ class StatementField(ScaleField):
         return (left + wide + first) / 2 if left < first else (last + width + left) / 2
 
     def set_sizes(self, sizes: Grid) -> None:
-        """Take the columns' widths and the row's height."""
         self.sizes, self.scale = sizes, sizes.scale
         margin = self.horizontal_margin
         self.grid.setContentsMargins(margin, 0, margin, 0)
@@ -286,7 +284,6 @@ class Heading(QWidget):
         return tuple(self._labels[column] for column in sorted(self.columns()))
 
     def set_sizes(self, sizes: Grid) -> None:
-        """Take the sizes of the columns."""
         self._sizes = sizes
         self.update()
 
@@ -372,16 +369,13 @@ class QuestionnaireWidget(QuestionsPage):
             field.pointed_at.connect(self._heading.point)
 
     def made_field(self, item: ItemView) -> QuestionField:
-        """Return the row of a statement."""
         return StatementField(item, self._page.labels, self._page.cannot_judge, self._words, self)
 
     def missing_words(self, numbers: Sequence[int]) -> str:
-        """Return the sentence that names what still needs an answer."""
         return self._words.missing(numbers)
 
     @property
     def heading(self) -> tuple[str, ...]:
-        """The labels over the columns that can be read now."""
         return self._heading.shown
 
     def arranged(self, asked: Sequence[QuestionField]) -> list[list[QuestionField]]:

@@ -56,7 +56,6 @@ class Badge(QWidget):
         self.set_scale(1.0)
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         side = round(56 * scale)
         self.setFixedSize(side, side)
 
@@ -94,7 +93,6 @@ class Column(QWidget):
             label.setAlignment(Qt.AlignmentFlag.AlignAbsolute | self._start)
 
     def set_scale(self, scale: float, *, text: float = 1.0, badge: bool = True) -> None:
-        """Grow with the page; in a small window with smaller text, then without the badge."""
         self._badge.set_scale(scale)
         self._badge.setVisible(badge)
         self._title.setFont(font("display", scale=scale * text))
@@ -215,7 +213,6 @@ class DeclineButton(QPushButton):
         self.setAutoDefault(False)
 
     def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
         self.setFont(font("card", scale=scale, weight=500))
         metrics = QFontMetricsF(self.font())
         self.setFixedSize(round(metrics.horizontalAdvance(self.text()) + 44 * scale), round(48 * scale))

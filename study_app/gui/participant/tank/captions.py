@@ -58,7 +58,6 @@ class Captions:
         self.lay_out(*DESIGNED_FOR, 0.84 * DESIGNED_FOR[1])
 
     def turn_to(self, page: TaskPage) -> None:
-        """Write the words of another interval of the same trial."""
         self._page = page
 
     def below(self, width: float, height: float) -> float:
@@ -131,7 +130,6 @@ class Captions:
         return key + 12 * self._fine + QFontMetricsF(self._pause_font).horizontalAdvance(self._words.pause_hint) + 4
 
     def things(self, task: TaskShown | None, hint: str = "") -> dict[str, Placed]:
-        """Return what can change among the words."""
         return {
             "count": Placed(self._counted(task), self._count),
             "hint": Placed(self._hint_words(task, hint), self._hint),
@@ -183,7 +181,6 @@ class Captions:
 
     @property
     def small_scale(self) -> float:
-        """How much larger than designed small words are."""
         return self._fine
 
     @property

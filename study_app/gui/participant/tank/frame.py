@@ -51,7 +51,6 @@ class Box:
         )
 
     def corners(self) -> tuple[Point, ...]:
-        """Return the eight corners of the glass."""
         return tuple((x, y, z) for x in (-self.x, self.x) for y in (self.floor, self.top) for z in (-self.z, self.z))
 
 
@@ -92,7 +91,6 @@ class Camera:
         return (self.eye_y - y) * math.sin(self.pitch) + (self.eye_z - z) * math.cos(self.pitch)
 
     def scale(self, point: Point) -> float:
-        """Return px per metre at a point's distance."""
         return self.focal / self.distance(point)
 
     def point(self, point: Point) -> Pixel:
@@ -214,7 +212,6 @@ class BallPlacer:
         return self._radius_m * self._camera.focal / distance, step / (DEPTH_STEPS - 1)
 
     def step(self, point: Point) -> int:
-        """Return the step of depth of a point."""
         nearness = (self._camera.distance(point) - self._nearest) / self._step
         return min(max(round(nearness), 0), DEPTH_STEPS - 1)
 

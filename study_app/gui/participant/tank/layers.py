@@ -121,11 +121,9 @@ class VideoLayer:
         return Placed(None if self._frame is None else self._frame.number, self.place)
 
     def size(self, ratio: float) -> tuple[int, int]:
-        """Return how many pixels a screen of this pixel ratio has for it."""
         return max(2, int(self.place.width() * ratio)), max(2, int(self.place.height() * ratio))
 
     def paint(self, painter: QPainter, region: QRegion) -> None:
-        """Paint what lies in the region asked for."""
         around = region.boundingRect()
         painter.fillRect(around, QColor(PARTICIPANT.window))
         if self._frame is not None and region.intersects(self.place.toAlignedRect()):
