@@ -1,12 +1,11 @@
 """The settings of this machine and its devices: read, changed with undo, looked at in a thread."""
 
-import threading
 from collections.abc import Callable, Sequence
 from datetime import date
 from pathlib import Path
 from typing import Any, Final
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.devices.descriptor import Backend
@@ -19,6 +18,7 @@ from study_app.gui.kit.devices import DeviceShown, benches_shown, device_named, 
 from study_app.gui.kit.workstation import settings_here
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.theme.theme import Theme
+from study_app.gui.widgets.background import Background
 from study_app.store import workstation
 from study_app.store.workstation import DisplayOffset, MachineSettings
 from study_app.user_folder import settings_file
@@ -138,17 +138,16 @@ class DevicesController(QObject):
 
     looked = Signal(object)
     troubled = Signal(str, str)
-    _done = Signal(object)
 
     def __init__(self, workstation: WorkstationController, look: Callable[[], Sequence[Backend]] = backends) -> None:
         super().__init__()
         self._workstation, self.backends = workstation, look
-        self.looking: threading.Thread | None = None
+        self.looking = Background(self)
+        self.looking.done.connect(self._show_found)
         self._ended = False
         self.shown: tuple[DeviceShown, ...] = ()
         self.place: DevicesPlace | None = None
         self.dialog: DiagnosisDialog | None = None
-        self._done.connect(self._end, Qt.ConnectionType.QueuedConnection)
         workstation.changed.connect(self._show)
 
     @property
@@ -169,18 +168,16 @@ class DevicesController(QObject):
 
     def look(self) -> None:
         """Look at the machine, in the background."""
-        if self.looking is not None or self._ended:
+        if self.looking.busy or self._ended:
             return
         if self.place is not None:
             self.place.show_looking(True)
-        self.looking = threading.Thread(target=self._see, name="looking for devices", daemon=True)
-        self.looking.start()
+        self.looking.run(self._look)
 
     def end(self, patience_s: float = PATIENCE_S) -> None:
         """Look no more, wait for a look that is under way, and show nothing of it: the windows go."""
         self._ended = True
-        if self.looking is not None:
-            self.looking.join(min(patience_s, PATIENCE_S))
+        self.looking.wait(min(patience_s, PATIENCE_S))
 
     def diagnose(self, name: str) -> None:
         """Open the diagnosis of a device; a serial number that is preferred is taken along."""
@@ -200,29 +197,26 @@ class DevicesController(QObject):
     def _forget_dialog(self) -> None:
         self.dialog = None
 
-    def _see(self) -> None:
+    def _look(self) -> tuple[DeviceShown, ...] | Exception:
         try:
-            made: object = devices_shown(self.backends())
-        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
-            made = error
-        self._done.emit(made)
+            return devices_shown(self.backends())
+        except Exception as error:  # noqa: BLE001 - a bug of a driver is told as what it is of the machine
+            return error
 
-    def _end(self, made: object) -> None:
-        self.looking = None
+    def _show_found(self, found: tuple[DeviceShown, ...] | Exception) -> None:
         if self._ended:
             return
-        if self.place is not None:
-            self.place.show_looking(False)
-        if isinstance(made, Exception):
-            self.troubled.emit("This machine could not be examined", f"{made}.")
+        if isinstance(found, Exception):
+            self._show()
+            self.troubled.emit("This machine could not be examined", f"{found}.")
             return
-        assert isinstance(made, tuple)  # noqa: S101 - what _see makes
-        self.shown = made
+        self.shown = found
         self._show()
-        self.looked.emit(made)
+        self.looked.emit(found)
 
     def _show(self) -> None:
         if self.place is not None:
+            self.place.show_looking(self.looking.busy)
             self.place.show_devices(self.shown, self._workstation.settings.device)
             self.place.show_benches(benches_shown(self._workstation.settings.benches))
             self.place.show_options(self._workstation.settings.device_options)

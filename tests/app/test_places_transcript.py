@@ -205,10 +205,10 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
         if number == len(steps) - 1:
             devices.end()
         getattr(place, name).emit(*given)
-        if devices.looking is not None:
+        if devices.looking.busy:
             heard.append(f"looking {place.refresh.isEnabled()}")
-            devices.looking.join()
-            QApplication.sendPostedEvents(devices)
+            devices.looking.wait()
+            QApplication.processEvents()
         lines += [f"== {name} {given}", *heard, f"refresh: {place.refresh.isEnabled()}"]
         lines += [
             *value_lines(devices.preferred, "preferred"),

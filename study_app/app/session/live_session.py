@@ -28,6 +28,7 @@ from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.kit.workstation import described, screen_number, settings_here, text_scale_on
 from study_app.gui.theme.theme import Theme
+from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse
 from study_app.session.preflight import Check, checks, refused
@@ -68,7 +69,6 @@ class LiveSession(QObject):
     """
 
     over = Signal()
-    _ready = Signal(object)
     _said = Signal(str)
     _compiled = Signal(float)
 
@@ -93,12 +93,11 @@ class LiveSession(QObject):
         self._crash_trace: CrashTrace | None = None
         self._closed = False
         self._ending = threading.Event()
-        self._working = False
         self._steps: Iterator[None] | None = None
         self._windows: list[QWidget] = []  # until the bridge has them
         self.patience_s = OPENING_PATIENCE_S
-        self._opening: threading.Thread | None = None
-        self._ready.connect(self._begin, Qt.ConnectionType.QueuedConnection)
+        self._opening = Background(self)
+        self._opening.done.connect(self._begin)
         self._said.connect(self._say, Qt.ConnectionType.QueuedConnection)
         self._compiled.connect(self._show_compiled, Qt.ConnectionType.QueuedConnection)
 
@@ -113,9 +112,7 @@ class LiveSession(QObject):
         self.note.cancelled.connect(self.cancel)
         place(self.note, self.note.screen(), corner=False)
         self.note.show()
-        self._working = True
-        self._opening = threading.Thread(target=self._make_ready, name="opening", daemon=True)
-        self._opening.start()
+        self._opening.run(self._make_ready)
 
     @property
     def began(self) -> bool:
@@ -124,12 +121,12 @@ class LiveSession(QObject):
     @property
     def opening(self) -> bool:
         """Whether device and servo are being made ready, even for a session that was called off meanwhile."""
-        return self._opening is not None and self._opening.is_alive()
+        return self._opening.busy
 
     def wait(self, patience_s: float = OPENING_PATIENCE_S) -> None:
         """Wait for what is being made ready: it must be let go of here, not in the thread that makes it."""
-        if self._opening is not None:
-            self._opening.join(patience_s)
+        if self._opening.busy:
+            self._opening.wait(patience_s)
             QApplication.processEvents()
 
     def end_by_signal(self, number: int) -> None:
@@ -142,7 +139,7 @@ class LiveSession(QObject):
         else:
             self._close()
 
-    def _make_ready(self) -> None:
+    def _make_ready(self) -> Ready | Exception:
         """Compile, open, start and measure, in a thread of its own; whatever comes of it goes to ``_begin``."""
         rig: Rig | None = None
         outlets: Outlets | None = None
@@ -159,18 +156,17 @@ class LiveSession(QObject):
                 outlets = None if self.chosen.played else open_outlets(self.settings, rig.servo, study.study.blinding)
                 videos = videos_of(self.chosen, study, self.settings.camera, rig)
                 facts = measured(rig, self.chosen, videos, sleep=self._ending.wait)
-                made: object = Ready(rig, facts, outlets=outlets, videos=videos)
+                made = Ready(rig, facts, outlets=outlets, videos=videos)
             if not self._closed:
                 gc.freeze()  # the windows' thread need not look through all that was loaded here
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
-            made = error
             with suppress(Exception):  # what came first says why
                 _close_all(rig, videos, outlets)
-        self._ready.emit(made)
+            return error
+        return made
 
     def _begin(self, made: object) -> None:
         """Ask the operator, or claim the session on the disk and open the two windows at once."""
-        self._working = False
         if isinstance(made, Ready):
             self.rig, self._outlets, self._videos = made.rig, made.outlets, made.videos
         if self._closed:
@@ -361,7 +357,7 @@ class LiveSession(QObject):
             traceback.print_exc()
             self.code = BUG
         self.over.emit()
-        if not self._working:
+        if not self._opening.busy:
             self.deleteLater()
 
     def _close_note(self) -> None:

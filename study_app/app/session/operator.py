@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Signal
 
 from study_app.app.failures import guarded_session_slot
 from study_app.errors import StudyError
@@ -17,6 +16,7 @@ from study_app.gui.operator.plots import ForceCard
 from study_app.gui.operator.servo_health import Forces, ServoHealth
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
+from study_app.gui.widgets.background import Background
 from study_app.session.pages import Page
 from study_app.session.ports import JournalPort
 from study_app.session.resume import FIRST, Start
@@ -303,42 +303,36 @@ class Reconnection(QObject):
 
     connected = Signal(object)
     failed = Signal(object)
-    _over = Signal(object)
 
     def __init__(self, reconnect: Callable[[], dict[str, Any]]) -> None:
         super().__init__()
         self._reconnect = reconnect
-        self._thread: threading.Thread | None = None
+        self._job = Background(self)
+        self._job.done.connect(self._end)
         self.line = ""
-        self._over.connect(self._end, Qt.ConnectionType.QueuedConnection)
 
     @property
     def under_way(self) -> bool:
-        return self._thread is not None
+        return self._job.busy
 
     def begin(self) -> None:
         """Begin, unless it is under way."""
-        if self._thread is None:
+        if not self._job.busy:
             self.line = "Connecting the device …"
-            self._thread = threading.Thread(target=self._run, name="reconnecting", daemon=True)
-            self._thread.start()
+            self._job.run(self._run)
 
     def wait(self, patience_s: float = PATIENCE_S) -> bool:
         """Wait until the device is left alone, for whoever closes it must be its only user; return whether it is."""
-        if self._thread is None:
-            return True
-        self._thread.join(patience_s)
-        return not self._thread.is_alive()
+        return self._job.wait(patience_s)
 
-    def _run(self) -> None:
+    def _run(self) -> dict[str, Any] | Exception:
         try:
-            made: object = self._reconnect()
-        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
-            made = error
-        self._over.emit(made)
+            return self._reconnect()
+        except Exception as error:  # noqa: BLE001 - a bug, too, is shown to the operator, and the force stays off
+            return error
 
-    def _end(self, made: object) -> None:
-        self._thread, self.line = None, ""
+    def _end(self, made: dict[str, Any] | Exception) -> None:
+        self.line = ""
         if not isinstance(made, Exception):
             self.connected.emit(made)
             return

@@ -15,6 +15,7 @@ from study_app.evidence.appraisal import Costs, Errors, Question, start_appraisa
 from study_app.gui.display.screens import place
 from study_app.gui.preflight.window import PreflightWindow, preflight_view, resumed_rows
 from study_app.gui.theme.theme import Theme
+from study_app.gui.widgets.background import Background
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
@@ -103,7 +104,6 @@ class Preflight(QObject):
     started = Signal(object)
     cancelled = Signal()
     failed = Signal(object)
-    _measured = Signal(object)
 
     def __init__(
         self,
@@ -118,7 +118,8 @@ class Preflight(QObject):
         self._chosen, self._protocol, self._ready, self._screen = chosen, protocol, ready, screen
         self._who = who
         self._goes_on = _goes_on(chosen, protocol)
-        self.measuring: threading.Thread | None = None
+        self.measuring = Background(self)
+        self.measuring.done.connect(self._take)
         self._ending = threading.Event()
         self.appraisal = Appraisal(study_scenes(protocol), _dynamics(ready.facts, protocol))
         self.window = PreflightWindow(
@@ -127,7 +128,6 @@ class Preflight(QObject):
         self.window.start_asked.connect(self._start)
         self.window.again_asked.connect(self._again)
         self.window.cancelled.connect(self.cancelled)
-        self._measured.connect(self._take)
         self._appraised = False
         self._outlets_shown = ready.outlet_statuses
         self._timer = QTimer(self)
@@ -144,8 +144,7 @@ class Preflight(QObject):
         self._timer.stop()
         self._ending.set()
         self.appraisal.close()
-        if self.measuring is not None:
-            self.measuring.join(PATIENCE_S)
+        self.measuring.wait(PATIENCE_S)
         self.window.finish()
         self.window.deleteLater()
         self.deleteLater()
@@ -177,7 +176,7 @@ class Preflight(QObject):
                 error_n=self.appraisal.error_n,
                 asked_error=self.appraisal.error_n is not None or not self.appraisal.over,
                 now=datetime.now().astimezone(),
-                busy=self.measuring is not None,
+                busy=self.measuring.busy,
                 goes_on=self._goes_on,
             )
         )
@@ -201,21 +200,17 @@ class Preflight(QObject):
 
     def _again(self) -> None:
         """Measure anew, in a thread of its own: it looks at the servo for two seconds."""
-        if self.measuring is not None:
-            return
-        self.measuring = threading.Thread(target=self._measure, name="preflight", daemon=True)
-        self._show()
-        self.measuring.start()
+        if not self.measuring.busy:
+            self.measuring.run(self._measure)
+            self._show()
 
-    def _measure(self) -> None:
+    def _measure(self) -> Facts | Exception:
         try:
-            found: object = measured(self._ready.rig, self._chosen, self._ready.videos, sleep=self._ending.wait)
-        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
-            found = error
-        self._measured.emit(found)
+            return measured(self._ready.rig, self._chosen, self._ready.videos, sleep=self._ending.wait)
+        except Exception as error:  # noqa: BLE001 - whoever opened the session prints it
+            return error
 
     def _take(self, found: object) -> None:
-        self.measuring = None
         if isinstance(found, Measurements):
             self._ready = replace(self._ready, facts=found)
             dynamics = _dynamics(found, self._protocol)

@@ -28,7 +28,7 @@ from study_app.protocol.describe import spread
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.session.preflight import LOUDEST_DB, MEANS, QUIETEST_DB, USUAL_DB, Check, Facts, Masking, checks
+from study_app.session.preflight import LOUDEST_DB, MEANS, QUIETEST_DB, USUAL_DB, Check, Masking, Measurements, checks
 from study_app.session.resume import resume_at
 from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of

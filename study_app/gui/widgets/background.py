@@ -1,15 +1,15 @@
 """Jobs outside the window's thread: neither a slow disk nor a long computation freezes a window."""
 
-import queue
 import threading
 import time
 import weakref
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, Signal
+from shiboken6 import isValid
 
-LOOK_MS = 10
 _threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
 
 
@@ -18,6 +18,26 @@ def wait_for_jobs(seconds: float) -> None:
     until_s = time.monotonic() + seconds
     for thread in tuple(_threads):
         thread.join(max(until_s - time.monotonic(), 0.0))
+
+
+class _Ends(QObject):
+    """Brings the ends of jobs to the windows' thread; a job may outlive its `Background`, but not this."""
+
+    came = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.came.connect(self._pass_on, Qt.ConnectionType.QueuedConnection)
+
+    def _pass_on(self, end: tuple["Background", Callable[[], Any], bool, Any]) -> None:
+        background, *rest = end
+        if isValid(background):
+            background.take(*rest)
+
+
+@cache
+def _ends() -> _Ends:
+    return _Ends()
 
 
 class Background(QObject):
@@ -32,12 +52,9 @@ class Background(QObject):
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
-        self._made: queue.SimpleQueue[tuple[Callable[[], Any], bool, Any]] = queue.SimpleQueue()
+        self._ends = _ends()  # made in the windows' thread
         self._wanted: Callable[[], Any] | None = None
         self._thread: threading.Thread | None = None
-        self._look = QTimer(self)
-        self._look.setInterval(LOOK_MS)
-        self._look.timeout.connect(self._take)
 
     @property
     def busy(self) -> bool:
@@ -50,14 +67,14 @@ class Background(QObject):
         if self._thread is None:
             self._begin(job)
 
-    def wait(self) -> None:
-        """Wait until the job that runs has ended."""
-        if self._thread is not None:
-            self._thread.join()
+    def wait(self, seconds: float | None = None) -> bool:
+        """Wait until the job that runs has ended; return whether it has."""
+        if self._thread is None:
+            return True
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
 
     def _begin(self, job: Callable[[], Any]) -> None:
-        made = self._made
-
         def work() -> None:
             found, whole = None, False
             try:
@@ -66,25 +83,17 @@ class Background(QObject):
                 found = error
                 raise
             finally:
-                made.put((job, whole, found))
+                self._ends.came.emit((self, job, whole, found))
 
         self._thread = threading.Thread(target=work, name="background", daemon=True)
         _threads.add(self._thread)
         self._thread.start()
-        self._look.start()
 
-    def _take(self) -> None:
-        try:
-            job, whole, found = self._made.get_nowait()
-        except queue.Empty:
-            return
-        self._look.stop()
+    def take(self, job: Callable[[], Any], whole: bool, found: Any) -> None:
+        """Pass on what a job returned, or raised where it is not ``whole``; begin the one that took its place."""
         self._thread = None
         if self._wanted is not job and self._wanted is not None:
             self._begin(self._wanted)
             return
         self._wanted = None
-        if whole:
-            self.done.emit(found)
-        else:
-            self.failed.emit(found)
+        (self.done if whole else self.failed).emit(found)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
@@ -81,7 +82,7 @@ def fail(error: Exception) -> Any:
 def reconnected(bridge: Any, world: World) -> None:
     world.fault = None
     assert bridge.reconnection.wait()
-    QApplication.sendPostedEvents(bridge.reconnection)
+    QApplication.sendPostedEvents(None, QEvent.Type.MetaCall)
 
 
 STEPS: dict[str, Any] = {

@@ -117,10 +117,10 @@ def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, m
     monkeypatch.setattr(preflight_controller, "measured", slow)
     asked.window.again_asked.emit()
     measuring = asked.measuring
-    assert measuring is not None
+    assert measuring.busy
     assert begun.wait(5)
     asked.close()
-    assert not measuring.is_alive()
+    assert measuring.wait(0)
     assert waited == [True]
 
 
@@ -196,7 +196,7 @@ def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_c
     slower = replace(found, delay_ticks=3)
     monkeypatch.setattr(preflight_controller, "measured", lambda *_words, **_named: slower)
     made.window.again_asked.emit()
-    qtbot.waitUntil(lambda: made.measuring is None)
+    qtbot.waitUntil(lambda: not made.measuring.busy)
     again: Any = made.appraisal.appraiser
     assert again.devices == [Dynamics(0.003, 20e-6, 0.3)]
     assert not first.works
@@ -212,7 +212,7 @@ def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
     with qtbot.waitSignal(asked.failed) as failed:
         asked.window.again_asked.emit()
     assert isinstance(failed.args[0], ValueError)
-    assert asked.measuring is None
+    assert not asked.measuring.busy
 
 
 @pytest.mark.parametrize(
