@@ -30,7 +30,7 @@ from PySide6.QtCore import (
     QTimer,
     qVersion,
 )
-from PySide6.QtGui import QAccessible, QEnterEvent, QImage, QPainter, QShortcut, QWheelEvent
+from PySide6.QtGui import QAccessible, QAction, QEnterEvent, QImage, QPainter, QShortcut, QWheelEvent
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -330,6 +330,9 @@ def steps(window: QWidget, settled: Callable[[], None]) -> Iterator[str]:
             yield from recorder.record(chosen[0], lambda control=chosen[1]: use(control))
     for shortcut in window.findChildren(QShortcut):
         yield from recorder.record(shortcut.key().toString(), shortcut.activated.emit)
+    for action in window.findChildren(QAction):
+        for keys in action.shortcuts():
+            yield from recorder.record(keys.toString(), action.trigger)
     yield from recorder.record("Esc", lambda: QTest.keyClick(recorder.base, Qt.Key.Key_Escape))
 
 

@@ -28,10 +28,10 @@ from study_app.designer.place.requests import (
     SetValue,
     Several,
 )  # fmt: skip
+from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
-from study_app.gui.widgets.keys import tip, with_key
 from study_app.gui.widgets.labels import Elided, figures
 from study_app.number_text import typed_numbers
 

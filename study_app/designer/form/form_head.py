@@ -8,6 +8,7 @@ from study_app.designer.form.form_rows import Form
 from study_app.designer.form.typed_fields import TypedLine
 from study_app.designer.place.requests import RenameElement, SetValue
 from study_app.designer.problems.repair_button import NameRefusal
+from study_app.gui.kit.commands import tip
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
@@ -15,7 +16,6 @@ from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_layout, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX
 from study_app.gui.widgets.controls import ActionButton, IconButton
-from study_app.gui.widgets.keys import tip
 from study_app.gui.widgets.labels import Elided, label
 
 TILE = 40

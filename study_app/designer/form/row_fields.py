@@ -9,10 +9,10 @@ from study_app.designer.form.form_rows import FormRow, choice_words, new_words
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.designer.place.requests import AddNamed, RemoveKey, SetValue, SwitchKind
 from study_app.designer.place.segments import Segments
+from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
-from study_app.gui.widgets.keys import with_key
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import number_of, typed_numbers
 

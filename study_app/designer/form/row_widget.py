@@ -20,11 +20,11 @@ from study_app.designer.place.segments import Segments
 from study_app.designer.place.tab_order import lead_by_tab, stops
 from study_app.designer.problems.problem_rows import ProblemRow
 from study_app.designer.problems.repair_button import RepairButton
+from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.boxes import add_layout, hbox, insert_layout, vbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import IconButton
-from study_app.gui.widgets.keys import with_key
 from study_app.gui.widgets.labels import label
 
 MOST_REPAIRS = 3

@@ -11,8 +11,8 @@ from PySide6.QtCore import QEvent, QMimeData, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
+from study_app.gui.kit.commands import keys_of
 from study_app.gui.theme.theme import font
-from study_app.gui.widgets.keys import keys_of
 
 HAND_ON_MS = 150
 """What is typed is handed on so long after the first key [ms]: typing without a rest is kept as well."""

@@ -7,13 +7,13 @@ from PySide6.QtWidgets import QLineEdit, QMenu
 from study_app.designer.outline.outline_rows import ElementPath, OutlineRow
 from study_app.designer.outline.rows import ROW_ROLE, Index
 from study_app.designer.outline.tree import Tree
+from study_app.gui.kit.commands import key_cap, key_words, keys_of, tip, with_key
 from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.keys import key_cap, key_words, keys_of, tip, with_key
 from study_app.gui.widgets.labels import Elided
 
 

@@ -9,12 +9,12 @@ from PySide6.QtWidgets import QWidget
 from study_app.designer.participant.live_page import LivePage
 from study_app.designer.participant.participant_page import ParticipantView, ScreenSize
 from study_app.designer.place.segments import Segments
+from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
 from study_app.gui.widgets.controls import Cap, Choice, IconButton
-from study_app.gui.widgets.keys import key_cap, tip
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.number_field import NumberField
 from study_app.session.trial import TankView

@@ -5,10 +5,10 @@ from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QMenu, QWidget
 
 from study_app.designer.participant.play import PlayDevices
+from study_app.gui.kit.commands import keys_of, tip
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.controls import ActionButton, IconButton
-from study_app.gui.widgets.keys import keys_of, tip
 
 PLAY, PLAY_NARROW = "Play from here", "Play"
 

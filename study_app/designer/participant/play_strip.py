@@ -5,12 +5,12 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QWidget
 
 from study_app.designer.participant.play import PlayState
+from study_app.gui.kit.commands import key_cap
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.keys import key_cap
 from study_app.gui.widgets.labels import Ink, label
 
 INKS: dict[str, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}

@@ -25,9 +25,8 @@ from study_app.designer.place.editing import Editing
 from study_app.designer.place.right_pane import PanePage
 from study_app.designer.place.view import DesignerPlace
 from study_app.gui.display.screens import choose_screens
+from study_app.gui.kit.commands import add_commands, tip
 from study_app.gui.kit.workstation import screen_number, settings_here, text_scale_on
-from study_app.gui.widgets.keys import tip
-from study_app.gui.widgets.main_view import make_shortcuts
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
@@ -85,7 +84,7 @@ class ParticipantPreview(QObject):
         tab.moment_asked.connect(self.show_moment)
         tab.happened.connect(self._hear)
         tab.frame_due.connect(self._move_ball)
-        make_shortcuts(place, {"page": self.enter_page, "language": self.show_next_language})
+        add_commands(place, {"page": self.enter_page, "language": self.show_next_language})
         self._look_at_screen()
 
     @property

@@ -11,12 +11,12 @@ from study_app.designer.place.right_pane import RightPane
 from study_app.designer.place.segments import Segments
 from study_app.designer.place.tab_order import lead_by_tab
 from study_app.designer.problems.problems_card import ProblemsCard
+from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Icon
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
-from study_app.gui.widgets.keys import key_cap, tip
 
 OUTLINE_PX, DRAWER_PX = 284, 320
 DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130

@@ -9,13 +9,14 @@ from study_app.designer.participant.play_controls import PlayControls
 from study_app.designer.participant.play_strip import PlayStrip
 from study_app.designer.place.designer_view import HeaderState
 from study_app.gui.theme.theme import Tone, font
+from study_app.gui.kit.commands import tip, with_key
+from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.dialogs import choose_protocol
-from study_app.gui.widgets.keys import tip, with_key
 from study_app.gui.widgets.labels import label
 
 NEW, OPEN = "\0new", "\0open"
@@ -66,7 +67,7 @@ class ChipButton(Themed, PressedByEnter):
 
 
 class DesignerHeader(QWidget):
-    """Signals: ``study_asked`` (source), ``new_asked``, ``problems_asked``, undo, redo, save, keys.
+    """Signals: ``study_asked`` (source), ``new_asked``, ``problems_asked``, undo, redo, save.
 
     ``keyboard_left`` is emitted when a button that has the keyboard is about to be disabled, and after a click between
     the buttons or on one that is disabled.
@@ -78,7 +79,6 @@ class DesignerHeader(QWidget):
     undo_asked = Signal()
     redo_asked = Signal()
     save_asked = Signal()
-    keys_asked = Signal()
     keyboard_left = Signal()
 
     def __init__(self) -> None:
@@ -96,7 +96,7 @@ class DesignerHeader(QWidget):
         self.problems.setToolTip(f"{tip('problems')}; {tip('next problem')}")
         self.version = ChipButton("show the changes")
         self.draft = Chip("neutral", "save", "")
-        self.keys = IconButton("question", "Keys", tip("keys"))
+        self.keys = IconButton("question", "Keys")
         self.undo = IconButton("undo", "Undo")
         self.redo = IconButton("redo", "Redo")
         self.save = ActionButton("save", "Save", role="primary")
@@ -115,7 +115,6 @@ class DesignerHeader(QWidget):
         self.undo.clicked.connect(self.undo_asked)
         self.redo.clicked.connect(self.redo_asked)
         self.save.clicked.connect(self.save_asked)
-        self.keys.clicked.connect(self.keys_asked)
         self.show_state(self.state)
 
     def show_state(self, state: HeaderState) -> None:

@@ -5,10 +5,10 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QWidget
 from shiboken6 import isValid
 
+from study_app.gui.kit.commands import COMMANDS, GROUPS, Command
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import Cap, IconButton
-from study_app.gui.widgets.keys import GROUPS, KEYS, Keys
 from study_app.gui.widgets.labels import label
 
 HIGHEST, WIDEST, MARGIN = 560, 980, 12
@@ -34,7 +34,7 @@ class KeysCard(Card):
             column = vbox(spacing=5)
             for group in groups:
                 column.addWidget(label(GROUPS[group], "strong"))
-                for one in (one for one in KEYS if one.group == group):
+                for one in (one for one in COMMANDS if one.group == group):
                     add_layout(column, self._row(one))
                 column.addSpacing(10)
             column.addStretch()
@@ -47,7 +47,7 @@ class KeysCard(Card):
         application.focusChanged.connect(self._follow_focus)
 
     @staticmethod
-    def _row(one: Keys) -> QHBoxLayout:
+    def _row(one: Command) -> QHBoxLayout:
         where = f" ({one.within})" if "outline" in one.within else ""
         words = label(f"{one.words}{where}", "label", "text2", wraps=True)
         words.setAccessibleName(f"{one.words}{where}: {' or '.join(one.shown)}")

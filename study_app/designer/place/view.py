@@ -40,11 +40,11 @@ from study_app.designer.place.tab_order import go_on
 from study_app.designer.problems.problem_rows import ProblemRow
 from study_app.designer.problems.problem_steps import ProblemSteps
 from study_app.designer.problems.problems_card import ProblemsCard
+from study_app.gui.kit.commands import add_commands, press, tip
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import vbox
-from study_app.gui.widgets.keys import tip
-from study_app.gui.widgets.main_view import Place, make_shortcuts
+from study_app.gui.widgets.main_view import Place
 
 
 class DesignerPlace(Place):
@@ -123,7 +123,6 @@ class DesignerPlace(Place):
         header.undo_asked.connect(undo)
         header.redo_asked.connect(redo)
         header.save_asked.connect(save)
-        header.keys_asked.connect(self.keys.switch)
         header.strip.changed.connect(lambda shown: self.banner.make_room(other=shown))
         self.nothing.new.clicked.connect(self.new_asked)
         self.nothing.study_asked.connect(self.study_asked)
@@ -172,7 +171,7 @@ class DesignerPlace(Place):
     def _take_keys(self) -> None:
         undo, redo, save = self._steps
         areas = self.areas
-        make_shortcuts(
+        self.commands = add_commands(
             self,
             {
                 "outline": self.parts.focus_outline, "form": areas.focus_form, "views": areas.focus_pane,
@@ -186,6 +185,7 @@ class DesignerPlace(Place):
                 "open": self.header.open_file, "save": save, "undo": undo, "redo": redo, "keys": self.keys.switch,
             },
         )  # fmt: skip
+        press(self.header.keys, self.commands["keys"])
 
     # what is shown
 

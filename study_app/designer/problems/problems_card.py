@@ -10,12 +10,12 @@ from study_app.designer.place.segments import Segments
 from study_app.designer.place.tab_order import lead_by_tab
 from study_app.designer.problems.problem_rows import ProblemRow, followed
 from study_app.designer.problems.repair_button import RepairButton
+from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
-from study_app.gui.widgets.keys import key_cap, tip
 from study_app.gui.widgets.labels import Clamped, Elided, Ink, label
 
 HIGHEST, NARROW_BELOW = 290, 1000

@@ -25,20 +25,10 @@ from study_app.gui.home.cards import (
     StudyCard,
 )
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
-from study_app.gui.home.study_facts import (
-    SHIPPED,
-    DraftFacts,
-    Interrupted,
-    LoadWords,
-    StudyFacts,
-    file_states,
-    held,
-    holds_liquids_alone,
-    interrupted,
-    read_studies,
-)
+from study_app.gui.home.study_facts import SHIPPED, DraftFacts, Interrupted, LoadWords, StudyFacts, file_states, held, holds_liquids_alone, interrupted, read_studies
 from study_app.gui.kit.devices import DeviceShown, looking
 from study_app.gui.sessions.session_facts import SessionFacts, extent_of, sessions
+from study_app.gui.kit.commands import add_commands, key_cap, with_key
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background
@@ -46,9 +36,8 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vb
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import choose_protocol
-from study_app.gui.widgets.keys import key_cap, with_key
 from study_app.gui.widgets.labels import Elided, label
-from study_app.gui.widgets.main_view import Place, make_shortcuts
+from study_app.gui.widgets.main_view import Place
 from study_app.session.start import resumed
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.workspace import workspace
@@ -111,7 +100,7 @@ class HomePlace(Place):
             button.setToolTip(with_key(button.text(), action))
             button.setAccessibleName(button.toolTip())
         self._lay_out()
-        make_shortcuts(self, {"open": self.open_protocol.click, "new": self.new_study.click})
+        add_commands(self, {"open": self.open_protocol.click, "new": self.new_study.click})
         self.open_protocol.clicked.connect(self._open_protocol)
         self.new_study.clicked.connect(lambda: self.new_asked.emit(""))
         self.banner.resume_asked.connect(self._resume)

@@ -5,13 +5,13 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
 from study_app.gui.operator.operator_view import OperatorView, State
+from study_app.gui.kit.commands import key_cap
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Chip, Icon, Logo
 from study_app.gui.widgets.controls import ActionButton, CompactStop
-from study_app.gui.widgets.keys import key_cap
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.number_text import minutes
 

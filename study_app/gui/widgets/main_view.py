@@ -1,13 +1,9 @@
 """The interface of a place of the main window: it fills the window, is entered and left, and has its own shortcuts."""
 
-from collections.abc import Callable, Mapping
-
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.keys import keys_of
 
 
 class Place(Themed, QWidget):
@@ -35,12 +31,3 @@ def last_focused(part: QWidget) -> QWidget | None:
     """Return what in a part had the keyboard last, if it is shown and enabled."""
     last = part.focusWidget()
     return last if last not in {None, part} and last.isVisible() and last.isEnabled() else None
-
-
-def make_shortcuts(place: QWidget, acts: Mapping[str, Callable[[], object]]) -> None:
-    """Let the keys of actions act anywhere in the window while the place is shown."""
-    for action, act in acts.items():
-        for keys in keys_of(action):
-            made = QShortcut(QKeySequence(keys), place)
-            made.setContext(Qt.ShortcutContext.WindowShortcut)
-            made.activated.connect(act)

@@ -10,7 +10,7 @@ from study_app.designer.form.question_rows import QuestionRows
 from study_app.designer.form.row_fields import Field, add_button
 from study_app.designer.form.special_editor import SpecialEditor
 from study_app.designer.place.requests import AddElement
-from study_app.gui.widgets.keys import with_key
+from study_app.gui.kit.commands import with_key
 
 
 class QuestionsField(Field):

@@ -5,13 +5,12 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QShortcut
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QWidget
 
 from study_app.designer.place.requests import SetValue
 from study_app.designer.place.tab_order import stops
-from study_app.gui.widgets.keys import KEYS
+from study_app.gui.kit.commands import COMMANDS
 
 pytestmark = pytest.mark.slow
 
@@ -20,9 +19,9 @@ PAGE = Path(__file__).parents[4] / "docs" / "designer.md"
 
 
 def test_every_key_of_the_place_is_one_shortcut(designer: Any) -> None:
-    made = [shortcut.key().toString() for shortcut in designer.place.findChildren(QShortcut)]
+    made = [keys.toString() for action in designer.place.actions() for keys in action.shortcuts()]
     made.append(designer.place.header.play.play.shortcut().toString())
-    wanted = [keys for one in KEYS if not one.within for keys in one.keys]
+    wanted = [keys for one in COMMANDS if not one.within for keys in one.keys]
     assert sorted({"Ins": "Insert"}.get(keys, keys) for keys in made) == sorted(wanted)
 
 
@@ -31,7 +30,7 @@ def test_the_documentation_lists_every_key() -> None:
     rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| ")][2:]
     listed = {one.strip() for row in rows for either in row.split(",") for one in either.split(" or ")}
     long = {"Ins": "Insert", "Del": "Delete"}
-    assert listed == {long.get(keys, keys) for one in KEYS for keys in one.shown}
+    assert listed == {long.get(keys, keys) for one in COMMANDS for keys in one.shown}
 
 
 LEFT = Qt.MouseButton.LeftButton

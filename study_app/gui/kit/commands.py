@@ -1,0 +1,134 @@
+"""Commands: one table for the shortcuts, tips, buttons, menus and the list of keys, and the `QAction` of each."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QAbstractButton, QWidget
+
+GROUPS: Final = ("Go to", "Selected element", "Study", "Inside a field")
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What the user can do by keys.
+
+    Attributes
+    ----------
+    id, words : str
+        Its name in the program, and what it does.
+    keys : tuple of str
+        Each does it.
+    group : int
+        Its group, of `GROUPS`.
+    within : str
+        Which part of the window listens to its keys; "" for the whole window.
+    held : bool
+        Whether the key is held, not pressed.
+    """
+
+    id: str
+    words: str
+    keys: tuple[str, ...]
+    group: int
+    within: str = ""
+    held: bool = False
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Its keys as they are written on a keyboard: "Ctrl+Enter", "hold Esc"."""
+        return tuple(f"{'hold ' * self.held}{key_words(keys)}" for keys in self.keys)
+
+    def action(self, place: QWidget, run: Callable[[], object]) -> QAction:
+        """Return its action, added to a widget: its keys act anywhere in the window while the widget is shown."""
+        made = QAction(self.words, place)
+        made.setToolTip(tip(self.id))
+        made.setShortcuts([QKeySequence(keys) for keys in self.keys])
+        made.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
+        made.triggered.connect(lambda _checked=False: run())
+        place.addAction(made)
+        return made
+
+
+LISTS: Final = "outline, lists"
+COMMANDS: Final = (
+    Command("outline", "Outline", ("Ctrl+1",), 0),
+    Command("form", "Form", ("Ctrl+2",), 0),
+    Command("views", "Views, then their tabs", ("Ctrl+3",), 0),
+    Command("problems", "Problems", ("Ctrl+4",), 0),
+    Command("header", "Header", ("Ctrl+5",), 0),
+    Command("next part", "Next of these parts", ("F6",), 0),
+    Command("part before", "Previous part", ("Shift+F6",), 0),
+    Command("find", "Find in the study", ("Ctrl+F",), 0),
+    Command("next problem", "Next problem", ("F8",), 0),
+    Command("file", "File, and back", ("Ctrl+E",), 0),
+    Command("back", "Previous element", ("Alt+Left",), 0),
+    Command("page", "Participant's page", ("Ctrl+Return",), 0),
+    Command("leave page", "Leave that page", ("Escape",), 0, "page"),
+    Command("language", "That page in the next language", ("Ctrl+L",), 0),
+    Command("add", "Add", ("Insert",), 1),
+    Command("open entry", "Open what an entry names", ("Return",), 1, "lists"),
+    Command("duplicate", "Duplicate", ("Ctrl+D",), 1),
+    Command("series", "Copies that differ in one number", ("Ctrl+Shift+D",), 1),
+    Command("rename", "Rename", ("F2",), 1),
+    Command("delete", "Delete", ("Delete",), 1, LISTS),
+    Command("up", "Move up", ("Alt+Up",), 1),
+    Command("down", "Move down", ("Alt+Down",), 1),
+    Command("copy", "Copy", ("Ctrl+C",), 1, LISTS),
+    Command("paste", "Paste", ("Ctrl+V",), 1, LISTS),
+    Command("several", "Select several", ("Shift+Up", "Shift+Down"), 1, LISTS),
+    Command("new", "New study …", ("Ctrl+N",), 2),
+    Command("open", "Open file …", ("Ctrl+O",), 2),
+    Command("save", "Save", ("Ctrl+S",), 2),
+    Command("undo", "Undo", ("Ctrl+Z",), 2),
+    Command("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), 2),
+    Command("play", "Play from here", ("F5",), 2),
+    Command("stop", "Stop playing", ("Escape",), 2, "windows while playing", held=True),
+    Command("keys", "Keys", ("Shift+F1",), 2),
+    Command("next field", "Next field", ("Tab",), 3, "field"),
+    Command("accept", "Accept", ("Return",), 3, "field"),
+    Command("restore", "Restore", ("Escape",), 3, "field"),
+    Command("remove", "Remove its key from the file", ("Ctrl+Delete",), 3, "field"),
+    Command("count", "Count up, down", ("Up", "Down"), 3, "field"),
+)
+_OF: Final = {one.id: one for one in COMMANDS}
+_NAMES: Final = {"Return": "Enter", "Escape": "Esc", "Insert": "Ins", "Delete": "Del"}
+
+
+def add_commands(place: QWidget, runs: Mapping[str, Callable[[], object]]) -> dict[str, QAction]:
+    """Add the actions of commands, by their names, to a widget."""
+    return {name: _OF[name].action(place, run) for name, run in runs.items()}
+
+
+def press(button: QAbstractButton, action: QAction) -> None:
+    """Let a button do what an action does, with its tip; it is enabled while the action is."""
+    button.setToolTip(action.toolTip())
+    button.clicked.connect(action.trigger)
+    action.enabledChanged.connect(button.setEnabled)
+
+
+def keys_of(action: str) -> tuple[str, ...]:
+    """Return the keys of an action, as Qt names them."""
+    return _OF[action].keys
+
+
+def key_words(keys: str) -> str:
+    """Return keys as they are written on a keyboard: "Ctrl+Enter"."""
+    return "+".join(_NAMES.get(key, key) for key in keys.split("+"))
+
+
+def key_cap(action: str) -> str:
+    """Return what the cap on the button of an action says: "Ctrl D"."""
+    return _OF[action].shown[0].replace("+", " ")
+
+
+def with_key(words: str, action: str) -> str:
+    """Return words followed by the key of an action, for a tip: "Duplicate (Ctrl+D)"."""
+    return f"{words} ({_OF[action].shown[0]})"
+
+
+def tip(action: str) -> str:
+    """Return what an action does, with its key."""
+    return with_key(_OF[action].words, action)
