@@ -204,7 +204,7 @@ class Preflight(QObject):
             self.measuring.run(self._measure)
             self._show()
 
-    def _measure(self) -> Facts | Exception:
+    def _measure(self) -> Measurements | Exception:
         try:
             return measured(self._ready.rig, self._chosen, self._ready.videos, sleep=self._ending.wait)
         except Exception as error:  # noqa: BLE001 - whoever opened the session prints it

@@ -8,9 +8,8 @@ from study_app.designer.new_study.study_list import StudyList
 from study_app.designer.participant.play_controls import PlayControls
 from study_app.designer.participant.play_strip import PlayStrip
 from study_app.designer.place.designer_view import HeaderState
-from study_app.gui.theme.theme import Tone, font
 from study_app.gui.kit.commands import tip, with_key
-from study_app.gui.theme.theme import font
+from study_app.gui.theme.theme import Tone, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox

@@ -25,10 +25,21 @@ from study_app.gui.home.cards import (
     StudyCard,
 )
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
-from study_app.gui.home.study_facts import SHIPPED, DraftFacts, Interrupted, LoadWords, StudyFacts, file_states, held, holds_liquids_alone, interrupted, read_studies
+from study_app.gui.home.study_facts import (
+    SHIPPED,
+    DraftFacts,
+    Interrupted,
+    LoadWords,
+    StudyFacts,
+    file_states,
+    held,
+    holds_liquids_alone,
+    interrupted,
+    read_studies,
+)
+from study_app.gui.kit.commands import add_commands, key_cap, with_key
 from study_app.gui.kit.devices import DeviceShown, looking
 from study_app.gui.sessions.session_facts import SessionFacts, extent_of, sessions
-from study_app.gui.kit.commands import add_commands, key_cap, with_key
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background

@@ -4,8 +4,8 @@ from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
-from study_app.gui.operator.operator_view import OperatorView, State
 from study_app.gui.kit.commands import key_cap
+from study_app.gui.operator.operator_view import OperatorView, State
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
