@@ -19,6 +19,7 @@ from study_app.outlets.markers import Marker, marker_of
 from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
+from study_app.store.atomic import write_file
 from study_app.store.blinded.blinding import Key, as_recorded, opened, opened_key, sealed
 from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.folders import SessionFolder, StudyFolder
@@ -27,7 +28,6 @@ from study_app.store.journals.journal import Journal
 from study_app.store.recorder import LEAVING_S, Kept, Recorder, hashes_of
 from study_app.store.sessions.folder_lock import Opening
 from study_app.store.tables import csv_files, session_tables
-from study_app.store.tables.session_tables import GrowingTables
 from study_app.store.tables.study_files import write_participants
 
 
@@ -71,7 +71,7 @@ class SessionStore:
         self._receipt = session_receipt
         self.opening = opening
         self._lines: list[events.Event] = list(lines)
-        self._tables = GrowingTables(lambda name: place.folder.table(place.study, name))
+        self._written: dict[Path, bytes] = {}
         self._kept: list[Kept] = []
         self._over = False
         self._ended_s: float | None = None
@@ -149,15 +149,18 @@ class SessionStore:
     def write_tables(self) -> None:
         """Bring the session's tables up to date with its journal.
 
-        While the session runs only changed rows are written, without a flush, since the participant waits for the next
-        page; at its end the tables are rewritten and flushed. A table that cannot be written now (open in another
+        While the session runs only changed tables are written, without a flush, since the participant waits for the
+        next page; at its end all are rewritten and flushed. A table that cannot be written now (open in another
         program, no space) does not stop the session: nothing is lost, since tables are made from the journal.
         ``behind`` gives the reason, and the next call tries again. Results of recordings since the last call are
         journalled first.
         """
         try:
             self._keep_recordings()
-            self._tables.write(self._lines, opened_key(self.place.study_folder), whole=self.journal.closed)
+            for path, content in table_files(self.place, self._lines, opened_key(self.place.study_folder)):
+                if self.journal.closed or self._written.get(path) != content:
+                    write_file(path, content, waits=self.journal.closed)
+                    self._written[path] = content
         except StoreError as error:
             self.behind = error
         else:

@@ -145,18 +145,9 @@ def header(columns: tuple[Column, ...]) -> tuple[str, ...]:
 
 def csv_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> bytes:
     """Return a table; half a surrogate pair, which no file can hold, becomes a question mark."""
-    return b"".join([header_bytes(columns), *records(columns, rows)])
-
-
-def header_bytes(columns: Sequence[Column]) -> bytes:
-    """Return the first record of a table."""
-    return f"{','.join(header(tuple(columns)))}\n".encode()
-
-
-def records(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> Iterator[bytes]:
-    """Yield each row of a table as `csv_bytes` writes it."""
-    for row in rows:
-        yield f"{','.join([cell_text(row[column.name]) for column in columns])}\n".encode("utf-8", "replace")
+    names = header(tuple(columns))
+    lines = [",".join(names), *(",".join([cell_text(row[name]) for name in names]) for row in rows), ""]
+    return "\n".join(lines).encode("utf-8", "replace")
 
 
 def cell_text(value: Any) -> str:
