@@ -19,15 +19,21 @@ from study_app.store.journals.journal_events import Stepped as SteppedLine
 Status: TypeAlias = Literal["completed", "withdrawn", "aborted", "broken"]
 
 
+class Command:
+    """What is to be done."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
-class ShowPage:
+class ShowPage(Command):
     """Put a page before the participant."""
 
     page: Page
 
 
 @dataclass(frozen=True, slots=True)
-class StartTrial:
+class StartTrial(Command):
     """Prepare a trial, or one of its intervals: what is ``presented`` is loaded with its tank's first painted frame.
 
     The tank stays for ``linger_s`` after the task, so that its end is seen. That goes by the longest delay of the
@@ -47,7 +53,7 @@ class StartTrial:
 
 
 @dataclass(frozen=True, slots=True)
-class Adjust:
+class Adjust(Command):
     """Present another value of the varied number within the interval under way, and write the line of its steps.
 
     The force goes on from what it is; the line has the number by which recordings know the scene from then on.
@@ -59,32 +65,32 @@ class Adjust:
 
 
 @dataclass(frozen=True, slots=True)
-class LeaveTask:
+class LeaveTask(Command):
     """End the task because the participant wants to go on, if it may end so already."""
 
 
 @dataclass(frozen=True, slots=True)
-class StopTrial:
+class StopTrial(Command):
     """Follow the task no longer; what was measured until now stays until the next trial starts."""
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class Rest(Command):
     """Take the liquid away: the force fades to zero."""
 
 
 @dataclass(frozen=True, slots=True)
-class StopForce:
+class StopForce(Command):
     """Zero force with the next tick, and until ``FadeIn``."""
 
 
 @dataclass(frozen=True, slots=True)
-class FadeIn:
+class FadeIn(Command):
     """Let the force come back gently."""
 
 
 @dataclass(frozen=True, slots=True)
-class Write:
+class Write(Command):
     """Put one line into the journal; with ``waits``, as for answers and notes, on the disk before the next command.
 
     Other lines are flushed in the background, so that nothing drawn waits for the disk. With ``measured`` the runner
@@ -97,63 +103,49 @@ class Write:
 
 
 @dataclass(frozen=True, slots=True)
-class CheckFlushed:
+class CheckFlushed(Command):
     """Stop here while journal lines that were written without waiting could not be flushed."""
 
 
 @dataclass(frozen=True, slots=True)
-class WriteTables:
+class WriteTables(Command):
     """Bring the tables up to date with the journal."""
 
 
 @dataclass(frozen=True, slots=True)
-class Finish:
+class Finish(Command):
     """Close the session: last line, tables, receipt."""
 
     status: Status
     reason: str = ""
 
 
-Command: TypeAlias = (
-    ShowPage
-    | StartTrial
-    | Adjust
-    | LeaveTask
-    | StopTrial
-    | Rest
-    | StopForce
-    | FadeIn
-    | Write
-    | CheckFlushed
-    | WriteTables
-    | Finish
-)
-
-
 @dataclass(frozen=True, slots=True)
-class _Timed:
+class Event:
+    """What happened at ``at_s``."""
+
     at_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class Begin(_Timed):
+class Begin(Event):
     """Everything is open; show the first page."""
 
 
 @dataclass(frozen=True, slots=True)
-class Continue(_Timed):
+class Continue(Event):
     """The participant goes on from a text page, or ends an exploration after its least time."""
 
 
 @dataclass(frozen=True, slots=True)
-class LanguageChosen(_Timed):
+class LanguageChosen(Event):
     """The participant wants to read in another of the study's languages; possible until a consent is given."""
 
     language: str
 
 
 @dataclass(frozen=True, slots=True)
-class TaskDone(_Timed):
+class TaskDone(Event):
     """The task of the running trial is over; ``summary`` is what its row records (see ``store.tables.columns``).
 
     ``invalid`` names the limits that an interval breaks, so that it was not delivered as requested.
@@ -165,14 +157,14 @@ class TaskDone(_Timed):
 
 
 @dataclass(frozen=True, slots=True)
-class ItemShown(_Timed):
+class ItemShown(Event):
     """A statement became visible to the participant."""
 
     item: str
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen(_Timed):
+class Chosen(Event):
     """The participant answered ``item`` with ``value``, None for "cannot judge"; may come again."""
 
     item: str
@@ -180,52 +172,52 @@ class Chosen(_Timed):
 
 
 @dataclass(frozen=True, slots=True)
-class Retracted(_Timed):
+class Retracted(Event):
     """The participant took the answer to ``item`` back: an entry was emptied."""
 
     item: str
 
 
 @dataclass(frozen=True, slots=True)
-class Stepped(_Timed):
+class Stepped(Event):
     """The participant wants more of what an adjustment sets by some steps, or less where ``steps`` is below 0."""
 
     steps: int
 
 
 @dataclass(frozen=True, slots=True)
-class Submitted(_Timed):
+class Submitted(Event):
     """The participant confirms the questionnaire, or a setting."""
 
 
 @dataclass(frozen=True, slots=True)
-class TimeUp(_Timed):
+class TimeUp(Event):
     """A rest between two intervals, or a feedback, has lasted long enough; only the clock says so."""
 
 
 @dataclass(frozen=True, slots=True)
-class PauseRequested(_Timed):
+class PauseRequested(Event):
     """Esc, the operator's pause, or the program's when it is ended from outside or stood still."""
 
     by: Literal["participant", "operator", "program"]
 
 
 @dataclass(frozen=True, slots=True)
-class ResumeRequested(_Timed):
+class ResumeRequested(Event):
     """The pause ends; an interrupted trial starts again. Only the operator resumes what the operator stopped."""
 
     by: Literal["participant", "operator"]
 
 
 @dataclass(frozen=True, slots=True)
-class ForceStopped(_Timed):
+class ForceStopped(Event):
     """The force was switched off (the servo already sends zero); the session pauses."""
 
     by: Literal["participant", "operator", "device", "program"]
 
 
 @dataclass(frozen=True, slots=True)
-class Note(_Timed):
+class Note(Event):
     """The operator's note, or a mark (empty text allowed) at a moment."""
 
     kind: Literal["note", "mark"]
@@ -233,14 +225,14 @@ class Note(_Timed):
 
 
 @dataclass(frozen=True, slots=True)
-class RepeatRequested(_Timed):
+class RepeatRequested(Event):
     """The operator wants the running trial again, with a reason."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
-class EndRequested(_Timed):
+class EndRequested(Event):
     """The operator ends the session early, or the participant does not consent."""
 
     status: Literal["withdrawn", "aborted"]
@@ -248,7 +240,7 @@ class EndRequested(_Timed):
 
 
 @dataclass(frozen=True, slots=True)
-class Broke(_Timed):
+class Broke(Event):
     """Device, servo or program failed; ``what`` is for the operator and the log, not for the participant.
 
     After a failure ``by`` the device (its servo, or a video) the session can go on, see `Reconnected`.
@@ -259,14 +251,14 @@ class Broke(_Timed):
 
 
 @dataclass(frozen=True, slots=True)
-class Reconnected(_Timed):
+class Reconnected(Event):
     """What failed is open again and the servo runs at zero force; the journal keeps ``described``, of the device."""
 
     described: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class WriteFailed(_Timed):
+class WriteFailed(Event):
     """The disk did not take a command, for a reason; it and those after it, of moment ``at_s``, are ``left``."""
 
     reason: str
@@ -274,38 +266,13 @@ class WriteFailed(_Timed):
 
 
 @dataclass(frozen=True, slots=True)
-class WriteRetried(_Timed):
+class WriteRetried(Event):
     """What the disk did not take is tried again."""
 
 
 @dataclass(frozen=True, slots=True)
-class WriteCompleted(_Timed):
+class WriteCompleted(Event):
     """The disk took all that was left."""
-
-
-Event: TypeAlias = (
-    Begin
-    | Continue
-    | LanguageChosen
-    | TaskDone
-    | ItemShown
-    | Chosen
-    | Retracted
-    | Stepped
-    | Submitted
-    | TimeUp
-    | PauseRequested
-    | ResumeRequested
-    | ForceStopped
-    | Note
-    | RepeatRequested
-    | EndRequested
-    | Broke
-    | Reconnected
-    | WriteFailed
-    | WriteRetried
-    | WriteCompleted
-)
 
 
 def broken(at_s: float, error: BaseException) -> Broke:

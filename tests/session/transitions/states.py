@@ -1,8 +1,9 @@
 """A session in each of its phases, an event of each kind, and what a transition commands."""
 
 from functools import cache
-from typing import Any, get_args
+from typing import Any
 
+from study_app.session.transitions import events
 from study_app.session.transitions.events import (
     Broke,
     Chosen,
@@ -28,7 +29,7 @@ from study_app.session.transitions.table import advance
 from tests.journal_lines import event_of as line_of
 from tests.session import pairs, small
 
-EVENTS = get_args(Event)
+EVENTS = tuple(kind for kind in vars(events).values() if isinstance(kind, type) and Event in kind.__bases__)
 LEFT = Write(line_of("choice", trial=2, item="liquid", value=5), waits=True)
 
 

@@ -10,34 +10,25 @@ from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 from study_app.errors import SessionError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.session.pages import Page
-from study_app.session.transitions.events import (
-    Adjust,
-    Begin,
-    Command,
-    Event,
-    ShowPage,
-    StartTrial,
-    TaskDone,
-    TimeUp,
-    Write,
-)
+from study_app.session.transitions.events import Adjust, Begin, Command, ShowPage, StartTrial, TaskDone, TimeUp, Write
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
 from tests.protocol.edited_studies import text_of
 from tests.protocol.trials.level_studies import key_of
 from tests.protocol.trials.matching import ALONE, matching
 from tests.session import pairs, small
+from tests.session.transitions.states import EVENTS as ALL_EVENTS
 from tests.session.transitions.states import state_in
 
 FOLDER = Path(__file__).parent / "transcripts"
-EVENTS: Mapping[str, type[Any]] = {kind.__name__: kind for kind in get_args(Event)}
+EVENTS: Mapping[str, type[Any]] = {kind.__name__: kind for kind in ALL_EVENTS}
 SHOWN = ("phase", "index", "attempt", "interval", "steps", "force_off", "held", "invalid")
 """What is told of a state."""
 VALUE = (("levels = [0.1, 0.8]", 'levels = [0.1, 0.8]\nlevel = "value"'), ("standards = [1, 2]\n", ""))
