@@ -14,7 +14,6 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import SEALED, BlockAnswers, block_answers, block_facts, untested
 from study_app.analysis.levels.evaluate import levels_found
-from study_app.analysis.levels.thresholds import site_thresholds
 from study_app.analysis.results import (
     BlockFound,
     Delivered,
@@ -97,7 +96,6 @@ def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
         questions=failures.value("the answers to other questions", lambda: questions_found(study), ()),
         scores=failures.value("scores of questionnaires", lambda: scores_found(study), ()),
         levels=levels,
-        site_thresholds=failures.value("thresholds by site", lambda: tuple(site_thresholds(study, levels, SEED)), ()),
         performance=failures.value("motion and force", moved, None),
         failures=tuple(failures.found),
     )

@@ -13,7 +13,6 @@ from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynami
 from study_app.analysis.data.motion import Performance
 from study_app.analysis.statistics.equivalence import UNSEEN, UNSEEN_EQUAL, Equivalence, fewest
 from study_app.analysis.statistics.outcome import Interval, Outcome
-from study_app.analysis.statistics.rank_tests import GroupsDiffer, Paired
 from study_app.protocol.orders.balance import Evenness
 
 
@@ -42,23 +41,6 @@ class Delivered:
     error_mean_ms: float | None
     error_worst_ms: float | None
     achieved_ms: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class SiteThresholds:
-    """Thresholds of a block's participants at one ``standard``.
-
-    ``medians`` are those of the sites named ``sites``; ``thresholds`` and ``of_sites`` have an entry per participant.
-    """
-
-    block: str
-    title: str
-    standard: float | None
-    sites: tuple[str, ...]
-    medians: tuple[float, ...]
-    thresholds: tuple[float, ...]
-    of_sites: tuple[str, ...]
-    outcome: GroupsDiffer
 
 
 T = TypeVar("T")
@@ -262,8 +244,8 @@ class LevelsFound:
 class Results:
     """All that was found in a study; ``failures`` are the parts that could not be computed.
 
-    ``questions`` and ``scores`` are the answers to questions other than statements, ``levels`` the blocks of levels,
-    ``site_thresholds`` their thresholds at the sites of a merged study; JSON omits them where there are none.
+    ``questions`` and ``scores`` are the answers to questions other than statements, ``levels`` the blocks of levels;
+    JSON omits them where there are none.
     """
 
     decided: Decided
@@ -277,7 +259,6 @@ class Results:
     questions: tuple[QuestionFound, ...] = ()
     scores: tuple[ScoreFound, ...] = ()
     levels: tuple[LevelsFound, ...] = ()
-    site_thresholds: tuple[SiteThresholds, ...] = ()
 
 
 _SMALL: Final = "no one two three four five six seven eight nine ten eleven twelve"
@@ -423,21 +404,10 @@ def enough(alpha: float) -> str:
     )
 
 
-def higher(found: BlockFound, outcome: Outcome) -> str:
-    """Return which of two settings was rated higher; empty where more are compared."""
-    if not isinstance(outcome, Paired) or len(found.names) != 2 or not outcome.effect:
-        return ""
-    first, second = (name(found, setting.code) for setting in found.settings)
-    return f"higher for {first if outcome.effect > 0 else second}, "
-
-
 def test_name(outcome: Outcome) -> str:
     """Return a test as a sentence names it."""
     return {
         "Friedman": "Friedman's test",
-        "Kruskal-Wallis": "the Kruskal–Wallis test",
-        "Kruskal-Wallis of differences": "the Kruskal–Wallis test of differences between the two settings",
-        "permutation test of rank profiles": "a permutation test of the ranks of the settings",
         "Wilcoxon signed ranks": "Wilcoxon's signed ranks",
         "Page's trend": "Page's test of a trend",
     }.get(outcome.test, outcome.test)

@@ -52,7 +52,7 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
     json.dumps(plain(results), allow_nan=False)
     failures = Failures()
     figures = list(pictures(made, results, forms, failures)) if forms else []
-    texts = [*sections.findings(results), methods(made, results), *sections.limits(made, results)]
+    texts = [methods(made, results), *sections.limits(made, results)]
     page = first_page(results, sections.limits(made, results))
     texts.append(seen(re.sub(r'src="[^"]*"', 'src="#part-"', page)))
     for found in results.blocks:
@@ -62,7 +62,7 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
             if found.kind not in (finding.kinds if found.revealed else finding.sealed):
                 assert finding.of(found) == finding.empty, finding.key
             here = finding(found, results)
-            told = [*here.sentences(), *here.limits(), *here.methods()]
+            told = [*here.limits(), *here.methods()]
             assert all(text.endswith(".") for text in told), finding.key
             assert all(row["block"] == found.id for row in here.rows()), finding.key
     asked = [(one.block, one.question) for one in answers(results)]

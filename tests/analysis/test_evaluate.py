@@ -15,7 +15,7 @@ from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.delays import ContrastsWithControl, equivalent_up_to
 from study_app.analysis.findings.finding import MANY, judged, of_tables
-from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
+from study_app.analysis.findings.mixed_models import MixedModel
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of
 from study_app.analysis.report.write_report import plain
@@ -104,11 +104,7 @@ def test_equivalence_goes_up_from_the_shortest_delay_and_stops_at_the_first_that
 
 def test_of_five_no_pair_and_no_model_is_there_and_it_says_why(rek: Folder) -> None:
     liquids, delays = blocks(opened(rek, 5))
-    assert (
-        Pairs.of(liquids),
-        SameWithOtherAssumptions.of(liquids).mixed,
-        SameWithOtherAssumptions.of(delays).mixed,
-    ) == ((), (), ())
+    assert (Pairs.of(liquids), MixedModel.of(liquids), MixedModel.of(delays)) == ((), (), ())
     assert [one.what for one in liquids.absent] == ["comparison of two settings", "mixed model of the settings"]
     assert "5 participants cannot show it: the smallest p that 5 pairs can give is 0.0625" in liquids.absent[0].why
     assert "0.1875, which is above 0.05" in liquids.absent[0].why
@@ -164,8 +160,6 @@ def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder)
     one = next(one for one in SettingsDiffer.of(liquids) if one.item == "immersive")
     assert (one.outcome.n, one.outcome.dropped) == (8, 1)
     assert one.outcome.p == pytest.approx(whole["immersive"].p)
-    assert [other.item for other in SameWithOtherAssumptions.of(liquids).incomplete] == ["immersive"]
-    assert SameWithOtherAssumptions.of(liquids).incomplete[0].outcome.n == 9
     assert next(row for row in liquids.measures if row["item"] == "immersive" and row["missing"])["n"] == 8
 
 

@@ -10,9 +10,9 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import codebook_bytes
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold
-from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
+from study_app.analysis.findings.mixed_models import MixedModel
 from study_app.analysis.findings.statement_tests import DelayTrend, SessionsDiffer, SettingsDiffer
-from study_app.analysis.report.sections import block, findings, methods
+from study_app.analysis.report.sections import block, methods
 from study_app.analysis.results import BlockFound, Results, all_of, said_of_presentations
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 
@@ -75,11 +75,6 @@ def test_all_statements_are_told_as_a_reader_would() -> None:
     assert [all_of(count, "statement") for count in (1, 2, 3)] == [
         *("the one statement", "both statements", "all three statements")
     ]
-    two = liquids(2)
-    made = study(two, list(everybody(two, 10, moved)))
-    told = " ".join(findings(evaluate(made)))
-    assert "one test over both statements" in told
-    assert "“Different” (higher for Liquid2, adjusted p" in told
 
 
 FOUR_LEVELS = (0.0, 50.0, 100.0, 150.0)
@@ -113,7 +108,7 @@ def test_repetitions_are_said_and_single_answers_are_used_where_levels_count() -
     assert described["answers_per_participant_setting_and_item"] == [2, 2]
     assert DetectionThreshold.of(found) is not None
     assert set(DetectionThreshold.of(found).asked) == {20}
-    for one in SameWithOtherAssumptions.of(found).mixed:
+    for one in MixedModel.of(found):
         assert all(float(level).is_integer() for level in one.outcome.levels)  # type: ignore[attr-defined]
 
 
@@ -122,8 +117,8 @@ def test_sessions_are_shown_and_tested() -> None:
     results, found = evaluated(made)
     assert found.sessions == (1, 2)
     assert [one.verdict for one in SessionsDiffer.of(found)] == ["suggested", "suggested"]
-    assert all("sessions as a factor" in one.outcome.method for one in SameWithOtherAssumptions.of(found).mixed)
-    assert len(SameWithOtherAssumptions.of(found).mixed) == len(ITEMS)
+    assert all("sessions as a factor" in one.outcome.method for one in MixedModel.of(found))
+    assert len(MixedModel.of(found)) == len(ITEMS)
     page = " ".join(block(found, results, ()))
     assert "The answers are of sessions 1 and 2, which are compared with each other" in page
     assert "Do sessions differ?" in page

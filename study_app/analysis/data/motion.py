@@ -64,11 +64,6 @@ class Reach:
     submovements: int
 
 
-def targets_of(task: Mapping[str, Any]) -> Targets:
-    """Return the targets of a task as a receipt holds it."""
-    return Targets(np.asarray(task["targets_mm"], dtype=float) / 1000, task["radius_mm"] / 1000, task["dwell_s"])
-
-
 def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> tuple[Reach, ...]:
     """Return the completed reaches of a trial from times (n,) and places of the hand (n, 3), first sample to last."""
     seconds = (times_ns - times_ns[0]) / 1e9 if len(times_ns) else np.zeros(0)
@@ -243,7 +238,9 @@ def _targets(protocol: Mapping[str, Any], block: Block) -> Targets | None:
     """Return the targets of a block's task, None where it has none."""
     named = protocol.get("blocks", {}).get(block.id, {}).get("task")
     task = protocol.get("tasks", {}).get(named, {})
-    return targets_of(task) if task.get("kind") == "reach" else None
+    if task.get("kind") != "reach":
+        return None
+    return Targets(np.asarray(task["targets_mm"], dtype=float) / 1000, task["radius_mm"] / 1000, task["dwell_s"])
 
 
 def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached | str:

@@ -47,18 +47,13 @@ def long_sav(study: Study, table: Delivered) -> bytes:
     """Return the long table of responses as a .sav file."""
     frame = table.frame
     if study.protocol_format > 1:  # the answers of all kinds in one column are texts, without levels
-        return _sav(study, table, {})
+        return sav(study, table, {})
     answers = frame["response"].astype("Float64").fillna(NOT_ANSWERED).mask(frame["cannot_judge"], CANNOT_JUDGE)
     labels = {block.labels for block in study.blocks}
     levels = dict(zip(LEVELS, next(iter(labels)), strict=True)) if len(labels) == 1 else {}
     words = {block.cannot_judge for block in study.blocks if block.cannot_judge}
     coded = {"response": _levels(levels, " / ".join(sorted(words)))}
-    return _sav(study, Delivered(table.name, table.columns, frame.assign(response=answers)), coded)
-
-
-def plain_sav(study: Study, table: Delivered) -> bytes:
-    """Return a table whose numbers have no codes as a .sav file."""
-    return _sav(study, table, {})
+    return sav(study, Delivered(table.name, table.columns, frame.assign(response=answers)), coded)
 
 
 def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | QuestionCells]) -> bytes:
@@ -77,7 +72,7 @@ def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | Questio
         coded[name] = _levels(dict(zip(LEVELS, one.block.labels, strict=True)), one.block.cannot_judge or "")
     numbered = {name for name, found in coded.items() if found}
     columns = tuple(replace(one, kind="number") if one.name in numbered else one for one in table.columns)
-    return _sav(study, Delivered(table.name, columns, frame), {name: coded[name] for name in numbered})
+    return sav(study, Delivered(table.name, columns, frame), {name: coded[name] for name in numbered})
 
 
 def _question(
@@ -105,7 +100,7 @@ def _levels(levels: Mapping[int, str], cannot_judge: str) -> dict[int, str]:
     return {**levels, CANNOT_JUDGE: cannot_judge or "Cannot judge", NOT_ANSWERED: "No answer"}
 
 
-def _sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]]) -> bytes:
+def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]]) -> bytes:
     """Write the table; ``coded`` has the levels of columns whose missing answers have codes."""
     names = names_of([column.name for column in table.columns])
     columns = {names[column.name]: column for column in table.columns}

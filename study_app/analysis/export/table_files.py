@@ -45,7 +45,7 @@ def table_files(
         opened = {"tracks", *(one.table for one in statistics())}
         files[file_name(study, tables[0], "sav")] = spss.long_sav(study, tables[0])
         files[file_name(study, tables[-1], "sav")] = spss.wide_sav(study, tables[-1], cells)
-        files |= {file_name(study, one, "sav"): spss.plain_sav(study, one) for one in tables if one.name in opened}
+        files |= {file_name(study, one, "sav"): spss.sav(study, one, {}) for one in tables if one.name in opened}
     return files
 
 

@@ -8,7 +8,6 @@ Darker means more, and every count stands in its cell, so that nothing depends o
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -243,14 +242,8 @@ def draw_threshold(found: Threshold, lowest_ms: float | None, look: Look) -> She
     return sheet
 
 
-REASONS: Final = 5
-REASON_SIGNS: Final = 80
-"""How many reasons for exclusions a caption names; the codebook of an export holds all."""
-
 FILES: Final = 3
 """Of files that are not as recorded so many are named."""
-
-_NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
 def title(block: Block) -> str:
@@ -261,26 +254,17 @@ def title(block: Block) -> str:
 
 
 def counts(study: Study, block: Block) -> list[str]:
-    """Return what a figure says about n and about answers that are missing, the longest wording first."""
+    """Return what the figure of a block says about n and missing ratings, the longest wording first."""
     people = set(people_a_setting(study, block).values())
     n = len(set(study.answers(block)["participant"]))
     table = study.aggregate(block)
     asked = int(table["presented"].sum())
     lacking = asked - int(table["n"].sum())
-    gaps = f", {lacking} of {asked} ratings missing" if lacking else ""
-    missing = f", {lacking} missing" if lacking else ""
-    noun = _noun(block)
+    words = f"n = {counted(n, 'participant')}"
     if people != {n}:
-        low, high = min(people), max(people)
-        short = f"n = {_listed(people)} of {n} participants"
-        whole, least = f"{short} in a {noun}", f"n = {low}–{high}"
-    else:
-        short, least = f"n = {counted(n, 'participant')}", f"n = {n}"
-        presented = set(study.presented(block).values())
-        whole = f"{short}, {_listed(presented)} presentations of a {noun}"
-        if presented == {n}:
-            whole = f"{short}, every {noun} {'presented to' if gaps else 'rated by'} all" if n > 1 else short
-    return [f"{whole}{gaps}", *([f"{whole}{missing}"] if gaps else []), f"{short}{missing}", f"{least}{missing}"]
+        words = f"n = {_listed(people)} of {n} participants in a {_noun(block)}"
+    missing = f", {lacking} of {asked} ratings missing" if lacking else ""
+    return [f"{words}{missing}", f"n = {_listed(people)}{missing}"]
 
 
 def _listed(values: set[int]) -> str:
@@ -302,8 +286,8 @@ def caption(study: Study, block: Block) -> str:
 def _sentences(study: Study, block: Block) -> Iterator[str]:
     simulated = "SIMULATED participants, no people; " if study.simulated else ""
     yield (
-        f"{'Pilot. ' if study.pilot else ''}Agreement with {_number(len(block.items), 'statement')} on "
-        f"{_number(len(block.settings), _noun(block))} ({simulated}{counts(study, block)[0]})."
+        f"{'Pilot. ' if study.pilot else ''}Agreement with {counted(len(block.items), 'statement')} on "
+        f"{counted(len(block.settings), _noun(block))} ({simulated}{counts(study, block)[0]})."
     )
     yield from _marks_of_delays(study, block) if block.kind == "delays" else _marks_of_bars(block)
     if not study.revealed:
@@ -320,10 +304,10 @@ def _sentences(study: Study, block: Block) -> Iterator[str]:
     if study.left_out:
         yield f"{counted(study.left_out, 'session is', 'sessions are')} left out, not having been completed."
     if len(rows := study.excluded_sessions):
-        yield f"{counted(len(rows), 'session is', 'sessions are')} excluded ({_reasons(rows)})."
+        yield f"{counted(len(rows), 'session is', 'sessions are')} excluded."
     if len(rows := study.excluded_trials(block)):
         which = counted(len(rows), "trial is excluded, its answers", "trials are excluded, their answers")
-        yield f"{which} missing here ({_reasons(rows)})."
+        yield f"{which} missing here."
     if invalid := int((~trials["valid"].fillna(value=True)).sum()):
         yield f"{invalid} of {len(trials)} trials exceeded the protocol's limits of timing and are included."
     if study.doubts:
@@ -354,29 +338,12 @@ def _marks_of_delays(study: Study, block: Block) -> Iterator[str]:
     yield f"Answers from 1 ({block.labels[0]}) to 7 ({block.labels[-1]})."
 
 
-def _reasons(rows: pd.DataFrame) -> str:
-    """List why rows are excluded: each reason once, with its number where it is not the only one."""
-    given = (" ".join(str(reason).split()) for reason in rows["exclusion_reason"].fillna("no reason given"))
-    found = Counter(
-        reason if len(reason) <= REASON_SIGNS else f"{reason[: REASON_SIGNS - 1].rstrip()}…" for reason in given
-    )
-    shown = found.most_common(REASONS)
-    reasons = [f"{count} × {reason}" if len(found) > 1 else reason for reason, count in shown]
-    more = found.total() - sum(count for _, count in shown)
-    return "; ".join([*reasons, *([f"{more} × other"] if more else [])])
-
-
 def _counted_trials(study: Study, block: Block) -> pd.DataFrame:
     return study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
 
 
 def _noun(block: Block) -> str:
     return block.kind.removesuffix("s") if block.revealed else "setting"
-
-
-def _number(count: int, noun: str) -> str:
-    words = _NUMBERS[count] if count < len(_NUMBERS) else str(count)
-    return f"{words} {noun}" + ("" if count == 1 else "s")
 
 
 PANELS_A_ROW: Final = 3

@@ -109,11 +109,6 @@ def _differs(found: BlockFound, against: ContrastWithControl) -> dict[str, Any]:
     }
 
 
-def _without_normality(tested: Equivalence) -> float | None:
-    """Return the largest p of the tests for equivalence that do not ask for normality."""
-    return max((p for p in (tested.p_permutation, tested.p_ranks, tested.p_bootstrap) if p is not None), default=None)
-
-
 def _p_different(one: ContrastWithControl) -> str:
     """Return the adjusted p of a difference, unless no answers of so many participants could have shown one."""
     out = min(1.0, 2 * 0.5**one.found.n) * one.members > one.found.alpha
@@ -274,7 +269,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             ("interval", lambda one: interval(one.found.interval)),
             ("people beyond the bound", lambda one: beyond(one.found)),
             ("p equivalent", lambda one: p_value(one.found.p)),
-            ("p without normality", lambda one: p_value(_without_normality(one.found))),
+            ("p without normality", lambda one: p_value(one.found.p_without_normality)),
             ("p different, adjusted", _p_different),
             ("Verdict", lambda one: one.verdict + (" *" if one.found.checks_agree is False else "")),
             words=2,
@@ -333,14 +328,6 @@ class Lowest:
         return lowest
 
 
-def _at_most(delay_ms: float | None) -> str:
-    return "–" if delay_ms is None else f"≤ {ms(delay_ms)}"
-
-
-def _steps(one: Lowest) -> str:
-    return "; ".join(f"{ms(step.longest_ms)} {p_value(step.page.p)}" for step in one.steps.steps)
-
-
 class LowestDelay(Finding[tuple[Lowest, ...]]):
     """The lowest delay at which a trend shows, stepping down from the longest."""
 
@@ -385,9 +372,12 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         yield table_of(
             self.value,
             ("Statement", lambda one: short(self.found, one.item)),
-            ("lowest", lambda one: _at_most(one.over_all_ms)),
-            ("uncorrected", lambda one: _at_most(one.steps.lowest_ms)),
-            ("steps down: longest delay, p", _steps),
+            ("lowest", lambda one: "–" if one.over_all_ms is None else f"≤ {ms(one.over_all_ms)}"),
+            ("uncorrected", lambda one: "–" if one.steps.lowest_ms is None else f"≤ {ms(one.steps.lowest_ms)}"),
+            (
+                "steps down: longest delay, p",
+                lambda one: "; ".join(f"{ms(step.longest_ms)} {p_value(step.page.p)}" for step in one.steps.steps),
+            ),
             words=4,
         )
         members = self.value[0].members
@@ -398,22 +388,6 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
             "upper bound and biased upward: few participants find only long delays.",
             "soft",
         )
-
-    def sentences(self) -> Iterator[str]:
-        lowest = [
-            f"“{short(self.found, one.item)}” {ms(one.over_all_ms)}"
-            for one in self.value
-            if one.over_all_ms is not None
-        ]
-        if lowest:
-            complete = {one.steps.steps[0].page.n for one in self.value}
-            most = max(complete)
-            used = counted(most, "participant") if len(complete) == 1 else f"{min(complete)} to {most} participants"
-            yield (
-                f"{lead(self.found)}: the lowest delay at which the answers of {used} show a trend, "
-                f"corrected for {all_of(self.value[0].members, 'statement')}: {listed(lowest)}. "
-                "Each is an upper bound: shorter delays may be noticed too."
-            )
 
 
 class DetectionThreshold(Finding[Threshold | None]):
@@ -488,15 +462,6 @@ class DetectionThreshold(Finding[Threshold | None]):
         return drawing.picture(
             self.figure_title, caption, lambda look: answer_figures.draw_threshold(threshold, lowest, look)
         )
-
-    def sentences(self) -> Iterator[str]:
-        threshold = self.value
-        if threshold is not None and threshold.effect is not None:
-            yield (
-                f"{lead(self.found)}: the detection threshold is {threshold.effect:.0f} ms (95 % interval "
-                f"{interval(threshold.interval, 0)} ms, n = {threshold.n}), if agreeing counts as noticing; "
-                f"{'; '.join(words for words in (threshold.no_interval, threshold.note) if words)}."
-            )
 
     def methods(self) -> Iterator[str]:
         if self.value is not None:
@@ -575,25 +540,6 @@ class UnchangedUpTo(Finding[None]):
         statements = all_of(len(equivalent_up_to(against)), "statement")
         text = f"Up to {ms(at)} mean answers to {statements} stay {within}; single people may notice the delay."
         return self.answered("shown", text)
-
-    def sentences(self) -> Iterator[str]:
-        against = ContrastsWithControl.of(self.found)
-        if not against:
-            return
-        within, control = _within(against[0]), ms(against[0].control_ms)
-        up_to = [
-            f"“{short(self.found, item)}” up to {ms(delay)}"
-            for item, delay in equivalent_up_to(against).items()
-            if delay is not None
-        ]
-        if up_to:
-            yield f"{lead(self.found)}: mean answers {within} are shown for {listed(up_to)}."
-        elif all(one.found.p is None for one in against):
-            reasons = "; ".join(dict.fromkeys(one.found.note for one in against))
-            yield f"{lead(self.found)}: no delay could be compared with {control} ({reasons})."
-        else:
-            nearest = ms(against[0].delay_ms)
-            yield f"{lead(self.found)}: mean answers {within} are shown in no statement, not even at {nearest}."
 
 
 def _within(against: ContrastWithControl) -> str:

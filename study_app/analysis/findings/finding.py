@@ -429,10 +429,6 @@ class Finding(Generic[R]):
         """Return the HTML of its part of the report's section of the block."""
         return ()
 
-    def sentences(self) -> Iterable[str]:
-        """Return the sentences of the summary."""
-        return ()
-
     def limits(self) -> Iterable[str]:
         """Return the sentences about what was not shown."""
         return ()

@@ -31,7 +31,6 @@ from study_app.analysis.results import (
     Verdict,
     counted,
     interval,
-    lead,
     listed,
     name,
     number,
@@ -145,23 +144,6 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
                 right,
             ),
             answer_figures.counts(study, block),
-        )
-
-    def sentences(self) -> Iterator[str]:
-        named = self.value
-        if named is None or named.found.p is None or named.found.expected is None or named.found.statistic is None:
-            return
-        rates = [f"{self.found.names[rate.setting]} {rate.hits} of {rate.n}" for rate in named.found.rates]
-        answers = named.found.decided + named.found.undecided
-        verdict = {
-            "shown": "recognition above chance is shown",
-            "suggested": "recognition above chance is suggested (exploratory)",
-            "out of reach": "recognition above chance was out of reach of these answers",
-        }.get(named.verdict, "recognition above chance is not shown")
-        yield (
-            f"{lead(self.found)}: {verdict}: {named.found.statistic:g} of {answers} names were right, "
-            f"{number(named.found.expected, 1)} expected by chance ({p_equals(named.found.p)}). This is "
-            f"about all liquids together; by liquid: {listed(rates)}."
         )
 
     def methods(self) -> Iterator[str]:

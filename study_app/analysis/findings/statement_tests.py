@@ -1,16 +1,12 @@
-"""Tests of statements: whether settings differ, in which pairs, with the delay, between sessions and between sites.
-
-The tables, the rows of tests.csv and the sentences of all of them are made here.
-"""
+"""Tests of statements: whether settings differ, in which pairs, with the delay and between sessions."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, ClassVar, Final
 
 import numpy as np
-from scipy.stats import rankdata
 
 from study_app import number_text
 from study_app.analysis.data.blocks import KINDS
@@ -18,7 +14,6 @@ from study_app.analysis.data.measures import medians
 from study_app.analysis.findings.finding import (
     FDR,
     HOLM,
-    SEALED,
     Absent,
     BlockAnswers,
     Finding,
@@ -36,9 +31,7 @@ from study_app.analysis.results import (
     Tested,
     all_of,
     counted,
-    higher,
     interval,
-    lead,
     listed,
     name,
     number,
@@ -50,14 +43,7 @@ from study_app.analysis.results import (
     test_name,
 )
 from study_app.analysis.statistics.outcome import Outcome, false_discovery, holm
-from study_app.analysis.statistics.rank_tests import (
-    GroupsDiffer,
-    Paired,
-    friedman,
-    global_permutation,
-    groups_differ,
-    paired,
-)
+from study_app.analysis.statistics.rank_tests import Paired, friedman, global_permutation, paired
 from study_app.analysis.statistics.trend import page
 
 ONE_DELAY: Final = "the block has one delay: there is nothing to compare it with"
@@ -106,29 +92,6 @@ def _verdict(one: Tested) -> str:
     return one.verdict + (f" ({one.outcome.note})" if one.verdict == "not tested" and one.outcome.note else "")
 
 
-def tests_in_words(found: BlockFound, tests: Sequence[Tested], showing: str, nothing: str) -> Iterator[str]:
-    """Yield in which statements tests show something, or that they show ``nothing``; no sentence without tests."""
-    if not tests:
-        return
-    shown, suggested = (
-        [
-            f"“{short(found, one.item)}” ({higher(found, one.outcome)}"
-            f"{'' if one.p_adjusted is None else f'adjusted {p_equals(one.p_adjusted)}'})"
-            for one in tests
-            if one.verdict == verdict
-        ]
-        for verdict in ("shown", "suggested")
-    )
-    if shown or suggested:
-        parts = [*([listed(shown)] if shown else []), *([f"{listed(suggested)} (exploratory)"] if suggested else [])]
-        yield f"{lead(found)}: {showing} {'; '.join(parts)}."
-    elif any(one.outcome.p is not None for one in tests):
-        yield f"{lead(found)}: {nothing} is shown."
-    else:
-        why = "; ".join(dict.fromkeys(one.outcome.note for one in tests))
-        yield f"{lead(found)}: no statement could be tested ({why})."
-
-
 def families(tests: Sequence[Tested]) -> str:
     """Return what is corrected together: primary statements, and apart from them the exploratory ones."""
     each = sorted({(not one.primary, one.members, one.correction) for one in tests})
@@ -162,8 +125,6 @@ class StatementTests(Finding[tuple[Tested, ...]]):
     empty = ()
     asks: ClassVar[str]
     title: ClassVar[str]
-    showing: ClassVar[str] = ""
-    nothing: ClassVar[str] = ""
 
     def compared(self) -> Sequence[str]:
         """Return the names of what is compared."""
@@ -174,10 +135,6 @@ class StatementTests(Finding[tuple[Tested, ...]]):
 
     def section(self) -> Iterator[str]:
         return table_of_tests(self._said(self.title), self.found, self.value, self.compared())
-
-    def sentences(self) -> Iterator[str]:
-        if self.showing:
-            yield from tests_in_words(self.found, self.value, self._said(self.showing), self._said(self.nothing))
 
     def _said(self, words: str) -> str:
         return words.format(noun=settings_noun(self.found))
@@ -196,8 +153,6 @@ class SettingsDiffer(StatementTests):
     statements = True
     asks = "settings differ"
     title = "Do the {noun}s differ, statement by statement?"
-    showing = "the {noun}s differ in"
-    nothing = "in no single statement a difference between the {noun}s"
 
     @classmethod
     def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
@@ -232,8 +187,6 @@ class DelayTrend(StatementTests):
     statements = True
     asks = "answers follow the delay"
     title = "Do answers follow the delay?"
-    showing = "answers follow the delay, in the direction stated before the study, in"
-    nothing = "in no statement a trend over the delay"
 
     @classmethod
     def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
@@ -295,103 +248,6 @@ class SessionsDiffer(StatementTests):
         return tested, ()
 
 
-@dataclass(frozen=True, slots=True)
-class SiteTests:
-    """Tests of each statement: of the participants' medians (``level``), and of the ``profile`` over settings."""
-
-    level: tuple[Tested, ...] = ()
-    profile: tuple[Tested, ...] = ()
-
-
-class SitesDiffer(Finding[SiteTests]):
-    """The comparison of a merged study's sites: in the level of answers, and in what settings do.
-
-    Comparisons of settings are within participants, so that a difference in level between sites cannot appear in them.
-    What can is a difference between settings that is another at another site.
-    """
-
-    key = "by_site"
-    place = 12.5
-    row_place = 4.5
-    what = "comparison of sites"
-    part = "sites"
-    sealed = KINDS
-    about = "sessions"
-    empty = SiteTests()
-
-    @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[SiteTests, Absent]:
-        """A participant's level is the median over settings; the profile has their ranks, or the difference of two."""
-        if not answers.sites:
-            return SiteTests(), ()
-        if not answers.block.revealed:
-            return SiteTests(), (NotTested(cls.what, SEALED),)
-
-        def differ(values: Any, test: str) -> GroupsDiffer:
-            return groups_differ(values, answers.sites, test=test, draws=answers.draws, seed=answers.seed)
-
-        levels, profiles = {}, {}
-        for item in answers.block.items:
-            values = answers.values[item.id]
-            levels[item.id] = differ(np.median(values, axis=1)[:, None], "Kruskal-Wallis")
-            if answers.k == 2:
-                profiles[item.id] = differ(np.diff(values, axis=1), "Kruskal-Wallis of differences")
-            elif answers.k > 2:
-                ranks = rankdata(values, axis=1, nan_policy="propagate")
-                profiles[item.id] = differ(ranks, "permutation test of rank profiles")
-        return SiteTests(
-            *(
-                in_family(
-                    tests,
-                    answers.decided.alpha,
-                    f"{answers.block.id}: sites, {what}",
-                    false_discovery,
-                    FDR,
-                    primary=False,
-                )
-                for tests, what in ((levels, "level"), (profiles, "settings"))
-            )
-        ), ()
-
-    @classmethod
-    def entries(cls, found: BlockFound) -> Mapping[str, Any]:
-        return super().entries(found) if cls.of(found).level else {}
-
-    def rows(self) -> Iterator[Row]:
-        tests = self.value
-        yield from (judged_row(self.found, "sites differ", one) for one in tests.level)
-        yield from (judged_row(self.found, "interaction of setting and site", one) for one in tests.profile)
-
-    def section(self) -> Iterator[str]:
-        tests, noun = self.value, settings_noun(self.found)
-        yield from table_of_tests("Do sites differ?", self.found, tests.level)
-        yield from table_of_tests(f"Do differences between the {noun}s depend on the site?", self.found, tests.profile)
-        if tests.level:
-            yield paragraph(
-                f"First each participant's median over the {noun}s is compared between sites, then the order of the "
-                f"{noun}s by each participant's answers. All other tests compare within participants, so that a "
-                "difference in level between sites does not enter them.",
-                "soft",
-            )
-
-    def sentences(self) -> Iterator[str]:
-        tests, noun = self.value, settings_noun(self.found)
-        nothing = "in no single statement a difference between sites"
-        yield from tests_in_words(self.found, tests.level, "sites differ in", nothing)
-        nothing = f"in no single statement that differences between the {noun}s depend on the site"
-        showing = f"differences between the {noun}s depend on the site in"
-        yield from tests_in_words(self.found, tests.profile, showing, nothing)
-
-    @classmethod
-    def common_methods(cls, blocks: Sequence[BlockFound]) -> Iterator[str]:
-        tests = [one for found in blocks for one in (*cls.of(found).level, *cls.of(found).profile)]
-        if names := list(dict.fromkeys(test_name(one.outcome) for one in tests)):
-            yield (
-                f"Sites were compared by {listed(names)}, with participants exchanged between sites, p adjusted by "
-                f"{FDR}; all other tests are within participants, with the participants of all sites together."
-            )
-
-
 def over_all(answers: BlockAnswers, draws: int | None = None) -> Outcome | None:
     """Test once over all statements whether the settings are answered alike; ``draws`` of them if not as usual."""
     if answers.k < 2 or (answers.verdicts_only and draws is None):
@@ -430,15 +286,6 @@ class OverAll(Finding[Outcome | None]):
             f"{p_value(overall.smallest_p)}; {overall.method}), {overall.effect_name} {number(overall.effect)}, "
             f"n = {overall.n}."
         )
-
-    def sentences(self) -> Iterator[str]:
-        overall = self.value
-        if overall is not None and overall.p is not None:
-            yield (
-                f"{lead(self.found)}: one test over {all_of(len(self.found.items), 'statement')} "
-                f"{'finds' if overall.p <= self.results.decided.alpha else 'does not find'} a difference between the "
-                f"{settings_noun(self.found)}s ({p_equals(overall.p)}, n = {overall.n})."
-            )
 
     def methods(self) -> Iterator[str]:
         if self.value is not None and not self.found.delays_ms:

@@ -33,7 +33,6 @@ from study_app.analysis.levels.statistic import (
 from study_app.analysis.report.html_page import drawn, paragraph, table, table_of
 from study_app.analysis.results import LevelsFound, Summary, listed
 from study_app.analysis.statistics.outcome import Array, clopper_pearson, student_interval
-from study_app.analysis.statistics.thresholds import setting_statistics
 from study_app.protocol.trials.designs import Reply
 from study_app.protocol.trials.stimuli import Stimulus
 
@@ -81,19 +80,19 @@ def _setting(
     in_u = np.vectorize(stimulus.coordinate, otypes=[float])
     u, starts = (in_u(rows[name].to_numpy(dtype=float)) for name in ("setting", "level"))
     started_high = starts > sum(stimulus.domain) / 2
-    found = setting_statistics(u, started_high)
+    pse, (low, high) = float(u.mean()), student_interval(u)
+    above, below = u[started_high], u[~started_high]
     compared = standard is not None and block.design.intervals > 1
-    low, high = (None if end is None else stimulus.level_of(end) for end in (found.low, found.high))
     return SettingFound(
         participant=person,
         standard=standard,
-        n=found.n,
-        pse=stimulus.level_of(found.pse),
-        low=low,
-        high=high,
-        jnd=found.jnd,
-        constant_error=found.pse - stimulus.coordinate(standard) if compared and standard is not None else None,
-        hysteresis=found.hysteresis,
+        n=len(u),
+        pse=stimulus.level_of(pse),
+        low=None if low is None else stimulus.level_of(low),
+        high=None if high is None else stimulus.level_of(high),
+        jnd=float(u.std(ddof=1)) if len(u) > 1 else None,
+        constant_error=pse - stimulus.coordinate(standard) if compared and standard is not None else None,
+        hysteresis=float(above.mean() - below.mean()) if len(above) and len(below) else None,
         levels=tuple(rows["setting"].to_numpy(dtype=float).tolist()),
         started_high=tuple(started_high.tolist()),
     )

@@ -10,7 +10,7 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import number_or_none
-from study_app.analysis.levels.statistic import LevelStatistic, Shown, analysed, between, digits, level_words, unit
+from study_app.analysis.levels.statistic import LevelStatistic, Shown, between, digits, unit
 from study_app.analysis.results import counted, listed, number
 from study_app.protocol.checks.delayed_force import WITHHELD_PERCENT
 from study_app.protocol.trials.stimuli import OF_LINK
@@ -34,17 +34,6 @@ def _by_levels(rows: pd.DataFrame) -> Iterator[tuple[float | None, float, float,
         for some in np.array_split(levels, min(len(levels), MOST_LEVELS)):
             here = at_standard[level.between(some[0], some[-1])]
             yield number_or_none(standard), float(some[0]), float(some[-1]), here
-
-
-def _level_times(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Row]:
-    """Yield the median times [s] of correct and of other answers of all participants by level."""
-    rows = analysed(block, opened, "right")
-    for standard, low, high, here in _by_levels(rows[rows["response_s"].notna()]):
-        seconds, right = here["response_s"].to_numpy(dtype=float), here["right"].to_numpy(dtype=bool)
-        row = {"standard": standard, "low": low, "high": high}
-        for name, some in (("right", seconds[right]), ("wrong", seconds[~right])):
-            row |= {f"{name}_n": len(some), f"{name}_s": float(np.median(some)) if len(some) else None}
-        yield row
 
 
 def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[Row]:
@@ -95,26 +84,6 @@ def catch_answers(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Row]:
         wrong = int((~rows["right"].astype(bool)).sum())
         person, session = str(rows["participant"].iloc[0]), int(rows["session"].iloc[0])
         yield {"participant": person, "session": session, "n": len(rows), "wrong": wrong, "most": block.wrong_most}
-
-
-class TimesByLevel(LevelStatistic[Row]):
-    """The times of correct and of other answers by level."""
-
-    key = "level_times"
-    place = 5
-    title = "Time to answer by level"
-
-    compute = staticmethod(lambda block, opened, _study, _found: _level_times(block, opened))
-
-    def shown(self) -> Sequence[Shown]:
-        return (
-            self.standard(),
-            (level_words(self.found), _levels),
-            ("n correct", lambda one: str(one["right_n"])),
-            ("median, correct [s]", lambda one: number(one["right_s"])),
-            ("n incorrect", lambda one: str(one["wrong_n"])),
-            ("median, incorrect [s]", lambda one: number(one["wrong_s"])),
-        )
 
 
 class Delivery(LevelStatistic[Row]):

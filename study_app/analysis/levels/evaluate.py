@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import pandas as pd
 
-from study_app.analysis.data.blocks import LevelBlock, PublishedValue, setting_name
+from study_app.analysis.data.blocks import LevelBlock, PublishedValue, Setting, setting_name
 from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import Picture
@@ -52,12 +52,7 @@ def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opene
         title=block.title,
         design=block.design.kind,
         revealed=opened is not None,
-        times=tuple(
-            GroupAnswers(
-                one.code, setting_name(one, block.settings), _time_numbers(counted[counted["code"] == one.code])
-            )
-            for one in block.settings
-        ),
+        times=tuple(_times(counted, block, one) for one in block.settings),
         summary=SUMMARIES[block.design.reply],
         counts=block.counts,
         guess_rate=block.design.guess_rate if block.has_correct_answer else None,
@@ -84,10 +79,11 @@ def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opene
     return found
 
 
-def _time_numbers(answers: pd.DataFrame) -> dict[str, Any]:
-    seconds = answers["response_s"].dropna().to_numpy(dtype=float)
+def _times(answers: pd.DataFrame, block: LevelBlock, setting: Setting) -> GroupAnswers:
+    seconds = answers.loc[answers["code"] == setting.code, "response_s"].dropna().to_numpy(dtype=float)
     low, middle, high = quartiles_or_none(seconds)
-    return {"n": len(seconds), "median": middle, "q1": low, "q3": high}
+    numbers = {"n": len(seconds), "median": middle, "q1": low, "q3": high}
+    return GroupAnswers(setting.code, setting_name(setting, block.settings), numbers)
 
 
 def level_section(found: LevelsFound, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:

@@ -35,9 +35,8 @@ from study_app.analysis.levels.statistic import (
     with_unit,
 )
 from study_app.analysis.levels.tracks import TRACK, answers_of, setting_of
-from study_app.analysis.results import LevelsFound, SiteThresholds, counted, listed, number
+from study_app.analysis.results import LevelsFound, counted, listed, number
 from study_app.analysis.statistics.outcome import Array
-from study_app.analysis.statistics.rank_tests import groups_differ
 from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, drift, drifts, group_mean, p_of_fit
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
@@ -288,30 +287,6 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
             low=low,
             high=high,
         )
-
-
-def site_thresholds(study: Study, levels: Sequence[LevelsFound], seed: int) -> Iterator[SiteThresholds]:
-    """Yield the comparison of sites at each standard of each block; nothing where the study is not merged or sealed."""
-    for found in levels if study.sites else ():
-        for standard in dict.fromkeys(one.standard for one in Thresholds.own(found)):
-            own = [one for one in Thresholds.own(found) if one.standard == standard]
-            thresholds = tuple(one.threshold for one in own)
-            of_sites = tuple(study.site_of(str(one.participant)) for one in own)
-            sites = tuple(dict.fromkeys(of_sites))
-            medians = [
-                np.median([value for value, at in zip(thresholds, of_sites, strict=True) if at == site])
-                for site in sites
-            ]
-            yield SiteThresholds(
-                found.block,
-                found.title,
-                standard,
-                sites,
-                tuple(map(float, medians)),
-                thresholds,
-                of_sites,
-                groups_differ(np.array(thresholds)[:, None], of_sites, seed=seed),
-            )
 
 
 def percent_compared(found: LevelsFound) -> float | None:

@@ -54,17 +54,12 @@ def paragraph(words: str, kind: str = "") -> Markup:
     return _part("paragraph", words, kind)
 
 
-def not_there(why: str) -> Markup:
-    """Return the text that replaces a part that could not be computed."""
-    return box([paragraph(f"Not there: {why}.")], "care")
-
-
 def attempted(
     failures: Failures, what: str, title: Markup, make: Callable[[], Iterable[str]], *, block: str | None = None
 ) -> list[str]:
     """Return a part of the page; where it fails its title and why it is missing, and the failure is kept."""
     found = failures.attempt(what, lambda: list(make()), block=block)
-    return [title, not_there(found.why)] if isinstance(found, Failure) else found
+    return [title, box([paragraph(f"Not there: {found.why}.")], "care")] if isinstance(found, Failure) else found
 
 
 def bullets(lines: Iterable[str]) -> Markup:

@@ -34,7 +34,6 @@ from study_app.analysis.results import (
     QuestionFound,
     Results,
     ScoreFound,
-    SiteThresholds,
     counted,
     lead,
     listed,
@@ -42,28 +41,13 @@ from study_app.analysis.results import (
     ms,
     name,
     number,
-    p_value,
     said_of_presentations,
     settings_noun,
     short,
-    statistic,
-    test_name,
 )
 from study_app.analysis.statistics.outcome import FEW, holm
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.exclusions import named
-
-
-def findings(results: Results) -> tuple[str, ...]:
-    """Return what was found, a sentence each."""
-    of_statements = (
-        line
-        for found in results.blocks
-        if found.n
-        for finding in all_findings()
-        for line in finding(found, results).sentences()
-    )
-    return (*of_statements, *of_levels(results))
 
 
 def of_levels(results: Results) -> tuple[str, ...]:
@@ -276,7 +260,7 @@ def first_page(results: Results, limits: Sequence[str]) -> Markup:
     return render(
         "first_page.html",
         verdicts=verdicts if given else "",
-        without_findings=() if given else of_levels(results) or (none_found(results),),
+        sentences=of_levels(results) or (() if given else (none_found(results),)),
         limits=list(limits),
         shown=LIMITS_SHOWN,
         empty=empty_studies(max(found.n for found in results.blocks)) if given else "",
@@ -497,17 +481,11 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
         if rows := [one for one in means if one.block == found.id]:
             yield heading(3, found.title)
             yield _means(found, rows, by)
-    if by == "site":
-        yield from _site_thresholds(results)
     if not results.blocks:
         return
     yield paragraph(
-        "Mean and standard deviation over participants, each with the mean of their answers. "
-        + (
-            "Differences between groups are described, not tested."
-            if by == "group"
-            else "Sites are compared in the section of each block."
-        ),
+        "Mean and standard deviation over participants, each with the mean of their answers. Differences between "
+        f"{by}s are described, not tested.",
         "soft",
     )
 
@@ -522,35 +500,6 @@ def _means(found: BlockFound, rows: Sequence[Any], by: By) -> str:
         ("mean", lambda one: number(one.mean, 2)),
         ("SD", lambda one: number(number_or_none(one.sd), 2)),
         words=3,
-    )
-
-
-def _site_thresholds(results: Results) -> Iterator[str]:
-    """Yield the thresholds of blocks of levels by site, with their comparison."""
-    if not results.site_thresholds:
-        return
-    yield heading(3, "Thresholds")
-
-    def medians(one: SiteThresholds) -> str:
-        sizes = map(one.of_sites.count, one.sites)
-        each = zip(one.sites, one.medians, sizes, strict=True)
-        return "; ".join(f"{site}: {median:.3g} (n = {size})" for site, median, size in each)
-
-    yield table_of(
-        results.site_thresholds,
-        ("Block", lambda one: one.title),
-        ("Median by site", medians),
-        ("Standard", lambda one: "–" if one.standard is None else f"{one.standard:g}"),
-        ("Statistic", lambda one: statistic(one.outcome)),
-        ("p", lambda one: p_value(one.outcome.p)),
-        ("Share between sites", lambda one: number(one.outcome.effect)),
-        words=2,
-    )
-    methods = dict.fromkeys(one.outcome.method for one in results.site_thresholds if one.outcome.p is not None)
-    yield paragraph(
-        f"Median of the participants' thresholds; {test_name(results.site_thresholds[0].outcome)} "
-        f"({'; '.join(methods) or 'not computed'}), exploratory, p not adjusted.",
-        "soft",
     )
 
 

@@ -51,10 +51,7 @@ from study_app.store.output_files import write_output
 from study_app.store.sites.merged import MANIFEST, folders_of
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
-OF_FORMAT_2: Final = {
-    Results: frozenset({"questions", "scores", "levels", "site_thresholds"}),
-    Setting: frozenset({"link", "view"}),
-}
+OF_FORMAT_2: Final = {Results: frozenset({"questions", "scores", "levels"}), Setting: frozenset({"link", "view"})}
 """Results that reports of earlier versions do not have; omitted where there are none."""
 
 
@@ -276,7 +273,7 @@ def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, b
         return (f"Not there: {found.why}.",) if isinstance(found, Failure) else found
 
     texts: dict[str, Any] = {
-        "findings": told("findings", lambda: sections.findings(results)),
+        "findings": told("findings", lambda: sections.of_levels(results)),
         "limits": told("limits", lambda: sections.limits(study, results)),
         "methods": told("methods", lambda: (methods(study, results),))[0],
     }
@@ -310,7 +307,6 @@ def _page(
     study: Study, results: Results, drawn: Sequence[Picture], texts: Mapping[str, Any], failures: Failures
 ) -> str:
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
-        ("In short", lambda: _short(texts, results)),
         *((found.title, partial(sections.block, found, results, drawn, failures)) for found in results.blocks),
         *(
             (title, partial(sections.question_section, where, study, results, drawn))
@@ -357,15 +353,6 @@ def _marks(study: Study) -> list[tuple[str, str]]:
     marks = [("mark", "SIMULATED participants, no people")] if study.simulated else []
     marks += [("mark", "PILOT")] if study.pilot else []
     return marks if study.revealed else [*marks, ("sealed", "Blinded: by code")]
-
-
-def _short(texts: Mapping[str, Any], results: Results) -> Iterator[str]:
-    """Yield every finding in a sentence, with its p; nothing without statements, where the first page has them."""
-    if not results.blocks:
-        return
-    yield heading(2, "In short: every finding in a sentence")
-    found = texts["findings"]
-    yield bullets(found) if found else paragraph(sections.none_found(results))
 
 
 def _again(study: Study, results: Results) -> Iterator[str]:

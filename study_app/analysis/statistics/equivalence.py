@@ -145,6 +145,12 @@ class Equivalence(Outcome):
         return self.p is not None and all(p is None or p <= self.alpha for p in asked)
 
     @property
+    def p_without_normality(self) -> float | None:
+        """The largest p of the tests for equivalence that do not ask for normality."""
+        asked = (self.p_permutation, self.p_ranks, self.p_bootstrap)
+        return max((p for p in asked if p is not None), default=None)
+
+    @property
     def p_difference(self) -> float | None:
         """P that the mean differs from 0: the larger of the t test's and the signed ranks', of those there are."""
         return max((p for p in (self.p_different, self.p_different_ranks) if p is not None), default=None)

@@ -134,13 +134,13 @@ def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike
     return Interval(float(low), float(high), 0.95, method), ""
 
 
-def drawn_p(reached: NDArray[np.bool_], seed: int, least: float, of: str = "") -> tuple[float, float, str]:
+def drawn_p(reached: NDArray[np.bool_], seed: int, least: float) -> tuple[float, float, str]:
     """Return p, the smallest it could have been (``least`` if all were gone through), and how it was found.
 
-    ``reached`` says of each random rearrangement, ``of`` participants or of settings, whether it is as extreme.
+    ``reached`` says of each random rearrangement whether it is as extreme.
     """
     draws = len(reached)
-    method = f"Monte Carlo permutation{of}, {draws} draws, seed {seed}"
+    method = f"Monte Carlo permutation, {draws} draws, seed {seed}"
     return (1 + int(reached.sum())) / (1 + draws), max(least, 1 / (1 + draws)), method
 
 

@@ -1,23 +1,15 @@
-"""Tests of ranks: two or several settings within participants, all statements at once, and groups.
+"""Tests of ranks: two or several settings within participants, and all statements at once.
 
 Friedman (1937), J. Am. Stat. Assoc. 32, 675–701; ties: Conover (1999), Practical Nonparametric Statistics, p. 370.
 The exact distribution is built participant by participant over the sorted rank sums, so ties count as they are.
 
-Skillings & Mack (1981), Technometrics 23, 171–177. A participant contributes what he or she answered, if it is two
-settings or more; answers must be missing for reasons that have nothing to do with them.
-
 A participant's answers to all statements move together, so that statements may depend on each other in any way.
 The statistic is the sum of the statements' Friedman statistics (nonparametric combination; Pesarin & Salmaso 2010).
-
-One value per participant: Kruskal and Wallis (1952), J. Am. Stat. Assoc. 47, 583–621, corrected for ties. Several
-values of each (a profile): the same share of the sum of squares between groups, of their mean vectors (Anderson 2001,
-Austral Ecol. 26, 32–46, with Euclidean distances).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import permutations
@@ -26,8 +18,7 @@ from typing import Any, Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtrc, fdtrc
-from scipy.stats import chi2 as chi_square
-from scipy.stats import norm, rankdata
+from scipy.stats import norm
 
 from study_app.analysis.statistics.outcome import (
     DRAWS,
@@ -263,7 +254,7 @@ def _p(ranks: Whole, squares: int, draws: int, seed: int) -> tuple[float | None,
     if n > DRAWN_UP_TO:
         return None, None, APPROXIMATE
     least = math.exp((1 - n) * math.lgamma(k + 1))
-    (sums,) = shuffled_sums(ranks[None], np.ones(ranks.shape, dtype=np.bool_), draws, seed)
+    (sums,) = shuffled_sums(ranks[None], draws, seed)
     return drawn_p(_squares(sums, n) >= squares, seed, least)
 
 
@@ -310,109 +301,17 @@ def shuffles(rng: np.random.Generator, draws: int, k: int) -> Whole:
     return table[(rng.random(draws) * len(table)).astype(np.int64)]
 
 
-def shuffled_sums(scores: NDArray[Any], there: NDArray[np.bool_], draws: int, seed: int) -> NDArray[Any]:
+def shuffled_sums(scores: NDArray[Any], draws: int, seed: int) -> NDArray[Any]:
     """Return the sums over participants (items, draws, settings) after shuffling each one's scores at random.
 
-    ``scores`` (items, participants, settings) move together; those that are not ``there`` (participants, settings)
-    stay where they are.
+    ``scores`` (items, participants, settings) move together.
     """
     items, _, k = scores.shape
     rng = np.random.default_rng(seed)
     sums = np.zeros((items, draws, k), dtype=scores.dtype)
-    for own, given in zip(scores.transpose(1, 0, 2), there, strict=True):
-        places = np.flatnonzero(given)
-        sums[:, :, places] += own[:, places][:, shuffles(rng, draws, len(places))]
+    for own in scores.transpose(1, 0, 2):
+        sums += own[:, shuffles(rng, draws, k)]
     return sums
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SkillingsMack(Outcome):
-    """Skillings and Mack's T with ``df`` degrees of freedom; ``p_chi2`` is its published approximation, without ties.
-
-    ``effect`` is T over its largest possible value, which without missing answers is Kendall's W. ``missing`` counts
-    the missing answers of the participants that were used. ``adjusted_sums`` has one entry a setting.
-    """
-
-    df: int
-    p_chi2: float | None
-    missing: int
-    adjusted_sums: tuple[float, ...]
-
-
-def skillings_mack(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> SkillingsMack:
-    """Test whether settings are answered alike, using participants that miss some.
-
-    Values are (participants, settings), NaN where an answer is missing; ``draws`` and ``seed`` are of the drawn p.
-    """
-    array = checked(values, "participants, settings")
-    k = array.shape[1]
-    if k < 3:
-        raise AnalysisError(f"{k} settings: at least 3 are needed; compare two by the signed ranks of pairs")
-    used = (~np.isnan(array)).sum(axis=1) >= 2
-    rows = array[used]
-    scores = _scores(rows)
-    inverse: Array = np.linalg.pinv(_covariance((~np.isnan(rows)).astype(np.float64))).astype(np.float64)
-    sums = scores.sum(axis=0)
-    statistic = float(sums @ inverse @ sums)
-    df = int(np.linalg.matrix_rank(inverse)) if len(rows) else 0
-    note = "" if scores.any() else NO_VARIATION if len(rows) else "no participant answered under two settings"
-    p_chi2 = None if note else float(chi_square.sf(statistic, df))
-    p, smallest, method = (None, None, "none") if note else _p_with_gaps(scores, rows, inverse, draws, seed)
-    ideal = _scores(np.where(np.isnan(rows), np.nan, np.arange(k))).sum(axis=0)
-    return SkillingsMack(
-        test="Skillings-Mack",
-        n=len(rows),
-        dropped=int((~used).sum()),
-        statistic_name="T",
-        statistic=None if note else statistic,
-        p=p,
-        smallest_p=smallest,
-        method=method,
-        effect_name="T over the T of full agreement",
-        effect=None if note else statistic / float(ideal @ inverse @ ideal),
-        no_interval=note or NO_INTERVAL,
-        note=note,
-        df=df,
-        p_chi2=p_chi2,
-        missing=int(np.isnan(rows).sum()),
-        adjusted_sums=tuple(float(value) for value in sums),
-    )
-
-
-def _scores(rows: Array) -> Array:
-    """Return centred, scaled ranks (n, k) of the answers of ``rows``; 0 where one is missing."""
-    scores = np.zeros(rows.shape)
-    for row, values in enumerate(rows):
-        there = ~np.isnan(values)
-        count = int(there.sum())
-        scores[row, there] = (rankdata(values[there]) - (count + 1) / 2) * np.sqrt(12 / (count + 1))
-    return scores
-
-
-def _covariance(weights: Array) -> Array:
-    """Return the covariance (k, k) of the adjusted sums: of settings minus their common weights, rows sum to 0.
-
-    Without ties the ``weights`` (n, k) are 1 where there is an answer and 0 elsewhere.
-    """
-    covariance: Array = -(weights.T @ weights)
-    np.fill_diagonal(covariance, 0.0)
-    np.fill_diagonal(covariance, -covariance.sum(axis=1))
-    return covariance
-
-
-def _p_with_gaps(scores: Array, rows: Array, inverse: Array, draws: int, seed: int) -> tuple[float, float | None, str]:
-    """Return p by shuffling each participant's given answers, the smallest it could have been, and the method."""
-    sums, there = scores.sum(axis=0), ~np.isnan(rows)
-    if len(rows) > DRAWN_UP_TO:
-        counts = there.sum(axis=1)
-        spread = (scores**2).sum(axis=1) / (counts - 1) / counts  # of each participant's scores changing places
-        covariance = _covariance(there * np.sqrt(spread)[:, None])
-        reached = float(sums @ np.linalg.pinv(covariance) @ sums)
-        return float(chi_square.sf(reached, np.linalg.matrix_rank(covariance))), None, APPROXIMATE
-    found = float(sums @ inverse @ sums)
-    (drawn,) = shuffled_sums(scores[None], there, draws, seed)
-    statistics = np.einsum("dk,kl,dl->d", drawn, inverse, drawn)
-    return drawn_p(statistics >= found - 1e-9 * abs(found), seed, 0.0)
 
 
 EXACT_OVER_ALL: Final = 50_000
@@ -497,124 +396,5 @@ def _p_over_all(scores: Array, found: float, draws: int, seed: int) -> tuple[flo
         reached = (sums**2).sum(axis=(1, 2))
         p = float((reached >= found * (1 - ROUNDING)).mean())
         return p, float((reached >= reached.max() * (1 - ROUNDING)).mean()), "exact permutation"
-    drawn = (shuffled_sums(scores, np.ones((n, k), dtype=np.bool_), draws, seed) ** 2).sum(axis=(0, 2))
+    drawn = (shuffled_sums(scores, draws, seed) ** 2).sum(axis=(0, 2))
     return drawn_p(drawn >= found * (1 - ROUNDING), seed, math.exp((1 - n) * math.log(orders)))
-
-
-EXACT_GROUPS: Final = 50_000
-"""So many allocations of participants to groups are gone through (two groups: of eight or nine); beyond, p is drawn."""
-
-AT_ONCE: Final = 500
-
-NO_INTERVAL_OF_GROUPS: Final = "no interval for the share between groups: it cannot be negative"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GroupsDiffer(Outcome):
-    """H = (n − 1) · ``effect``, the share of the sum of squares of ranks that lies between groups (ε² of one value).
-
-    ``p_chi2`` is the approximate p of one value, with ``df`` degrees of freedom; None of a profile, which has none.
-    ``sizes`` are the numbers of participants in the groups.
-    """
-
-    statistic_name: str = "H"
-    effect_name: str = "share between groups"
-    df: int
-    p_chi2: float | None = None
-    sizes: tuple[int, ...] = ()
-
-
-def groups_differ(
-    values: ArrayLike, groups: Sequence[str], *, test: str = "Kruskal-Wallis", draws: int = DRAWS, seed: int = 1
-) -> GroupsDiffer:
-    """Test whether groups of participants have the same values (participants, k).
-
-    One value of each is ranked here, several are used as they are. NaN where one is missing: such participants are
-    dropped. ``groups`` has the group of each; ``draws`` and ``seed`` are of a drawn p, where going through all
-    allocations would take too long.
-    """
-    array = checked(values, "participants, values")
-    if len(groups) != len(array):
-        raise AnalysisError(f"{len(array)} participants and {len(groups)} groups: give the group of each participant")
-    whole = ~np.isnan(array).any(axis=1)
-    names, labels = np.unique(np.asarray(groups, dtype=np.str_)[whole], return_inverse=True)
-    rows, n = array[whole], int(whole.sum())
-    ranks = rankdata(rows, axis=0) if rows.shape[1] == 1 else rows
-    centred = ranks - ranks.mean(axis=0) if n else ranks
-    total = float((centred**2).sum())
-    sizes = tuple(int(count) for count in np.bincount(labels, minlength=len(names)))
-    dropped, df = int((~whole).sum()), max(0, len(names) - 1)
-    if note := _impossible(len(names), n, total):
-        return GroupsDiffer(test=test, n=n, dropped=dropped, df=df, sizes=sizes, note=note, no_interval=note)
-    found = float(_between(centred, labels[None], len(names))[0])
-    p, smallest, method = _p_of_groups(centred, labels, found, draws, seed)
-    statistic = (n - 1) * found / total
-    return GroupsDiffer(
-        test=test,
-        n=n,
-        dropped=dropped,
-        statistic=statistic,
-        p=p,
-        smallest_p=smallest,
-        method=method,
-        effect=found / total,
-        no_interval=NO_INTERVAL_OF_GROUPS,
-        df=df,
-        p_chi2=float(chdtrc(df, statistic)) if rows.shape[1] == 1 else None,
-        sizes=sizes,
-    )
-
-
-def _impossible(groups: int, n: int, total: float) -> str:
-    if groups < 2:
-        return "fewer than two groups have participants with all answers"
-    if n == groups:
-        return "each group has one participant"
-    return "" if total > ROUNDING else "no variation: all participants answered alike"
-
-
-def _between(centred: Array, labels: NDArray[np.intp], groups: int) -> Array:
-    """Return the sums of squares between groups (allocations,) of centred values (n, k) for labels (allocations, n)."""
-    found: Array = np.zeros(len(labels))
-    for group in range(groups):
-        members = labels == group
-        sums = members.astype(np.float64) @ centred
-        found += (sums**2).sum(axis=1) / members.sum(axis=1)
-    return found
-
-
-def _p_of_groups(
-    centred: Array, labels: NDArray[np.intp], found: float, draws: int, seed: int
-) -> tuple[float, float, str]:
-    """Return p, the smallest it could have been, and how it was found."""
-    sizes = np.bincount(labels)
-    log_ways = math.lgamma(len(labels) + 1) - sum(math.lgamma(size + 1) for size in sizes)
-    reached_by = found * (1 - ROUNDING)
-    if log_ways <= math.log(EXACT_GROUPS):
-        every = _allocations(tuple(sizes.tolist()))
-        reached = np.concatenate(
-            [_between(centred, every[at : at + AT_ONCE], len(sizes)) for at in range(0, len(every), AT_ONCE)]
-        )
-        p = float((reached >= reached_by).mean())
-        return p, float((reached >= reached.max() * (1 - ROUNDING)).mean()), "exact permutation of participants"
-    rng = np.random.default_rng(seed)
-    above = []
-    for done in range(0, draws, AT_ONCE):
-        drawn = rng.permuted(np.tile(labels, (min(AT_ONCE, draws - done), 1)), axis=1)
-        above.append(_between(centred, drawn, len(sizes)) >= reached_by)
-    return drawn_p(np.concatenate(above), seed, math.exp(-log_ways), " of participants")
-
-
-@lru_cache(maxsize=4)
-def _allocations(sizes: tuple[int, ...]) -> Whole:
-    """Return every allocation of participants to groups of these sizes (allocations, participants), as their groups."""
-
-    def every(left: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-        if not any(left):
-            yield ()
-        for group, free in enumerate(left):
-            if free:
-                for others in every((*left[:group], free - 1, *left[group + 1 :])):
-                    yield (group, *others)
-
-    return np.array(list(every(sizes)), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Detection thresholds of pooled answers; goodness of fit, adjusted settings and group means of single thresholds.
+"""Detection thresholds of pooled answers; goodness of fit and group means of single thresholds.
 
 Wichmann & Hill 2001, Percept. Psychophys. 63, 1293–1313: deviance (eq. 4), its residuals (eq. 6), and their
 correlation with the order of the trials. Between-person variance by Paule & Mandel 1982, interval by Hartung & Knapp
@@ -20,12 +20,12 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import xlogy
 from scipy.stats import t as student
 
-from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked, draws_for, student_interval
+from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked, draws_for
 from study_app.psychophysics.grid import Grid, Posterior, Values, evenly, fit, geometric, tables
 
 NOTICED_FROM: Final = 5.0
@@ -325,39 +325,6 @@ def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:
 def drifts(correlation: float | None, n: int) -> bool:
     """Return whether a correlation over ``n`` trials is beyond 2/√n."""
     return correlation is not None and abs(correlation) > 2.0 / math.sqrt(n)
-
-
-@dataclass(frozen=True, slots=True)
-class SettingStatistics:
-    """What ``n`` settings of one observer show, in u: log10 of the level on log spacing, else the level.
-
-    ``pse``, the point of subjective equality, is their mean, with Student's 95 % interval; ``jnd`` their standard
-    deviation (n − 1), ``hysteresis`` the mean of those that started high − that of those that started low.
-    """
-
-    n: int
-    pse: float
-    low: float | None
-    high: float | None
-    jnd: float | None
-    hysteresis: float | None
-
-
-def setting_statistics(u: Array, started_high: NDArray[np.bool_]) -> SettingStatistics:
-    """Return what settings (n,) show (Gescheider 1997, Psychophysics: The Fundamentals, chapter 3).
-
-    ``started_high`` (n,) says of each whether it started in the upper half of the levels.
-    """
-    above, below = u[started_high], u[~started_high]
-    low, high = student_interval(u)
-    return SettingStatistics(
-        n=len(u),
-        pse=float(u.mean()),
-        low=low,
-        high=high,
-        jnd=float(u.std(ddof=1)) if len(u) > 1 else None,
-        hysteresis=float(above.mean() - below.mean()) if len(above) and len(below) else None,
-    )
 
 
 FEWEST: Final = 3

@@ -10,8 +10,8 @@ from study_app.analysis.data.blocks import NOTHING_DECIDED, Direction, Item, Set
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.findings.delays import ContrastsWithControl, ContrastWithControl, Lowest, LowestDelay, by_delay
 from study_app.analysis.findings.finding import MANY
-from study_app.analysis.findings.other_assumptions import asked_again
-from study_app.analysis.report.sections import findings, limits
+from study_app.analysis.findings.mixed_models import MixedModel
+from study_app.analysis.report.sections import limits
 from study_app.analysis.results import BlockFound
 from study_app.analysis.results import Results as Found
 from study_app.analysis.statistics.equivalence import tost
@@ -97,9 +97,6 @@ def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -
     assert of_five.over_all_ms == 100  # the second step has p = .19, the first .0003
     assert "speak against" in by_delay(delays({50: SCATTERED}, (alone,)))[0][-1]
     assert "speak against" not in by_delay(delays({50: SCATTERED}, (of_five,)))[0][-1]
-    block = delays({50: SCATTERED, 100: SCATTERED}, (of_five,))
-    assert "“Different” 100 ms. Each is an upper bound" in " ".join(findings(found(block)))
-    assert "“Different” 50 ms. Each is an upper bound" in " ".join(findings(found(delays({50: CALM}, (alone,)))))
 
 
 def test_one_of_many_comparisons_that_differs_by_chance_speaks_against_nothing() -> None:
@@ -155,7 +152,7 @@ def test_every_delay_has_its_own_sentence() -> None:
 def test_the_mixed_model_is_left_out_for_a_reason(
     k: int, sites: tuple[str, ...], revealed: bool, n: int, reason: str
 ) -> None:
-    block = SimpleNamespace(revealed=revealed, items=())
-    asked: Any = SimpleNamespace(k=k, sites=sites, n=n, block=block, values={}, verdicts_only=False)
-    _, absent = asked_again(asked, None, "the settings")
+    block = SimpleNamespace(id="b", kind="liquids", revealed=revealed)
+    asked: Any = SimpleNamespace(k=k, sites=sites, n=n, block=block, single={}, verdicts_only=False)
+    _, absent = MixedModel.test(asked, found(delays({50: CALM})))
     assert [(one.what, one.why) for one in absent] == ([("mixed model of the settings", reason)] if reason else [])

@@ -134,11 +134,6 @@ def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
         "thresholds": tuple(threshold(*one) for one in where) if estimated else (),
         "exponents": tuple(map(exponent, whom)) if estimated or summary == "geometric mean" else (),
         "sensitivities": tuple(sensed(*one) for one in where) if share and rng.random() < 0.7 else (),
-        "level_times": tuple(
-            {"standard": standard, "low": level, "high": level * 1.2, "right_n": int(rng.integers(0, 9)),
-             "right_s": some(around(1.0)), "wrong_n": 3, "wrong_s": some(around(2.0))}
-            for standard in standards for level in levels
-        ),
         "withheld": tuple(
             {"standard": standard, "low": level, "high": level, "n": 4, "mean_percent": float(most) / 3,
              "most_percent": float(most)}

@@ -20,7 +20,7 @@ TESTS = {
     "findings.statement_tests.friedman": ("liquids", "test of settings"),
     "findings.statement_tests.global_permutation": ("liquids", "test over all statements"),
     "findings.recognition.recognition": ("liquids", "test of recognition"),
-    "findings.other_assumptions.ordinal": ("liquids", "the same asked with other assumptions"),
+    "findings.mixed_models.ordinal": ("liquids", "mixed model"),
     "findings.statement_tests.page": ("delays", "test of a trend (Page)"),
     "findings.delays.step_down": ("delays", "lowest delay that shows"),
     "findings.delays.tost": ("delays", "test of equivalence"),
@@ -29,7 +29,7 @@ TESTS = {
 WRITING = {
     "figures.answer_figures.answers_picture": "figure liquids",
     "report.write_report.methods": "texts: methods",
-    "report.write_report.sections.findings": "texts: findings",
+    "report.write_report.sections.of_levels": "texts: findings",
     "report.write_report.r_script": "report.R",
     "report.write_report.motion_csv": "motion.csv",
     "findings.delays.LowestDelay.section": "lowest delay",

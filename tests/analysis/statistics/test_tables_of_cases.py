@@ -74,7 +74,6 @@ def named_(number: int, count: int) -> dict[str, Any]:
 def of_settings() -> Iterator[str]:
     yield from results(rank_tests.friedman, SAMPLES)
     yield from results(rank_tests.friedman, {"long": answers(60, 5, 1, 0.2)}, draws=500, seed=2)
-    yield from results(rank_tests.skillings_mack, SAMPLES)
     yield from results(trend.page, SAMPLES)
     yield from results(trend.page, SAMPLES, "decreasing")
     yield from results(trend.page, {"long": answers(210, 3, 2, 0.1)}, seed=None)
@@ -90,9 +89,6 @@ def of_pairs() -> Iterator[str]:
     yield from results(rank_tests.paired, pairs)
     yield from results(rank_tests.paired, {"few": pairs["few"]}, alpha=0.2)
     yield from results(rank_tests.paired, {"lengths": ([1.0], [1.0, 2.0])})
-    groups = {name: (one, ["A", "B", "C"][: len(one)] * len(one)) for name, one in SAMPLES.items()}
-    groups = {name: (values, sites[: len(values)]) for name, (values, sites) in groups.items()}
-    yield from results(rank_tests.groups_differ, groups)
     yield from results(outcome.holm, {str(ps): (ps,) for ps in PS})
     yield from results(outcome.false_discovery, {str(ps): (ps,) for ps in (*PS, (1.2,))})
     tables = {"2": [[5, 1], [2, 7]], "0": [[0, 0], [0, 0]], "3": [[3, 0, 1], [0, 4, 0], [2, 0, 5]]}

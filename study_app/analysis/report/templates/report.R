@@ -103,15 +103,6 @@ different <- function(what, d, row) {
   ranks <- if (grepl("signed ranks", row$method)) signed_ranks_p(d) else 0
   same(paste(what, "difference p"), row$p, max(found$p.value, ranks))
 }
-# Sites of a merged study: medians over settings, differences of two settings, or ranks of more.
-sites <- function(what, table, row) {
-  x <- whole(table); site <- factor(answers$site[match(rownames(x), answers$participant)])
-  y <- switch(row$test, "Kruskal-Wallis" = cbind(apply(x, 1, median)),
-              "Kruskal-Wallis of differences" = cbind(x[, 2] - x[, 1]), t(apply(x, 1, rank)))
-  if (ncol(y) == 1) return(same(paste(what, "H"), row$statistic, unname(kruskal.test(y[, 1], site)$statistic)))
-  y <- sweep(y, 2, colMeans(y)); n <- as.vector(table(site))
-  same(paste(what, "H"), row$statistic, (nrow(y) - 1) * sum(rowsum(y, site)^2 / n) / sum(y^2))
-}
 for (place in seq_len(nrow(tests))) {
   row <- tests[place, ]
   if (is.na(row$item) || is.na(row$statistic) && is.na(row$p) || grepl("stepping down", row$question)) next
@@ -124,8 +115,7 @@ for (place in seq_len(nrow(tests))) {
     "Page's trend" = page(what, x, row),
     "Wilcoxon signed ranks" = pair(what, d, row),
     "equivalence, two one-sided t tests" = equivalent(what, d, row),
-    "difference, paired" = different(what, d, row),
-    "Kruskal-Wallis" = , "Kruskal-Wallis of differences" = , "permutation test of rank profiles" = sites(what, x, row))
+    "difference, paired" = different(what, d, row))
 }
 numbers <- sum(!is.na(tests[c("statistic", "p", "low", "high")]))
 

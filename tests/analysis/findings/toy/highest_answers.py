@@ -9,7 +9,7 @@ from scipy.stats import binomtest
 from study_app.analysis.figures.page_layout import Drawing, Look, Picture, Sheet
 from study_app.analysis.findings.finding import Absent, Answer, BlockAnswers, Finding, alone, judged_row
 from study_app.analysis.findings.statement_tests import table_of_tests
-from study_app.analysis.results import BlockFound, NotTested, Tested, lead, listed, short
+from study_app.analysis.results import BlockFound, NotTested, Tested, short
 from study_app.analysis.statistics.outcome import Outcome, clopper_pearson
 
 HIGHEST: Final = 7
@@ -63,10 +63,6 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
             return sheet
 
         return drawing.picture(self.figure_title, f"{self.figure_title}, as shares.", figure)
-
-    def sentences(self) -> Iterator[str]:
-        told = [f"“{short(self.found, one.item)}” {one.outcome.statistic:g} of {one.outcome.n}" for one in self.value]
-        yield f"{lead(self.found)}: highest answers were given for {listed(told)}."
 
     def methods(self) -> Iterator[str]:
         yield f"The highest answers of {self.found.title} were counted."
