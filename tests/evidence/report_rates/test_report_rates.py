@@ -5,7 +5,7 @@ import pytest
 from study_app.analysis.evaluate import found_in
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
 from study_app.analysis.findings.finding import of_tables
-from study_app.analysis.findings.other_assumptions import SameWithOtherAssumptions
+from study_app.analysis.findings.mixed_models import MixedModel
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer
 from study_app.analysis.planning.simulated_studies import Plan, plan
@@ -66,7 +66,7 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participant
             ]
             assert (SettingsDiffer.of(quick), Pairs.of(quick)) == (SettingsDiffer.of(whole), Pairs.of(whole))
             assert [one.p_adjusted for one in DelayTrend.of(quick)] == [one.p_adjusted for one in DelayTrend.of(whole)]
-            assert (LowestDelay.of(quick), DetectionThreshold.of(quick), SameWithOtherAssumptions.of(quick).mixed) == (
+            assert (LowestDelay.of(quick), DetectionThreshold.of(quick), MixedModel.of(quick)) == (
                 LowestDelay.of(whole),
                 DetectionThreshold.of(whole),
                 (),
