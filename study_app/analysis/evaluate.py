@@ -9,13 +9,13 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.motion import Performance, performance
-from study_app.analysis.data.questions import questions_found, scores_found
+from study_app.analysis.data.questions import question_results, score_results
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
-from study_app.analysis.findings.finding import SEALED, BlockAnswers, block_answers, block_facts, untested
-from study_app.analysis.levels.evaluate import levels_found
+from study_app.analysis.findings.finding import SEALED, BlockAnswers, block_answers, summarize_block, untested
+from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.results import (
-    BlockFound,
+    BlockResult,
     Delivered,
     Ended,
     Failure,
@@ -34,7 +34,7 @@ SEED: Final = 1
 def evaluate(study: Study, *, progress: Progress = silent) -> Results:
     """Test everything that the answers and recordings of a study can answer.
 
-    While the key is sealed only counts and comparisons of codes are there; ``BlockFound.absent`` says what waits, and
+    While the key is sealed only counts and comparisons of codes are there; ``BlockResult.absent`` says what waits, and
     what so few participants could not show. A part that fails is in ``Results.failures`` and, with the reason, in its
     block's ``absent``; everything else is there.
 
@@ -66,12 +66,12 @@ def _ending(progress: Progress, what: str, share: float) -> None:
 
 
 def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
-    def tested(number: int, block: Block) -> BlockFound:
+    def tested(number: int, block: Block) -> BlockResult:
         def tell(what: str) -> None:
             progress(f"testing: {what}", 0.5 * number / len(study.blocks))
 
-        def test() -> BlockFound:
-            return found_in(study, block_answers(study, block, SEED, failures), tell)
+        def test() -> BlockResult:
+            return evaluate_block(study, block_answers(study, block, SEED, failures), tell)
 
         found = failures.attempt("all tests", test, block=block.id)
         return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
@@ -85,7 +85,7 @@ def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
         )
 
     blocks = tuple(tested(number, block) for number, block in enumerate(study.blocks))
-    levels = failures.value("the answers at each level", lambda: levels_found(study), ())
+    levels = failures.value("the answers at each level", lambda: level_results(study), ())
     return Results(
         decided=study.decided,
         people=study.people,
@@ -93,21 +93,21 @@ def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
         delivered=failures.value("the delays as they were shown", lambda: delivered(study), ()),
         orders=failures.value("the orders as run", lambda: orders(study), {}),
         seed=SEED,
-        questions=failures.value("the answers to other questions", lambda: questions_found(study), ()),
-        scores=failures.value("scores of questionnaires", lambda: scores_found(study), ()),
+        questions=failures.value("the answers to other questions", lambda: question_results(study), ()),
+        scores=failures.value("scores of questionnaires", lambda: score_results(study), ()),
         levels=levels,
         performance=failures.value("motion and force", moved, None),
         failures=tuple(failures.found),
     )
 
 
-def found_in(study: Study | None, answers: BlockAnswers, tell: Callable[[str], object] = str) -> BlockFound:
+def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[str], object] = str) -> BlockResult:
     """Test everything that a block's answers can answer; without a study no measures.
 
     ``tell`` receives the name of each finding that is begun.
     """
     block = answers.block
-    found = block_facts(study, answers)
+    found = summarize_block(study, answers)
     settings: list[NotTested] = []
     not_tested: list[NotTested] = []
     for finding in all_findings():

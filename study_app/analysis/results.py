@@ -123,7 +123,7 @@ class Tested:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BlockFound:
+class BlockResult:
     """What was found in one block.
 
     ``settings`` are in their order, ``delays_ms`` theirs once known where the block compares delays. ``measures`` has a
@@ -167,7 +167,7 @@ class GroupAnswers:
 
 
 @dataclass(frozen=True, slots=True)
-class QuestionFound:
+class QuestionResult:
     """A question asked after the trials of a block, or in a form: ``where`` is its id, ``title`` what people read.
 
     ``measure`` and ``figure`` are the ids of what computes and draws its numbers.
@@ -191,7 +191,7 @@ class QuestionFound:
 
 
 @dataclass(frozen=True, slots=True)
-class ScoreFound:
+class ScoreResult:
     """A score of a questionnaire: number, mean, standard deviation and range over its answers, by setting."""
 
     where: str
@@ -206,7 +206,7 @@ Summary: TypeAlias = Literal["share", "mean", "geometric mean", "settings"]
 
 
 @dataclass(frozen=True, slots=True)
-class LevelsFound:
+class LevelsResult:
     """A block of levels.
 
     ``summary`` says how the answers at a level are summarised, ``counts`` what a share is of ("correct"); ``vary`` is
@@ -250,15 +250,15 @@ class Results:
 
     decided: Decided
     people: tuple[str, ...]
-    blocks: tuple[BlockFound, ...]
+    blocks: tuple[BlockResult, ...]
     delivered: tuple[Delivered, ...]
     orders: Mapping[str, Evenness]
     performance: Performance | None
     seed: int
     failures: tuple[Failure, ...] = ()
-    questions: tuple[QuestionFound, ...] = ()
-    scores: tuple[ScoreFound, ...] = ()
-    levels: tuple[LevelsFound, ...] = ()
+    questions: tuple[QuestionResult, ...] = ()
+    scores: tuple[ScoreResult, ...] = ()
+    levels: tuple[LevelsResult, ...] = ()
 
 
 _SMALL: Final = "no one two three four five six seven eight nine ten eleven twelve"
@@ -337,17 +337,17 @@ def ms(delay_ms: float) -> str:
     return f"{delay_ms:g} ms"
 
 
-def settings_noun(found: BlockFound | Block) -> str:
+def settings_noun(found: BlockResult | Block) -> str:
     """Return what the settings of a block are called."""
     return found.kind.removesuffix("s") if found.revealed else "setting"
 
 
-def short(found: BlockFound, item: str) -> str:
+def short(found: BlockResult, item: str) -> str:
     """Return the few words for a statement."""
     return next(one.short for one in found.items if one.id == item)
 
 
-def name(found: BlockFound, code: str) -> str:
+def name(found: BlockResult, code: str) -> str:
     """Return what a setting is called: a delay by its milliseconds alone, since its block has one liquid."""
     for setting, text in zip(found.settings, found.names, strict=True):
         if setting.code == code:
@@ -355,7 +355,7 @@ def name(found: BlockFound, code: str) -> str:
     raise KeyError(code)
 
 
-def lead(found: BlockFound) -> str:
+def lead(found: BlockResult) -> str:
     """Return how sentences about a block begin."""
     return f"{found.title} ({settings_noun(found)}s)" if found.revealed else found.title
 
@@ -368,7 +368,7 @@ def statistic(outcome: Outcome) -> str:
     return f"{text} {number(outcome.statistic)}"
 
 
-def said_of_presentations(found: BlockFound) -> tuple[str, ...]:
+def said_of_presentations(found: BlockResult) -> tuple[str, ...]:
     """Return how many presentations an answer stands for, and what became of sessions; empty for one of each."""
     fewest, most = found.presentations
     lines = []
@@ -413,7 +413,7 @@ def test_name(outcome: Outcome) -> str:
     }.get(outcome.test, outcome.test)
 
 
-def missing(found: BlockFound) -> tuple[str, ...]:
+def missing(found: BlockResult) -> tuple[str, ...]:
     """Return what is not there, and why, a sentence for each reason."""
     reasons: dict[str, list[str]] = {}
     for one in found.absent:

@@ -119,10 +119,10 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
 
 def _draw_questions(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     """Draw the figures of questions that no block of statements holds."""
-    from study_app.analysis.data.questions import questions_found  # noqa: PLC0415
+    from study_app.analysis.data.questions import question_results  # noqa: PLC0415
     from study_app.analysis.figures.question_figures import question_pictures  # noqa: PLC0415
 
-    found = questions_found(study)
+    found = question_results(study)
     titles = {(one.where, one.item): f"{one.title}: {one.short}" for one in found}
     for picture in question_pictures(study, found, ("svg",)):
         title = titles[picture.block, picture.name.removeprefix(f"question-{picture.block}-")]

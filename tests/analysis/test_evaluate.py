@@ -19,7 +19,7 @@ from study_app.analysis.findings.mixed_models import MixedModel
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of
 from study_app.analysis.report.write_report import plain
-from study_app.analysis.results import BlockFound, Results
+from study_app.analysis.results import BlockResult, Results
 from study_app.analysis.statistics.outcome import DRAWS, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import friedman, paired
 from study_app.errors import AnalysisError
@@ -36,7 +36,7 @@ def found(folder: Folder) -> Results:
     return evaluate(load_study(folder.folder))
 
 
-def blocks(folder: Folder) -> tuple[BlockFound, BlockFound]:
+def blocks(folder: Folder) -> tuple[BlockResult, BlockResult]:
     liquids, delays = found(folder).blocks
     return liquids, delays
 

@@ -13,7 +13,7 @@ from study_app.analysis.findings.delays import ContrastsWithControl, DetectionTh
 from study_app.analysis.findings.mixed_models import MixedModel
 from study_app.analysis.findings.statement_tests import DelayTrend, SessionsDiffer, SettingsDiffer
 from study_app.analysis.report.sections import block, methods
-from study_app.analysis.results import BlockFound, Results, all_of, said_of_presentations
+from study_app.analysis.results import BlockResult, Results, all_of, said_of_presentations
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 
 pytestmark = pytest.mark.slow
@@ -90,7 +90,7 @@ def rising(seed: int, shift: float = 0.0):  # type: ignore[no-untyped-def]
     return answer
 
 
-def evaluated(made: Study) -> tuple[Results, BlockFound]:
+def evaluated(made: Study) -> tuple[Results, BlockResult]:
     results = evaluate(made)
     assert results.failures == ()
     return results, results.blocks[0]

@@ -405,7 +405,7 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
 
 
 @dataclass(frozen=True, slots=True)
-class AskedIn:
+class QuestionPlace:
     """Where questions were asked: after the trials of a block, with its ``settings``, or in a form, which has none."""
 
     id: str
@@ -415,10 +415,10 @@ class AskedIn:
 
 
 @dataclass(frozen=True, slots=True)
-class AskedQuestion:
+class PlacedQuestion:
     """A question, and where it was asked."""
 
-    where: AskedIn
+    where: QuestionPlace
     question: Question
     context: Context
 
@@ -454,62 +454,62 @@ class AskedQuestion:
 
 
 @dataclass(frozen=True, slots=True)
-class AskedScore:
+class PlacedScore:
     """A score of a questionnaire, with the questions that it is computed of."""
 
-    where: AskedIn
+    where: QuestionPlace
     name: str
     instrument: str | None
     score: Score
-    questions: tuple[AskedQuestion, ...]
+    questions: tuple[PlacedQuestion, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class AskedQuestions:
+class OtherQuestions:
     """What a study asked besides statements after trials."""
 
-    questions: tuple[AskedQuestion, ...] = ()
-    scores: tuple[AskedScore, ...] = ()
+    questions: tuple[PlacedQuestion, ...] = ()
+    scores: tuple[PlacedScore, ...] = ()
 
 
-NO_QUESTIONS: Final = AskedQuestions()
+NO_QUESTIONS: Final = OtherQuestions()
 
 
-def asked_questions(protocol: Mapping[str, Any], key: Key | None) -> AskedQuestions:
+def other_questions(protocol: Mapping[str, Any], key: Key | None) -> OtherQuestions:
     """Read them from a protocol as a receipt holds it, in the order of the session."""
     if protocol.get("format", 1) < 2:
         return NO_QUESTIONS
-    questions: list[AskedQuestion] = []
-    scores: list[AskedScore] = []
+    questions: list[PlacedQuestion] = []
+    scores: list[PlacedScore] = []
     scales = {name: Scale.model_validate(table) for name, table in protocol["scales"].items()}
     for where, table in _questionnaires(protocol, key):
         context = Context(scales, table.get("scale"), spoken(protocol))
-        found = tuple(AskedQuestion(where, _question(item, where), context) for item in table["items"])
+        found = tuple(PlacedQuestion(where, _question(item, where), context) for item in table["items"])
         questions += [one for one in found if where.is_form or not isinstance(one.question, Statement)]
         scores += [
-            AskedScore(where, name, table.get("instrument"), Score.model_validate(score), found)
+            PlacedScore(where, name, table.get("instrument"), Score.model_validate(score), found)
             for name, score in table.get("scores", {}).items()
         ]
-    return AskedQuestions(tuple(questions), tuple(scores))
+    return OtherQuestions(tuple(questions), tuple(scores))
 
 
-def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tuple[AskedIn, Mapping[str, Any]]]:
+def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tuple[QuestionPlace, Mapping[str, Any]]]:
     language = spoken(protocol)
     for step in every_step_of(protocol):
         if step in protocol["blocks"]:
             block = protocol["blocks"][step]
             if block["phase"] == "main" and block["questionnaire"] is not None:
                 title = text_in(block["title"], language)
-                where = AskedIn(step, title, False, settings_in(protocol, step, key))
+                where = QuestionPlace(step, title, False, settings_in(protocol, step, key))
                 yield where, protocol["questionnaires"][block["questionnaire"]]
         elif step in protocol["questionnaires"]:
             table = protocol["questionnaires"][step]
             titled = table["title"] is not None
             title = text_in(table["title"], language) if titled else step.replace("_", " ").capitalize()
-            yield AskedIn(step, title, True, ()), table
+            yield QuestionPlace(step, title, True, ()), table
 
 
-def _question(table: Mapping[str, Any], where: AskedIn) -> Question:
+def _question(table: Mapping[str, Any], where: QuestionPlace) -> Question:
     try:
         return question_of(table)
     except (KeyError, ValueError) as error:

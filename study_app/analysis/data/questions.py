@@ -7,10 +7,10 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.data.blocks import AskedIn, AskedQuestion, AskedScore, setting_name
+from study_app.analysis.data.blocks import PlacedQuestion, PlacedScore, QuestionPlace, setting_name
 from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.results import GroupAnswers, QuestionFound, ScoreFound, number
+from study_app.analysis.results import GroupAnswers, QuestionResult, ScoreResult, number
 from study_app.protocol.questionnaires import instrument, instruments, score
 
 Numbers: TypeAlias = Mapping[str, Any]
@@ -25,8 +25,8 @@ class Measure:
     """
 
     id: str
-    of: Callable[[AskedQuestion, pd.DataFrame], Numbers]
-    cells: Callable[[AskedQuestion, Numbers], Mapping[str, str]] | None
+    of: Callable[[PlacedQuestion, pd.DataFrame], Numbers]
+    cells: Callable[[PlacedQuestion, Numbers], Mapping[str, str]] | None
 
 
 def given(answers: pd.DataFrame) -> pd.DataFrame:
@@ -55,7 +55,7 @@ def quartile_cells(numbers: Numbers) -> dict[str, str]:
     }
 
 
-def _distribution(_asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
+def _distribution(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     values = given(answers)["value"].to_numpy(dtype=float)
     low, middle, high = quartiles_or_none(values)
     return {
@@ -69,7 +69,7 @@ def _distribution(_asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
     }
 
 
-def _distribution_cells(_asked: AskedQuestion, numbers: Numbers) -> dict[str, str]:
+def _distribution_cells(_asked: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
     least, most = numbers["smallest"], numbers["largest"]
     return {
         "n": str(numbers["n"]),
@@ -82,7 +82,7 @@ def _distribution_cells(_asked: AskedQuestion, numbers: Numbers) -> dict[str, st
 DISTRIBUTION: Final = Measure("distribution", _distribution, _distribution_cells)
 
 
-def _option_counts(asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
+def _option_counts(asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     chosen = [asked.question.counted(str(response)) for response in given(answers)["response"]]
     return {
         **counts_of_missing(answers),
@@ -90,7 +90,7 @@ def _option_counts(asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
     }
 
 
-def _option_cells(asked: AskedQuestion, numbers: Numbers) -> dict[str, str]:
+def _option_cells(asked: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
     total = numbers["n"] or 1
     return {
         **{
@@ -105,7 +105,7 @@ def _option_cells(asked: AskedQuestion, numbers: Numbers) -> dict[str, str]:
 OPTION_COUNTS: Final = Measure("counts", _option_counts, _option_cells)
 
 
-def _point_counts(asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
+def _point_counts(asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     chosen = given(answers)["response"].value_counts()
     low, middle, high = quartiles_or_none(given(answers)["value"].to_numpy(dtype=float))
     return {
@@ -117,7 +117,7 @@ def _point_counts(asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
     }
 
 
-def _point_cells(_asked: AskedQuestion, numbers: Numbers) -> dict[str, str]:
+def _point_cells(_asked: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
     return {
         **{point: str(count) for point, count in numbers["counts"].items()},
         "n": str(numbers["n"]),
@@ -129,7 +129,7 @@ def _point_cells(_asked: AskedQuestion, numbers: Numbers) -> dict[str, str]:
 POINT_COUNTS: Final = Measure("rating", _point_counts, _point_cells)
 
 
-def _texts(_asked: AskedQuestion, answers: pd.DataFrame) -> Numbers:
+def _texts(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     texts = given(answers).sort_values(["participant", "session"], kind="stable")
     pairs = zip(texts["participant"], texts["response"], strict=True)
     return {**counts_of_missing(answers), "texts": [f"{person}: {text}" for person, text in pairs]}
@@ -144,19 +144,19 @@ MEASURES: Final = {one.id: one for one in (POINT_COUNTS, OPTION_COUNTS, DISTRIBU
 _ONE: Final = ["participant", "session", "trial"]
 
 
-def questions_found(study: Study) -> tuple[QuestionFound, ...]:
+def question_results(study: Study) -> tuple[QuestionResult, ...]:
     """Return the numbers of every question, in the order of the session."""
-    return tuple(_question_found(study, asked) for asked in study.others.questions)
+    return tuple(_question_result(study, asked) for asked in study.others.questions)
 
 
-def scores_found(study: Study) -> tuple[ScoreFound, ...]:
+def score_results(study: Study) -> tuple[ScoreResult, ...]:
     """Return every score, in the order of the session."""
     return tuple(_score(study, asked) for asked in study.others.scores)
 
 
-def _question_found(study: Study, asked: AskedQuestion) -> QuestionFound:
+def _question_result(study: Study, asked: PlacedQuestion) -> QuestionResult:
     measure = MEASURES[asked.question.measure]
-    return QuestionFound(
+    return QuestionResult(
         where=asked.where.id,
         title=asked.where.title,
         is_form=asked.where.is_form,
@@ -173,7 +173,7 @@ def _question_found(study: Study, asked: AskedQuestion) -> QuestionFound:
     )
 
 
-def _groups(where: AskedIn, answers: pd.DataFrame) -> Iterator[tuple[str | None, str, pd.DataFrame]]:
+def _groups(where: QuestionPlace, answers: pd.DataFrame) -> Iterator[tuple[str | None, str, pd.DataFrame]]:
     """Yield the answers about each setting, or of a form all, with code and name."""
     if where.is_form:
         yield None, "All", answers
@@ -181,7 +181,7 @@ def _groups(where: AskedIn, answers: pd.DataFrame) -> Iterator[tuple[str | None,
         yield setting.code, setting_name(setting, where.settings), answers[answers["code"] == setting.code]
 
 
-def scored(study: Study, asked: AskedScore) -> pd.DataFrame:
+def scored(study: Study, asked: PlacedScore) -> pd.DataFrame:
     """Return a row for every time that a questionnaire was answered: ``participant``, ``code`` and ``score``."""
     rows = pd.concat([study.answers_to(one) for one in asked.questions])
     bounds = {one.id: one.bounds for one in asked.questions}
@@ -197,9 +197,9 @@ def scored(study: Study, asked: AskedScore) -> pd.DataFrame:
     return pd.DataFrame(found, columns=["participant", "code", "score"])
 
 
-def _score(study: Study, asked: AskedScore) -> ScoreFound:
+def _score(study: Study, asked: PlacedScore) -> ScoreResult:
     known = asked.instrument is not None and asked.instrument in instruments()
-    return ScoreFound(
+    return ScoreResult(
         where=asked.where.id,
         title=asked.where.title,
         name=asked.name,

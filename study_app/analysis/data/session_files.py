@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from study_app.analysis.data.blocks import (
     NO_QUESTIONS,
-    AskedQuestions,
     Block,
     LevelBlock,
+    OtherQuestions,
     OwnDynamics,
-    asked_questions,
     level_blocks,
     main_blocks,
+    other_questions,
     spoken,
 )
 from study_app.errors import AnalysisError
@@ -126,7 +126,7 @@ class Session:
     protocol: Mapping[str, Any]
     blocks: tuple[Block, ...]
     visit: Mapping[str, Any]
-    others: AskedQuestions = NO_QUESTIONS
+    others: OtherQuestions = NO_QUESTIONS
     levels: tuple[LevelBlock, ...] = ()
     own_dynamics: tuple[float, float, float] | None = None
     device_velocity: bool = False
@@ -174,7 +174,7 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
         device_velocity = receipt["device"].get("estimator") == "device"
         alike = like is not None and protocol is like.protocol
         blocks = like.blocks if like is not None and alike else main_blocks(protocol, key)
-        others = like.others if like is not None and alike else asked_questions(protocol, key)
+        others = like.others if like is not None and alike else other_questions(protocol, key)
         levels = like.levels if like is not None and alike else level_blocks(protocol, key)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise AnalysisError(

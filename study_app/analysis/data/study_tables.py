@@ -26,15 +26,15 @@ from study_app.analysis.data import measures
 from study_app.analysis.data.blocks import (
     NO_QUESTIONS,
     NOTHING_DECIDED,
-    AskedIn,
-    AskedQuestion,
-    AskedQuestions,
-    AskedScore,
     Block,
     Decided,
     Kind,
     LevelBlock,
+    OtherQuestions,
     OwnDynamics,
+    PlacedQuestion,
+    PlacedScore,
+    QuestionPlace,
     Setting,
     read_decided,
     settings_of,
@@ -87,20 +87,20 @@ def pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, ..
     )
 
 
-def pooled_questions(sites: Mapping[str, AskedQuestions]) -> AskedQuestions:
+def pooled_questions(sites: Mapping[str, OtherQuestions]) -> OtherQuestions:
     """Return the other questions, which all sites were asked, with the settings of all sites."""
 
-    def where(wheres: Mapping[str, AskedIn]) -> AskedIn:
+    def where(wheres: Mapping[str, QuestionPlace]) -> QuestionPlace:
         settings = _all({site: one.settings for site, one in wheres.items()})
         return replace(next(iter(wheres.values())), settings=settings)
 
-    def questions(asked: Mapping[str, Sequence[AskedQuestion]]) -> tuple[AskedQuestion, ...]:
+    def questions(asked: Mapping[str, Sequence[PlacedQuestion]]) -> tuple[PlacedQuestion, ...]:
         return tuple(
             replace(one, where=where({site: those[place].where for site, those in asked.items()}))
             for place, one in enumerate(next(iter(asked.values())))
         )
 
-    scores: tuple[AskedScore, ...] = tuple(
+    scores: tuple[PlacedScore, ...] = tuple(
         replace(
             score,
             where=where({site: asked.scores[place].where for site, asked in sites.items()}),
@@ -108,7 +108,7 @@ def pooled_questions(sites: Mapping[str, AskedQuestions]) -> AskedQuestions:
         )
         for place, score in enumerate(next(iter(sites.values())).scores)
     )
-    return AskedQuestions(questions({site: asked.questions for site, asked in sites.items()}), scores)
+    return OtherQuestions(questions({site: asked.questions for site, asked in sites.items()}), scores)
 
 
 def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame:
@@ -172,7 +172,7 @@ class Study:
     exclusions: tuple[Exclusion, ...]
     doubts: tuple[Discrepancy, ...] = ()
     decided: Decided = NOTHING_DECIDED
-    others: AskedQuestions = NO_QUESTIONS
+    others: OtherQuestions = NO_QUESTIONS
     answered: pd.DataFrame = field(default_factory=pd.DataFrame)
     levels: tuple[LevelBlock, ...] = ()
     intervals: pd.DataFrame = field(default_factory=pd.DataFrame)
@@ -242,7 +242,7 @@ class Study:
         """Return the rows of ``responses`` that count, of one block."""
         return self.responses[self.responses["counted"] & (self.responses["block"] == block.id)]
 
-    def answers_to(self, asked: AskedQuestion) -> pd.DataFrame:
+    def answers_to(self, asked: PlacedQuestion) -> pd.DataFrame:
         """Return the rows of ``answered`` that count, of a question that no block of statements holds."""
         place = self.answered["form" if asked.where.is_form else "block"] == asked.where.id
         return self.answered[self.answered["counted"] & place.fillna(False) & (self.answered["item"] == asked.id)]

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.data.blocks import AskedScore
+from study_app.analysis.data.blocks import PlacedScore
 from study_app.analysis.data.measures import LEVELS
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.tables import Cells, Delivered, QuestionCells
@@ -80,7 +80,7 @@ def _question(
 ) -> tuple[pd.Series[Any], dict[int, str]]:
     """Return the cells of another question and its levels: options are numbered from 1; others have no levels."""
     asked = cells.asked
-    if isinstance(asked, AskedScore) or not asked.levels:
+    if isinstance(asked, PlacedScore) or not asked.levels:
         return values, {}
     if asked.question.value_type == "text":
         if asked.question.names_several:

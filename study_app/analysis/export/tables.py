@@ -12,12 +12,12 @@ from typing import Final, TypeAlias
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.data.blocks import AskedQuestion, AskedScore, Block, Item, Setting, setting_name
+from study_app.analysis.data.blocks import Block, Item, PlacedQuestion, PlacedScore, Setting, setting_name
 from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.data.questions import scored
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.columns import OF_TRACKS, RESULTS
-from study_app.analysis.levels.evaluate import levels_found
+from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS, tracks
 from study_app.store.tables.columns import INTERVALS, PARTICIPANTS, RESPONSES, TRIALS_2, tables_of
@@ -86,7 +86,7 @@ def level_tables(study: Study) -> Iterator[Delivered]:
         return
     frame = tracks(study).rename(columns={"level": "level_asked"})
     yield delivered("tracks", (*TRACKS, *_of_intervals(study)), frame)
-    found = levels_found(study, frame.rename(columns={"level_asked": "level"}))
+    found = level_results(study, frame.rename(columns={"level_asked": "level"}))
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
     groups = dict(zip(frame["participant"], frame["group"], strict=True))
     for one in statistics():
@@ -235,7 +235,7 @@ class Cells:
 class QuestionCells:
     """What a column holds of another question: answers about a setting, or in a form; or a score of a questionnaire."""
 
-    asked: AskedQuestion | AskedScore
+    asked: PlacedQuestion | PlacedScore
     setting: Setting | None
 
 
@@ -270,10 +270,10 @@ def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:
         for item in block.items
     ]
     found: dict[str, Cells | QuestionCells] = {}
-    asked: tuple[AskedQuestion | AskedScore, ...] = (*study.others.questions, *study.others.scores)
+    asked: tuple[PlacedQuestion | PlacedScore, ...] = (*study.others.questions, *study.others.scores)
     levels = {block.id for block in study.levels}  # their answers are pooled by no track: see the table of tracks
     for other in (one for one in asked if one.where.id not in levels):
-        called = other.name if isinstance(other, AskedScore) else other.id
+        called = other.name if isinstance(other, PlacedScore) else other.id
         for about in other.where.settings or (None,):
             ending = "" if about is None else f"__{about.condition or about.code}"
             found[f"{other.where.id}__{called}{ending}"] = QuestionCells(other, about)
@@ -295,12 +295,12 @@ def _statement(study: Study, cells: Cells, people: list[str]) -> Answers:
 
 def _question(study: Study, cells: QuestionCells, people: list[str]) -> Answers:
     asked, setting = cells.asked, cells.setting
-    answers = scored(study, asked) if isinstance(asked, AskedScore) else study.answers_to(asked)
+    answers = scored(study, asked) if isinstance(asked, PlacedScore) else study.answers_to(asked)
     about = ""
     if setting is not None:
         answers = answers[answers["code"] == setting.code]
         about = f" About {setting_name(setting, asked.where.settings)}."
-    if isinstance(asked, AskedScore):
+    if isinstance(asked, PlacedScore):
         of = f" of {asked.instrument}" if asked.instrument else ""
         description = f"Score {asked.name}{of}, in {asked.where.title}.{about}"
         return _medians(answers, "score", people), description, (None, None)

@@ -14,7 +14,7 @@ from study_app.analysis.figures.page_layout import MARGIN_PT, Look, Picture, She
 from study_app.analysis.levels.answers import (
     Answers,
     LevelAnswers,
-    SettingFound,
+    SettingEstimate,
     Settings,
     mean_words,
     people,
@@ -23,7 +23,7 @@ from study_app.analysis.levels.answers import (
 from study_app.analysis.levels.statistic import level_words, with_unit
 from study_app.analysis.levels.thresholds import (
     Flags,
-    ThresholdFound,
+    ThresholdEstimate,
     Thresholds,
     TrackCourse,
     courses,
@@ -31,7 +31,7 @@ from study_app.analysis.levels.thresholds import (
     psychometric_bands,
 )
 from study_app.analysis.levels.tracks import tracks
-from study_app.analysis.results import Failures, LevelsFound, counted
+from study_app.analysis.results import Failures, LevelsResult, counted
 from study_app.analysis.statistics.outcome import Array
 from study_app.psychophysics.families import Family, success
 
@@ -85,7 +85,7 @@ def panels(
 
 
 def _ends(
-    found: LevelsFound, levels: Iterable[float], share: float, least: float, linear: float
+    found: LevelsResult, levels: Iterable[float], share: float, least: float, linear: float
 ) -> tuple[float, float]:
     """Return the ends of an axis of levels: with a margin of a share of the span, in decades where these are spaced so.
 
@@ -100,7 +100,7 @@ def _ends(
     return low - margin, high + margin
 
 
-def over_trials(axes: Axes, found: LevelsFound, trials: int, ends: tuple[float, float], *, first: bool) -> None:
+def over_trials(axes: Axes, found: LevelsResult, trials: int, ends: tuple[float, float], *, first: bool) -> None:
     """Give axes ticks for trials from 1 and, between ``ends``, for levels."""
     axes.set_xticks([1, *(place for place in (round(trials / 2), trials) if place > 1)])
     if found.spacing == "log":
@@ -112,7 +112,7 @@ def over_trials(axes: Axes, found: LevelsFound, trials: int, ends: tuple[float, 
     axes.hlines(ticks, *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
 
 
-def _level_ticks(found: LevelsFound, ends: tuple[float, float]) -> list[float]:
+def _level_ticks(found: LevelsResult, ends: tuple[float, float]) -> list[float]:
     """Return round levels between the ends of an axis: from 1, 2 and 5, in decades where levels are spaced so."""
     low, high = ends
     if found.spacing == "linear":
@@ -142,7 +142,7 @@ BELOW: Final = 0.03
 COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
 
 
-def level_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+def level_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture:
     """Draw the answers over levels of a block."""
     bands = _bands(study, found)
     own = len(people(found)) - MOST_PEOPLE
@@ -155,7 +155,7 @@ def level_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
     return picture_of(study, found.block, name, found.title, caption, partial(_draw_levels, found, bands), forms)
 
 
-def _bands(study: Study, found: LevelsFound) -> Mapping[str, Array]:
+def _bands(study: Study, found: LevelsResult) -> Mapping[str, Array]:
     """Return the bands of the participants' functions, where there is one in each panel."""
     if not Thresholds.own(found) or len(_standards(found)) > 1:
         return {}
@@ -163,7 +163,7 @@ def _bands(study: Study, found: LevelsFound) -> Mapping[str, Array]:
     return psychometric_bands(block, tracks(study), people(found)[:MOST_PEOPLE], _limits(found, _places(found)))
 
 
-def _panels(found: LevelsFound, banded: bool) -> str:
+def _panels(found: LevelsResult, banded: bool) -> str:
     band = ", with the 95 % band" if banded else ""
     crosses = "; crosses: catch trials" if any(one.catch for one in Answers.of(found)) else ""
     if Thresholds.own(found):
@@ -180,7 +180,7 @@ def _panels(found: LevelsFound, banded: bool) -> str:
 
 
 @style.own_settings()
-def _draw_levels(found: LevelsFound, bands: Mapping[str, Array], look: Look) -> Sheet:
+def _draw_levels(found: LevelsResult, bands: Mapping[str, Array], look: Look) -> Sheet:
     shown_people = people(found)[:MOST_PEOPLE]
     words = summary_words(found)
     above = words[:1].upper() + words[1:]
@@ -201,11 +201,11 @@ def _draw_levels(found: LevelsFound, bands: Mapping[str, Array], look: Look) -> 
     return panels(look, above, names, draw, level_words(found), keys=shown, foot_pt=FOOT_PT)
 
 
-def _standards(found: LevelsFound) -> list[float]:
+def _standards(found: LevelsResult) -> list[float]:
     return sorted({one.standard for one in Answers.of(found) if one.standard is not None})
 
 
-def _levels_panel(axes: Axes, found: LevelsFound, person: str | None, *, first: bool) -> None:
+def _levels_panel(axes: Axes, found: LevelsResult, person: str | None, *, first: bool) -> None:
     places = _places(found)
     _levels_frame(axes, found, places, first=first)
     groups: Sequence[float | None] = _standards(found) or [None]
@@ -234,7 +234,7 @@ def _levels_panel(axes: Axes, found: LevelsFound, person: str | None, *, first: 
 
 
 def _line(
-    axes: Axes, shown: Sequence[LevelAnswers], person: str, places: Mapping[Any, float], found: LevelsFound
+    axes: Axes, shown: Sequence[LevelAnswers], person: str, places: Mapping[Any, float], found: LevelsResult
 ) -> None:
     """Draw a participant's answers; numbers without the unit that the participant chose."""
     points = [one for one in shown if one.participant == person]
@@ -244,7 +244,7 @@ def _line(
     axes.plot([places[_where(one)] for one in points], heights, color=style.PARTICIPANT, linewidth=0.5, alpha=0.7)
 
 
-def _curve(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str) -> None:
+def _curve(axes: Axes, found: LevelsResult, one: ThresholdEstimate, colour: str) -> None:
     """Draw a participant's psychometric function."""
     low, high = axes.get_xlim()
     u = np.linspace(low, high, 120)
@@ -254,7 +254,7 @@ def _curve(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str) -> 
     axes.plot(u, psi, color=colour, linewidth=0.9, zorder=2)
 
 
-def _threshold_interval(axes: Axes, found: LevelsFound, one: ThresholdFound, colour: str, number: int) -> None:
+def _threshold_interval(axes: Axes, found: LevelsResult, one: ThresholdEstimate, colour: str, number: int) -> None:
     """Draw the interval of a threshold at the height of the function there, each standard's below the one before."""
     if one.low is None or one.high is None:
         return
@@ -264,12 +264,12 @@ def _threshold_interval(axes: Axes, found: LevelsFound, one: ThresholdFound, col
     axes.plot(ends, [height, height], color=colour, linewidth=1.2, solid_capstyle="butt", zorder=2)
 
 
-def _coordinate(found: LevelsFound, level: float) -> float:
+def _coordinate(found: LevelsResult, level: float) -> float:
     return math.log10(level) if found.spacing == "log" else level
 
 
 def _answer_points(
-    axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsFound, colour: str
+    axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsResult, colour: str
 ) -> None:
     xs, ys = [places[_where(one)] for one in points], [_height(found, one.value) for one in points]
     if Thresholds.own(found):
@@ -287,11 +287,11 @@ def _where(one: LevelAnswers) -> Any:
     return one.comparison if one.level is None else one.level
 
 
-def _height(found: LevelsFound, value: float) -> float:
+def _height(found: LevelsResult, value: float) -> float:
     return math.log10(value) if found.summary == "geometric mean" else value
 
 
-def _places(found: LevelsFound) -> dict[Any, float]:
+def _places(found: LevelsResult) -> dict[Any, float]:
     """Return the place of each level on the horizontal axis: its logarithm where levels are spaced so."""
     levels = list(dict.fromkeys(_where(one) for one in Answers.of(found) if one.participant is None))
     if found.vary is None:
@@ -303,7 +303,7 @@ def _places(found: LevelsFound) -> dict[Any, float]:
     return {level: logs.get(level, min(logs.values(), default=0.0) - step) for level in levels}  # 0: left of the least
 
 
-def _levels_frame(axes: Axes, found: LevelsFound, places: Mapping[Any, float], *, first: bool) -> None:
+def _levels_frame(axes: Axes, found: LevelsResult, places: Mapping[Any, float], *, first: bool) -> None:
     """Draw the axes: levels below, shares, points or numbers at the left."""
     axes.set_xlim(*_limits(found, places))
     shown = _shown_levels(found, places)
@@ -319,14 +319,14 @@ def _levels_frame(axes: Axes, found: LevelsFound, places: Mapping[Any, float], *
         axes.axhline(found.guess_rate, color=style.AXIS, linewidth=0.6, linestyle=(0, (4, 3)), zorder=1)
 
 
-def _limits(found: LevelsFound, places: Mapping[Any, float]) -> tuple[float, float]:
+def _limits(found: LevelsResult, places: Mapping[Any, float]) -> tuple[float, float]:
     """Return the ends of the horizontal axis."""
     low, high = min(places.values()), max(places.values())
     margin = 0.5 if found.vary is None else 0.06 * ((high - low) or 1.0)
     return low - margin, high + margin
 
 
-def _shown_levels(found: LevelsFound, places: Mapping[Any, float]) -> Mapping[Any, float]:
+def _shown_levels(found: LevelsResult, places: Mapping[Any, float]) -> Mapping[Any, float]:
     """Return the levels that are named below the axis, with their places: of many on log spacing, round ones."""
     named = sorted(places, key=lambda level: places[level])
     if found.vary is None or len(named) <= MOST_TICKS:
@@ -341,7 +341,7 @@ def _shown_levels(found: LevelsFound, places: Mapping[Any, float]) -> Mapping[An
     return {level: places[level] for level in named[:: math.ceil(len(named) / MOST_TICKS)]}
 
 
-def _ticks(found: LevelsFound) -> list[tuple[float, str]]:
+def _ticks(found: LevelsResult) -> list[tuple[float, str]]:
     if found.summary == "share":
         return [(share, f"{100 * share:.0f} %") for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
     ends = [end for one in Answers.of(found) for end in (one.value, one.low, one.high) if end is not None]
@@ -363,7 +363,7 @@ CROSS_PT2: Final = 11.0
 """Areas of the marks of answers, reversals and catch trials."""
 
 
-def track_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+def track_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture:
     """Draw the tracks of a block whose levels answers chose, once the key is open."""
     block = next(block for block in study.levels if block.id == found.block)
     shown = list(courses(block, tracks(study), MOST_PANELS))
@@ -383,7 +383,7 @@ def track_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
 
 
 @style.own_settings()
-def _draw_tracks(found: LevelsFound, shown: Sequence[TrackCourse], look: Look) -> Sheet:
+def _draw_tracks(found: LevelsResult, shown: Sequence[TrackCourse], look: Look) -> Sheet:
     standards = len({one.standard for one in shown}) > 1
     names = [(one.participant, f"standard {one.standard:g}" if standards else "") for one in shown]
     ends = _ends(found, (level for one in shown for level in (*one.levels, one.low[-1], one.high[-1])), 0.12, 1.1, 0.06)
@@ -430,7 +430,7 @@ def _marks(
     )
 
 
-def settings_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+def settings_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture:
     """Draw the settings of a block whose levels participants set, once the key is open."""
     rest = len(Settings.own(found)) - MOST_PANELS
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
@@ -447,7 +447,7 @@ def settings_picture(study: Study, found: LevelsFound, forms: Sequence[str], nam
 
 
 @style.own_settings()
-def _draw_settings(found: LevelsFound, look: Look) -> Sheet:
+def _draw_settings(found: LevelsResult, look: Look) -> Sheet:
     shown = Settings.own(found)[:MOST_PANELS]
     standards = len({one.standard for one in shown}) > 1
     names = [
@@ -468,12 +468,12 @@ def _draw_settings(found: LevelsFound, look: Look) -> Sheet:
     return panels(look, level_words(found), names, draw, "Setting")
 
 
-def _compared(one: SettingFound) -> float | None:
+def _compared(one: SettingEstimate) -> float | None:
     """Return the standard as a level that can be drawn among the settings; None where none was presented."""
     return one.standard if one.constant_error is not None else None
 
 
-def _settings_panel(axes: Axes, one: SettingFound) -> None:
+def _settings_panel(axes: Axes, one: SettingEstimate) -> None:
     """Draw the PSE with its interval, the standard, and a circle for each setting."""
     if one.low is not None and one.high is not None:
         axes.axhspan(one.low, one.high, color=style.BAND, linewidth=0, zorder=1)
@@ -496,7 +496,7 @@ Point = tuple[float, float, float | None, float | None]
 """Standard, Weber fraction, and the ends of its interval."""
 
 
-def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
+def weber_fractions(found: LevelsResult, participant: str | None) -> list[Point]:
     """Return the Weber fractions of a participant or, of None, of the group, by standard.
 
     A threshold that is a difference is divided by its standard; standards of zero and levels that are values have none.
@@ -516,7 +516,7 @@ def weber_fractions(found: LevelsFound, participant: str | None) -> list[Point]:
     return points
 
 
-def _at(found: LevelsFound) -> str:
+def _at(found: LevelsResult) -> str:
     """Return at which percentage Weber fractions are shown."""
     percent = percent_compared(found)
     if percent is None and found.guess_rate is not None:
@@ -524,7 +524,7 @@ def _at(found: LevelsFound) -> str:
     return "" if percent is None else f" at {percent:.3g} % {found.counts}"
 
 
-def weber_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: str) -> Picture:
+def weber_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture:
     """Draw the Weber fractions of a block with thresholds at two standards or more."""
     listed = "; ".join(one.in_words() for one in found.published)
     published = f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
@@ -545,7 +545,7 @@ def weber_picture(study: Study, found: LevelsFound, forms: Sequence[str], name: 
 
 
 @style.own_settings()
-def _draw_fractions(found: LevelsFound, look: Look) -> Sheet:
+def _draw_fractions(found: LevelsResult, look: Look) -> Sheet:
     sheet = look.sheet(HEIGHT_PT, style.PAGE_WIDTH_PT / 2)
     sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(found)}", size=7, colour=style.TEXT_SOFT)
     axes = sheet.axes(
@@ -572,7 +572,7 @@ def _draw_fractions(found: LevelsFound, look: Look) -> Sheet:
     return sheet
 
 
-def published_fractions(found: LevelsFound) -> list[tuple[float | None, float]]:
+def published_fractions(found: LevelsResult) -> list[tuple[float | None, float]]:
     """Return standard and Weber fraction of the published values that are one; a standard of None: of all."""
     points = []
     for one in found.published:
@@ -619,9 +619,9 @@ def _fractions_frame(
     axes.hlines(ticks, *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
 
 
-Draw: TypeAlias = Callable[[Study, LevelsFound, Sequence[str], str], Picture]
+Draw: TypeAlias = Callable[[Study, LevelsResult, Sequence[str], str], Picture]
 
-FIGURES: Final[tuple[tuple[str, Callable[[LevelsFound], object], Draw], ...]] = (
+FIGURES: Final[tuple[tuple[str, Callable[[LevelsResult], object], Draw], ...]] = (
     ("levels", Answers.of, level_picture),
     ("tracks", lambda found: found.adaptive and Thresholds.own(found), track_picture),
     ("weber", lambda found: len(weber_fractions(found, None)) >= 2, weber_picture),
@@ -631,7 +631,7 @@ FIGURES: Final[tuple[tuple[str, Callable[[LevelsFound], object], Draw], ...]] = 
 
 
 def level_pictures(
-    study: Study, levels: Sequence[LevelsFound], forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
+    study: Study, levels: Sequence[LevelsResult], forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
 ) -> Iterator[Picture]:
     """Draw every figure of every block that has one, in each of ``forms``.
 

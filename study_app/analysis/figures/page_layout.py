@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.results import BlockFound, Failure, Failures, Results, counted
+from study_app.analysis.results import BlockResult, Failure, Failures, Results, counted
 
 MARGIN_PT = 4.0
 
@@ -234,7 +234,7 @@ class Drawing:
 
     study: Study
     block: Block
-    found: BlockFound
+    found: BlockResult
     results: Results
     name: str
     forms: Sequence[str]

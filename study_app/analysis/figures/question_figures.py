@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 
 from study_app import figure_style as style
-from study_app.analysis.data.blocks import AskedQuestion
+from study_app.analysis.data.blocks import PlacedQuestion
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import (
     MARGIN_PT,
@@ -22,7 +22,7 @@ from study_app.analysis.figures.page_layout import (
     picture_of,
     sample_words,
 )
-from study_app.analysis.results import Failures, QuestionFound
+from study_app.analysis.results import Failures, QuestionResult
 
 LEFT_PT: Final = 120.0
 RIGHT_PT: Final = 40.0
@@ -31,7 +31,7 @@ FOOT_PT: Final = 34.0
 LINE_PT: Final = 8.5
 
 
-Draw: TypeAlias = Callable[[AskedQuestion, QuestionFound, Look], Sheet]
+Draw: TypeAlias = Callable[[PlacedQuestion, QuestionResult, Look], Sheet]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ def rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) 
     return sheet, axes
 
 
-def _rows_of_groups(found: QuestionFound, look: Look, row_pt: float) -> tuple[Sheet, Axes]:
+def _rows_of_groups(found: QuestionResult, look: Look, row_pt: float) -> tuple[Sheet, Axes]:
     return rows(
         [one.name for one in found.groups], [int(one.numbers["n"]) for one in found.groups], look, row_pt=row_pt
     )
@@ -73,7 +73,7 @@ PILE: Final = 0.07  # from one of equal answers to the next
 
 
 @style.own_settings()
-def draw_distribution(asked: AskedQuestion, found: QuestionFound, look: Look) -> Sheet:
+def draw_distribution(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sheet:
     """Draw the answers."""
     groups = found.groups
     sheet, axes = _rows_of_groups(found, look, ROW_PT)
@@ -108,7 +108,7 @@ OPTION_PT: Final = 20.0
 
 
 @style.own_settings()
-def draw_options(asked: AskedQuestion, found: QuestionFound, look: Look) -> Sheet:
+def draw_options(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sheet:
     """Draw the counts of all options."""
     several = len(found.groups) > 1
     bars = [
@@ -147,7 +147,7 @@ def _ink(colour: str) -> str:
 
 
 @style.own_settings()
-def draw_ratings(asked: AskedQuestion, found: QuestionFound, look: Look) -> Sheet:
+def draw_ratings(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sheet:
     """Draw the counts of all points."""
     groups = found.groups
     sheet, axes = _rows_of_groups(found, look, RATING_PT)
@@ -187,7 +187,7 @@ FIGURES: Final = {one.id: one for one in (RATINGS, OPTIONS, DISTRIBUTION)}
 
 def question_pictures(
     study: Study,
-    answered: Sequence[QuestionFound],
+    answered: Sequence[QuestionResult],
     forms: Sequence[str] = style.FORMATS,
     failures: Failures | None = None,
 ) -> Iterator[Picture]:
@@ -210,7 +210,7 @@ def question_pictures(
     )
 
 
-def _picture(study: Study, asked: AskedQuestion, found: QuestionFound, forms: Sequence[str], name: str) -> Picture:
+def _picture(study: Study, asked: PlacedQuestion, found: QuestionResult, forms: Sequence[str], name: str) -> Picture:
     figure = FIGURES[found.figure or ""]
     title = found.short if found.short == found.title else f"{found.title}: {found.short}"
     caption = f"{found.title}: “{found.text}” {figure.caption} {sample_words(study, study.n)}"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import KINDS, Block
-from study_app.analysis.data.questions import questions_found
+from study_app.analysis.data.questions import question_results
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.level_figures import level_pictures
@@ -14,7 +14,7 @@ from study_app.analysis.figures.page_layout import Drawing, Picture, attempted
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import LowestDelay
-from study_app.analysis.levels.evaluate import levels_found
+from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.results import Failures, Results
 from study_app.errors import AnalysisError
 from study_app.store.output_files import write_output
@@ -70,13 +70,13 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
         raise AnalysisError(f"{folder}: the study {study.name!r} asks nothing, so there is nothing to draw")
     files: dict[str, bytes] = {}
     failures = Failures()
-    questions = question_pictures(study, questions_found(study), failures=failures)
+    questions = question_pictures(study, question_results(study), failures=failures)
     statements = (
         answer_figures.answers_picture(study, block, block_name(study, block))
         for kind in KINDS
         for block in study.blocks_of(kind)
     )
-    for picture in (*statements, *questions, *level_pictures(study, levels_found(study), failures=failures)):
+    for picture in (*statements, *questions, *level_pictures(study, level_results(study), failures=failures)):
         files |= {f"{picture.name}.{form}": content for form, content in picture.files.items()}
         files[f"{picture.name}.txt"] = f"{picture.caption}\n".encode()
     if failures.found:

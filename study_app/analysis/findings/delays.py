@@ -24,7 +24,7 @@ from study_app.analysis.findings.finding import (
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
 from study_app.analysis.report.html_page import heading, paragraph, table, table_of
 from study_app.analysis.results import (
-    BlockFound,
+    BlockResult,
     NotTested,
     all_of,
     beyond,
@@ -91,7 +91,7 @@ def equivalent_up_to(against: tuple[ContrastWithControl, ...]) -> dict[str, floa
     return found
 
 
-def _differs(found: BlockFound, against: ContrastWithControl) -> dict[str, Any]:
+def _differs(found: BlockResult, against: ContrastWithControl) -> dict[str, Any]:
     """Return the row of the same comparison asked the other way: whether the delay differs at all."""
     outcome = against.found
     by = "the larger p of a t test and of exact signed ranks, two-sided"
@@ -139,7 +139,7 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
 VERDICTS: Final = ("equivalent", "different", "inconclusive", "out of reach")
 
 
-def by_delay(found: BlockFound) -> list[list[str]]:
+def by_delay(found: BlockResult) -> list[list[str]]:
     """Return a row a delay: in which statements it has each verdict, and what may be said of it in one sentence."""
     rows = []
     for delay_ms in dict.fromkeys(one.delay_ms for one in ContrastsWithControl.of(found)):
@@ -151,7 +151,7 @@ def by_delay(found: BlockFound) -> list[list[str]]:
     return rows
 
 
-def _said_of(found: BlockFound, delay_ms: float, here: Sequence[ContrastWithControl]) -> str:
+def _said_of(found: BlockResult, delay_ms: float, here: Sequence[ContrastWithControl]) -> str:
     if all(one.verdict == "equivalent" for one in here):
         return "Mean answers to these statements stay within the bound; single people may notice the delay."
     claim = f"“delays up to {ms(delay_ms)} do not matter”"
@@ -160,7 +160,7 @@ def _said_of(found: BlockFound, delay_ms: float, here: Sequence[ContrastWithCont
     return f"These data neither support nor refute {claim}."
 
 
-def evidence_up_to(found: BlockFound, delay_ms: float) -> tuple[str, ...]:
+def evidence_up_to(found: BlockResult, delay_ms: float) -> tuple[str, ...]:
     """Return what shows that delays up to this one change answers, with the error rate held over all statements.
 
     That is a trend up to this delay or a shorter one, or else a difference at one of them.
@@ -180,7 +180,7 @@ def evidence_up_to(found: BlockFound, delay_ms: float) -> tuple[str, ...]:
     return tuple(reasons.values())
 
 
-def common_ms(found: BlockFound) -> float | None:
+def common_ms(found: BlockResult) -> float | None:
     """Return the longest delay up to which every statement is equivalent at every delay."""
     delays = list(equivalent_up_to(ContrastsWithControl.of(found)).values())
     known = [delay for delay in delays if delay is not None]
@@ -200,7 +200,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[ContrastWithControl, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[ContrastWithControl, ...], Absent]:
         """Compare every delay with the shortest one, by the bound that was decided."""
         bound, delays_ms = answers.decided.equivalence_bound, answers.block.delays_ms
         if answers.k < 2:
@@ -237,7 +237,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         ), ()
 
     @classmethod
-    def entries(cls, found: BlockFound) -> Mapping[str, Any]:
+    def entries(cls, found: BlockResult) -> Mapping[str, Any]:
         against = cls.of(found)
         up_to = equivalent_up_to(against) if cls.key in found.findings else None
         return {cls.key: against, "equivalent_up_to": up_to}
@@ -341,7 +341,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Lowest, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Lowest, ...], Absent]:
         """Step down in the statements whose trend is there at all."""
         trends, lowest = DelayTrend.of(found), []
         showing = [one for one in trends if one.verdict in FOUND]
@@ -404,7 +404,7 @@ class DetectionThreshold(Finding[Threshold | None]):
     figure_title = "When a delay is noticed"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[Threshold | None, Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[Threshold | None, Absent]:
         item = answers.decided.noticed
         if item is None or item not in answers.values:
             return None, (NotTested(cls.what, "the protocol names no statement that asks for it"),)

@@ -15,7 +15,7 @@ from study_app.analysis.data.measures import Array, medians, presentations
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.report.html_page import drawn
-from study_app.analysis.results import BlockFound, Failure, Failures, NotTested, Results, Tested, Verdict
+from study_app.analysis.results import BlockResult, Failure, Failures, NotTested, Results, Tested, Verdict
 from study_app.analysis.statistics.outcome import DRAWS, Outcome, draws_for, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import DRAWN_UP_TO
 from study_app.store.tables.csv_files import Column, optional
@@ -129,7 +129,7 @@ def of_tables(
     )
 
 
-def block_facts(study: Study | None, answers: BlockAnswers) -> BlockFound:
+def summarize_block(study: Study | None, answers: BlockAnswers) -> BlockResult:
     """Return a block without findings: settings, statements, counts; without a study no measures."""
     block = answers.block
     columns = list(block.columns.values())
@@ -148,9 +148,9 @@ def block_facts(study: Study | None, answers: BlockAnswers) -> BlockFound:
     )
 
 
-def untested(block: Block, *absent: NotTested) -> BlockFound:
+def untested(block: Block, *absent: NotTested) -> BlockResult:
     """Return a block of which nothing was computed."""
-    return BlockFound(
+    return BlockResult(
         id=block.id,
         title=block.title,
         kind=block.kind,
@@ -266,7 +266,7 @@ TESTS: Final = (
 )
 
 
-def test_row(found: BlockFound, question: str, outcome: Outcome) -> dict[str, Any]:
+def test_row(found: BlockResult, question: str, outcome: Outcome) -> dict[str, Any]:
     """Return the row of a test that answers a question about a block; its family and verdict are empty."""
     interval = outcome.interval
     blank = {column.name: None for column in TESTS}
@@ -289,7 +289,7 @@ def test_row(found: BlockFound, question: str, outcome: Outcome) -> dict[str, An
     }
 
 
-def codes_of(found: BlockFound, *delays_ms: float) -> str:
+def codes_of(found: BlockResult, *delays_ms: float) -> str:
     """Return the codes of a block's settings, or those of these delays, in order; those of one delay are joined."""
     if not found.delays_ms:
         return " ".join(setting.code for setting in found.settings)
@@ -299,7 +299,7 @@ def codes_of(found: BlockFound, *delays_ms: float) -> str:
     )
 
 
-def judged_row(found: BlockFound, question: str, one: Tested) -> dict[str, Any]:
+def judged_row(found: BlockResult, question: str, one: Tested) -> dict[str, Any]:
     """Return the row of a test of one statement, with its family and verdict."""
     return test_row(found, question, one.outcome) | {
         "item": one.item,
@@ -312,7 +312,7 @@ def judged_row(found: BlockFound, question: str, one: Tested) -> dict[str, Any]:
     }
 
 
-def rows_alone(found: BlockFound, what: str) -> dict[str, Any]:
+def rows_alone(found: BlockResult, what: str) -> dict[str, Any]:
     """Return the family of a test that is corrected for no other."""
     return {"family": f"{found.id}: {what}", "members": 1, "correction": ALONE}
 
@@ -351,7 +351,7 @@ class Finding(Generic[R]):
     Attributes
     ----------
     key : str
-        Its name in `BlockFound.findings`, in report.json and among the answers of the first page.
+        Its name in `BlockResult.findings`, in report.json and among the answers of the first page.
     place : float
         Its place among the others in the report's section of a block, in texts and in report.json.
     row_place : float
@@ -390,34 +390,34 @@ class Finding(Generic[R]):
     figure_title: ClassVar[str] = ""
     question: ClassVar[str] = ""
 
-    def __init__(self, found: BlockFound, results: Results, pictures: Mapping[str, Picture] | None = None) -> None:
+    def __init__(self, found: BlockResult, results: Results, pictures: Mapping[str, Picture] | None = None) -> None:
         self.found = found
         self.results = results
         self.value = self.of(found)
         self._pictures = pictures or {}
 
     @classmethod
-    def of(cls, found: BlockFound) -> R:
+    def of(cls, found: BlockResult) -> R:
         """Return the value that was found in a block."""
         return cast("R", found.findings.get(cls.key, cls.empty))
 
     @classmethod
-    def add_to(cls, found: BlockFound, value: R) -> BlockFound:
+    def add_to(cls, found: BlockResult, value: R) -> BlockResult:
         """Return a block's findings with this value."""
         return replace(found, findings={**found.findings, cls.key: value})
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[R, Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[R, Absent]:
         """Return the value, of a block's answers and the findings with lower places, and what was not tested."""
         raise NotImplementedError
 
     @classmethod
-    def entries(cls, found: BlockFound) -> Mapping[str, Any]:
+    def entries(cls, found: BlockResult) -> Mapping[str, Any]:
         """Return the entries of report.json."""
         return {cls.key: cls.of(found)}
 
     @classmethod
-    def common_methods(cls, blocks: Sequence[BlockFound]) -> Iterable[str]:
+    def common_methods(cls, blocks: Sequence[BlockResult]) -> Iterable[str]:
         """Return the sentences of the methods paragraph about all blocks together."""
         return ()
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from study_app.analysis.findings.finding import MANY, Absent, BlockAnswers, Finding, Row, alone, judged_row
 from study_app.analysis.report.html_page import heading, paragraph, table_of
-from study_app.analysis.results import BlockFound, NotTested, Tested, interval, number, p_value, short, statistic
+from study_app.analysis.results import BlockResult, NotTested, Tested, interval, number, p_value, short, statistic
 from study_app.analysis.statistics.mixed_model import Ordinal, ordinal
 from study_app.analysis.statistics.outcome import FEW
 from study_app.number_text import counted
@@ -24,7 +24,7 @@ def _no_model(answers: BlockAnswers) -> str:
     return ""
 
 
-def _effects(found: BlockFound, one: Tested) -> tuple[str, str]:
+def _effects(found: BlockResult, one: Tested) -> tuple[str, str]:
     outcome = one.outcome
     if isinstance(outcome, Ordinal) and len(outcome.coefficients) > 1:
         return (
@@ -48,7 +48,7 @@ class MixedModel(Finding[tuple[Tested, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         if answers.verdicts_only:
             return (), ()
         over_delay = answers.block.kind == "delays"
@@ -90,7 +90,7 @@ class MixedModel(Finding[tuple[Tested, ...]]):
         )
 
     @classmethod
-    def common_methods(cls, blocks: Sequence[BlockFound]) -> Iterator[str]:
+    def common_methods(cls, blocks: Sequence[BlockResult]) -> Iterator[str]:
         if any(cls.of(found) for found in blocks):
             yield (
                 "As a check, answers were fitted by cumulative logit models with a random intercept for each "

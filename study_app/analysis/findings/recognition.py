@@ -25,7 +25,7 @@ from study_app.analysis.findings.finding import (
 from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer, smallest_of_pairs
 from study_app.analysis.report.html_page import heading, paragraph, table_of
 from study_app.analysis.results import (
-    BlockFound,
+    BlockResult,
     NotTested,
     Tested,
     Verdict,
@@ -67,7 +67,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
     figure_title = "What each liquid was named"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[RecognitionResult | None, Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[RecognitionResult | None, Absent]:
         """Test whether settings were named for what they were."""
         labels = answers.decided.names
         right = tuple(setting.label for setting in answers.block.settings)
@@ -183,7 +183,7 @@ def _suggested(tests: Sequence[Tested]) -> bool:
     return all(one.verdict == "suggested" for one in tests)
 
 
-def _of_names(found: BlockFound, named: RecognitionResult, known: Sequence[int]) -> str:
+def _of_names(found: BlockResult, named: RecognitionResult, known: Sequence[int]) -> str:
     """Return which liquids were recognised and which were not, with the name that was given instead."""
     yes = [found.names[place].lower() for place in known]
     no = [rate.setting for rate in named.found.rates if rate.setting not in known]
@@ -198,7 +198,7 @@ def _of_names(found: BlockFound, named: RecognitionResult, known: Sequence[int])
     return f"{words[:1].upper()}{words[1:]}."
 
 
-def _instead(found: BlockFound, named: RecognitionResult, place: int) -> str:
+def _instead(found: BlockResult, named: RecognitionResult, place: int) -> str:
     """Return the wrong name that a setting was given most, if it was given more often than the right one."""
     counts = named.found.table[place]
     right = named.right[place]
@@ -211,7 +211,7 @@ def _instead(found: BlockFound, named: RecognitionResult, place: int) -> str:
     return f"{found.names[place].lower()} was called {called or short(found, label).lower()} by {most} of {sum(counts)}"
 
 
-def _compared(found: BlockFound) -> dict[tuple[str, str], list[Tested]]:
+def _compared(found: BlockResult) -> dict[tuple[str, str], list[Tested]]:
     """Return in which statements each two settings (codes) were rated differently."""
     codes = [setting.code for setting in found.settings]
     if len(codes) == 2:
@@ -227,7 +227,7 @@ def _compared(found: BlockFound) -> dict[tuple[str, str], list[Tested]]:
 
 
 def _of_pairs(
-    found: BlockFound,
+    found: BlockResult,
     apart: dict[tuple[str, str], list[Tested]],
     differing: Sequence[Tested],
     decided: Decided,
@@ -258,7 +258,7 @@ def _mark(tests: Sequence[Tested], mark: bool) -> str:
     return " (exploratory)" if mark and _suggested(tests) else ""
 
 
-def _pair(found: BlockFound, pair: tuple[str, str]) -> str:
+def _pair(found: BlockResult, pair: tuple[str, str]) -> str:
     between = " and " if len(found.settings) == 2 else " – "
     return between.join(name(found, code).lower() for code in pair)
 

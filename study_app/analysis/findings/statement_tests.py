@@ -26,7 +26,7 @@ from study_app.analysis.findings.finding import (
 )
 from study_app.analysis.report.html_page import heading, paragraph, table_of
 from study_app.analysis.results import (
-    BlockFound,
+    BlockResult,
     NotTested,
     Tested,
     all_of,
@@ -50,7 +50,7 @@ ONE_DELAY: Final = "the block has one delay: there is nothing to compare it with
 
 
 def table_of_tests(
-    title: str, found: BlockFound, tests: Sequence[Tested], compared: Sequence[str] = ()
+    title: str, found: BlockResult, tests: Sequence[Tested], compared: Sequence[str] = ()
 ) -> Iterator[str]:
     """Yield a table of tests; ``compared`` are the names of what each of them compares."""
     if not tests:
@@ -155,7 +155,7 @@ class SettingsDiffer(StatementTests):
     title = "Do the {noun}s differ, statement by statement?"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         return compared(answers)
 
     def compared(self) -> Sequence[str]:
@@ -189,7 +189,7 @@ class DelayTrend(StatementTests):
     title = "Do answers follow the delay?"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY),)
         outcomes = {}
@@ -230,7 +230,7 @@ class SessionsDiffer(StatementTests):
         return [f"session {number}" for number in self.found.sessions]
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         """A participant's answers in a session are their median over the settings answered in all sessions."""
         numbers = found.sessions
         if len(numbers) < 2:
@@ -267,7 +267,7 @@ class OverAll(Finding[Outcome | None]):
     waits = ("liquids", "views")
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[Outcome | None, Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[Outcome | None, Absent]:
         return over_all(answers), ()
 
     def rows(self) -> Iterator[Row]:
@@ -354,7 +354,7 @@ class Pairs(Finding[tuple[Pair, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Pair, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Pair, ...], Absent]:
         return pairs_of(answers, SettingsDiffer.of(found))
 
     def rows(self) -> Iterator[Row]:

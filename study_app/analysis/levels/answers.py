@@ -31,7 +31,7 @@ from study_app.analysis.levels.statistic import (
     with_unit,
 )
 from study_app.analysis.report.html_page import drawn, paragraph, table, table_of
-from study_app.analysis.results import LevelsFound, Summary, listed
+from study_app.analysis.results import LevelsResult, Summary, listed
 from study_app.analysis.statistics.outcome import Array, clopper_pearson, student_interval
 from study_app.protocol.trials.designs import Reply
 from study_app.protocol.trials.stimuli import Stimulus
@@ -40,7 +40,7 @@ MOST_NAMED = 6
 
 
 @dataclass(frozen=True, slots=True)
-class SettingFound:
+class SettingEstimate:
     """A participant's settings at one standard, as in `columns.RESULTS`, or the means of all ``n`` participants.
 
     ``levels`` are a participant's settings, in order, and ``started_high`` says from which end.
@@ -59,7 +59,7 @@ class SettingFound:
     started_high: tuple[bool, ...] = ()
 
 
-def settings(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SettingFound]:
+def settings(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SettingEstimate]:
     """Yield the group's settings at each standard, followed by those of its participants; none of other designs."""
     stimulus = block.stimulus
     if stimulus is None or not block.design.adjusts:
@@ -76,14 +76,14 @@ def settings(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SettingFound]:
 
 def _setting(
     block: LevelBlock, stimulus: Stimulus, person: str, standard: float | None, rows: pd.DataFrame
-) -> SettingFound:
+) -> SettingEstimate:
     in_u = np.vectorize(stimulus.coordinate, otypes=[float])
     u, starts = (in_u(rows[name].to_numpy(dtype=float)) for name in ("setting", "level"))
     started_high = starts > sum(stimulus.domain) / 2
     pse, (low, high) = float(u.mean()), student_interval(u)
     above, below = u[started_high], u[~started_high]
     compared = standard is not None and block.design.intervals > 1
-    return SettingFound(
+    return SettingEstimate(
         participant=person,
         standard=standard,
         n=len(u),
@@ -98,7 +98,7 @@ def _setting(
     )
 
 
-class Settings(LevelStatistic[SettingFound]):
+class Settings(LevelStatistic[SettingEstimate]):
     """The group's settings at each standard, followed by those of its participants."""
 
     key = "settings"
@@ -167,7 +167,7 @@ class Settings(LevelStatistic[SettingFound]):
         )
 
     @classmethod
-    def common_methods(cls, blocks: Sequence[LevelsFound]) -> Iterator[str]:
+    def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
         if any(map(cls.of, blocks)):
             yield (
                 "The point of subjective equality is the mean of a participant’s settings, the just-noticeable "
@@ -290,25 +290,25 @@ def _summarised(
     return float(values.mean()), low, high
 
 
-def of_group(found: LevelsFound) -> tuple[LevelAnswers, ...]:
+def of_group(found: LevelsResult) -> tuple[LevelAnswers, ...]:
     """Return the answers of all participants together, in order of standard and level; without catch trials."""
     return tuple(one for one in Answers.of(found) if one.participant is None and not one.catch)
 
 
-def people(found: LevelsFound) -> tuple[str, ...]:
+def people(found: LevelsResult) -> tuple[str, ...]:
     """Return the participants who answered."""
     answered = {str(one.participant) for one in Answers.own(found)}
     return tuple(sorted(answered | {str(one.participant) for one in Settings.own(found)}))
 
 
-def summary_words(found: LevelsFound) -> str:
+def summary_words(found: LevelsResult) -> str:
     """Return what a value at a level is: "share correct", "mean rating", "geometric mean of the numbers"."""
     if found.summary == "share":
         return "share correct" if found.counts == "correct" else f"share “{found.counts}”"
     return "mean rating" if found.summary == "mean" else "geometric mean of the numbers"
 
 
-def mean_words(found: LevelsFound) -> str:
+def mean_words(found: LevelsResult) -> str:
     """Return what a value of all participants is."""
     return "geometric mean" if found.summary == "geometric mean" else "mean"
 

@@ -14,7 +14,7 @@ from study_app.analysis.levels.answers import SUMMARIES, Answers, Settings, choo
 from study_app.analysis.levels.statistic import between, statistics
 from study_app.analysis.levels.tracks import answers_timed, tracks
 from study_app.analysis.report.html_page import heading, paragraph, table_of
-from study_app.analysis.results import GroupAnswers, LevelsFound, number
+from study_app.analysis.results import GroupAnswers, LevelsResult, number
 from study_app.protocol.quantities import quantity, quantity_words
 
 READ: Final = (
@@ -30,7 +30,7 @@ SEALED: Final = (
 )
 
 
-def levels_found(study: Study, rows: pd.DataFrame | None = None) -> tuple[LevelsFound, ...]:
+def level_results(study: Study, rows: pd.DataFrame | None = None) -> tuple[LevelsResult, ...]:
     """Return what was answered in every main block of levels, in the order of the session.
 
     ``rows`` are those of `tracks`, where they are already known.
@@ -44,10 +44,10 @@ def levels_found(study: Study, rows: pd.DataFrame | None = None) -> tuple[Levels
     return tuple(_levels_of_block(study, block, timed, opened) for block in main)
 
 
-def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opened: pd.DataFrame | None) -> LevelsFound:
+def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opened: pd.DataFrame | None) -> LevelsResult:
     counted = timed[(timed["block"] == block.id) & timed["counted"] & timed["response"].notna()]
     stimulus = block.stimulus
-    found = LevelsFound(
+    found = LevelsResult(
         block=block.id,
         title=block.title,
         design=block.design.kind,
@@ -86,7 +86,7 @@ def _times(answers: pd.DataFrame, block: LevelBlock, setting: Setting) -> GroupA
     return GroupAnswers(setting.code, setting_name(setting, block.settings), numbers)
 
 
-def level_section(found: LevelsFound, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:
+def level_section(found: LevelsResult, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:
     """Yield what a block's section says in addition to the counts of its answers.
 
     ``estimator`` is the name of the servo's velocity estimator, None where the receipt has none.
@@ -112,7 +112,7 @@ def level_section(found: LevelsFound, pictures: Sequence[Picture], estimator: st
         yield from one(found, {picture.name: picture for picture in pictures}, estimator).section()
 
 
-def level_findings(found: LevelsFound) -> Iterator[str]:
+def level_findings(found: LevelsResult) -> Iterator[str]:
     """Yield the findings of a block with n and interval; none while the key is sealed."""
     sentences = [line for one in statistics() for line in one(found).sentences()]
     yield from sentences
@@ -120,13 +120,13 @@ def level_findings(found: LevelsFound) -> Iterator[str]:
         yield f"{found.title}: published values: {'; '.join(one.in_words() for one in found.published)}."
 
 
-def level_limits(found: LevelsFound) -> Iterator[str]:
+def level_limits(found: LevelsResult) -> Iterator[str]:
     """Yield what the statistics of a block cannot show."""
     for one in statistics():
         yield from one(found).limits()
 
 
-def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsFound]) -> Iterator[str]:
+def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsResult]) -> Iterator[str]:
     """Yield the sentences about blocks whose key is open and that have answers."""
     by_id = {block.id: block for block in blocks}
     opened = [found for found in levels if found.revealed and (Answers.of(found) or Settings.of(found))]
@@ -137,6 +137,6 @@ def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsFound]) -
         yield from one.common_methods(opened)
 
 
-def level_entries(found: LevelsFound) -> dict[str, Any]:
+def level_entries(found: LevelsResult) -> dict[str, Any]:
     """Return the entries of report.json of a block's statistics; those of later formats only where there are rows."""
     return {one.key: one.of(found) for one in statistics() if one.since == 1 or one.of(found)}

@@ -23,7 +23,7 @@ from study_app.analysis.levels.statistic import (
     unit,
 )
 from study_app.analysis.levels.thresholds import Exponents, Thresholds
-from study_app.analysis.results import LevelsFound, number
+from study_app.analysis.results import LevelsResult, number
 from study_app.protocol.trials.presentation import arrangement_of
 from study_app.psychophysics.detection import Sensitivity, rating
 
@@ -40,7 +40,7 @@ BIASES: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class SensitivityFound:
+class SensitivityEstimate:
     """A participant's sensitivity and bias or, where ``participant`` is None, their means over ``n`` participants.
 
     They are those at a ``standard``, to a condition as ``comparison``, or of ratings at a ``level`` against the lowest.
@@ -62,7 +62,7 @@ class SensitivityFound:
     other: float | None = None
 
 
-def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SensitivityFound]:
+def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SensitivityEstimate]:
     """Yield the group's sensitivity at each standard, to each condition or at each level, then its participants'."""
     rows = analysed(block, opened)
     match block.design.reply:
@@ -82,7 +82,7 @@ def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Sensitivi
             return
 
 
-def _with_group(own: Sequence[SensitivityFound]) -> Iterator[SensitivityFound]:
+def _with_group(own: Sequence[SensitivityEstimate]) -> Iterator[SensitivityEstimate]:
     """Yield the means over participants, followed by those of each."""
     if own:
         shares = {answer: float(np.mean([one.shares[answer] for one in own])) for answer in own[0].shares}
@@ -90,27 +90,27 @@ def _with_group(own: Sequence[SensitivityFound]) -> Iterator[SensitivityFound]:
     yield from own
 
 
-def _of_ratings(person: str, rows: pd.DataFrame, lowest: float, level: float) -> SensitivityFound | None:
+def _of_ratings(person: str, rows: pd.DataFrame, lowest: float, level: float) -> SensitivityEstimate | None:
     noise, signal = (rows.loc[rows["level"] == at, "value"].dropna().to_numpy(float) for at in (lowest, level))
     found = rating(noise, signal)
-    one = SensitivityFound(participant=person, n=len(noise) + len(signal), shares={}, level=float(level))
+    one = SensitivityEstimate(participant=person, n=len(noise) + len(signal), shares={}, level=float(level))
     return None if found is None else _measured(one, found)
 
 
 def _of_choices(
     block: LevelBlock, person: str, rows: pd.DataFrame, where: Mapping[str, float | str | None]
-) -> SensitivityFound:
+) -> SensitivityEstimate:
     design = block.design
     pairs = zip(rows["arrangement"].astype(str), rows["response"].astype(str), strict=True)
     counts = Counter((arrangement_of(design, letters), answer) for letters, answer in pairs)
     given = Counter(rows["response"].astype(str))
     found = design.sensitivity(counts, roving=block.standards_rove) if block.has_correct_answer else None
     shares = {answer: given[answer] / len(rows) for answer in design.answers}
-    one = SensitivityFound(person, len(rows), shares, **where)  # type: ignore[arg-type]  # standard or comparison
+    one = SensitivityEstimate(person, len(rows), shares, **where)  # type: ignore[arg-type]  # standard or comparison
     return one if found is None else _measured(one, found)
 
 
-def _measured(one: SensitivityFound, found: Sensitivity) -> SensitivityFound:
+def _measured(one: SensitivityEstimate, found: Sensitivity) -> SensitivityEstimate:
     half = math.nan if found.variance is None else Z_95 * math.sqrt(found.variance)
     return replace(
         one,
@@ -123,11 +123,11 @@ def _measured(one: SensitivityFound, found: Sensitivity) -> SensitivityFound:
     )
 
 
-def _where(one: SensitivityFound) -> str:
+def _where(one: SensitivityEstimate) -> str:
     return plain(one.comparison or (one.level if one.standard is None else one.standard))
 
 
-class Sensitivities(LevelStatistic[SensitivityFound]):
+class Sensitivities(LevelStatistic[SensitivityEstimate]):
     """d′ and criterion of the group and of each participant.
 
     The exported table has all estimates of a participant at a standard, thresholds among them.
@@ -197,7 +197,7 @@ class Sensitivities(LevelStatistic[SensitivityFound]):
         ).rstrip()
 
     @classmethod
-    def common_methods(cls, blocks: Sequence[LevelsFound]) -> Iterator[str]:
+    def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
         if any(one.d_prime is not None for found in blocks for one in cls.of(found)):
             yield (
                 "Sensitivity is d′ from rates with the log-linear correction (Hautus 1995), by the model of each "

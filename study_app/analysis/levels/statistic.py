@@ -17,7 +17,7 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.levels.columns import RESULTS
 from study_app.analysis.report.html_page import drawn, heading, paragraph, table_of
-from study_app.analysis.results import LevelsFound, listed, number
+from study_app.analysis.results import LevelsResult, listed, number
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.discovery import modules_of
 
@@ -56,13 +56,13 @@ class LevelStatistic(Generic[R]):
     key: ClassVar[str]
     place: ClassVar[float]
     since: ClassVar[int] = 1
-    compute: "ClassVar[staticmethod[[LevelBlock, pd.DataFrame, Study, LevelsFound], Iterable[Any]]]"
+    compute: "ClassVar[staticmethod[[LevelBlock, pd.DataFrame, Study, LevelsResult], Iterable[Any]]]"
     title: ClassVar[str] = ""
     figures: ClassVar[tuple[str, ...]] = ()
     table: ClassVar[str] = ""
 
     def __init__(
-        self, found: LevelsFound, pictures: Mapping[str, Picture] | None = None, estimator: str | None = None
+        self, found: LevelsResult, pictures: Mapping[str, Picture] | None = None, estimator: str | None = None
     ) -> None:
         self.found = found
         self.rows = self.of(found)
@@ -70,12 +70,12 @@ class LevelStatistic(Generic[R]):
         self.estimator = estimator
 
     @classmethod
-    def of(cls, found: LevelsFound) -> tuple[R, ...]:
+    def of(cls, found: LevelsResult) -> tuple[R, ...]:
         """Return its rows in a block."""
         return found.statistics.get(cls.key, ())
 
     @classmethod
-    def own(cls, found: LevelsFound) -> tuple[R, ...]:
+    def own(cls, found: LevelsResult) -> tuple[R, ...]:
         """Return its rows of participants in a block."""
         return tuple(one for one in cls.of(found) if getattr(one, "participant", None) is not None)
 
@@ -85,7 +85,7 @@ class LevelStatistic(Generic[R]):
         return bool(cls.table)
 
     @classmethod
-    def common_methods(cls, blocks: Sequence[LevelsFound]) -> Iterable[str]:
+    def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterable[str]:
         """Return the sentences of the methods paragraph about all blocks together."""
         return ()
 
@@ -176,7 +176,7 @@ def between(low: float | None, high: float | None, written: Callable[[float], st
     return "–" if low is None or high is None else f"{written(low)} – {written(high)}"
 
 
-def unit(found: LevelsFound) -> str:
+def unit(found: LevelsResult) -> str:
     """Return the unit of the varied number in brackets."""
     return f" [{found.unit}]" if found.unit else ""
 
@@ -194,7 +194,7 @@ KINDS: Final = {"weber": "Weber fractions", "difference": "differences", "value"
 LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
 
 
-def level_words(found: LevelsFound) -> str:
+def level_words(found: LevelsResult) -> str:
     """Return what a level is, with its unit: "Weber fraction of viscosity", "Viscosity [Pa·s]", "Condition"."""
     if found.quantity is None:
         return "Condition"
@@ -202,12 +202,12 @@ def level_words(found: LevelsFound) -> str:
     return words[:1].upper() + words[1:] + ("" if found.level_kind == "weber" else unit(found))
 
 
-def with_unit(found: LevelsFound, value: float) -> str:
+def with_unit(found: LevelsResult, value: float) -> str:
     """Return a value of the varied number with its unit."""
     return f"{value:g} {found.unit or ''}".rstrip()
 
 
-def standards_of(found: LevelsFound, rows: Iterable[Any]) -> str:
+def standards_of(found: LevelsResult, rows: Iterable[Any]) -> str:
     """Return the standards of rows in words: " of 4 and 8 N·s/m"; nothing without any."""
     standards = sorted({one.standard for one in rows if one.standard is not None})
     return f" of {listed([f'{one:g}' for one in standards])} {found.unit}".rstrip() if standards else ""

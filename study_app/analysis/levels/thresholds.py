@@ -35,7 +35,7 @@ from study_app.analysis.levels.statistic import (
     with_unit,
 )
 from study_app.analysis.levels.tracks import TRACK, answers_of, setting_of
-from study_app.analysis.results import LevelsFound, counted, listed, number
+from study_app.analysis.results import LevelsResult, counted, listed, number
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, drift, drifts, group_mean, p_of_fit
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, Stimulus, analysis_grid
@@ -53,7 +53,7 @@ MOST_NAMED: Final = 6
 
 
 @dataclass(frozen=True, slots=True)
-class ThresholdFound:
+class ThresholdEstimate:
     """A participant's threshold at one standard, as in `columns.RESULTS`, or the group's of ``n`` participants.
 
     ``flat_width`` is the threshold under a flat prior on the width, ``variance`` the posterior variance in u, and
@@ -123,7 +123,7 @@ def counts_of(stimulus: Stimulus, rows: pd.DataFrame) -> Counts:
     )
 
 
-def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdFound]:
+def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEstimate]:
     """Yield the group's threshold of each standard, followed by those of its participants."""
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
@@ -143,7 +143,7 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdFou
 
 def _own(
     block: LevelBlock, stimulus: Stimulus, grid: Grid, standard: Any, person: Any, heard: pd.DataFrame
-) -> ThresholdFound:
+) -> ThresholdEstimate:
     """Return a participant's threshold; of the rows those that are analysed enter the fit."""
     rows = heard[heard["analysed"]]
     counts = counts_of(stimulus, rows)
@@ -155,7 +155,7 @@ def _own(
     percent, compared = compared_percent(block.published), math.nan
     if percent is not None:
         compared = level_at(grid.family, percent, threshold, *found.others)
-    return ThresholdFound(
+    return ThresholdEstimate(
         participant=str(person),
         standard=number_or_none(standard),
         n=len(rows),
@@ -188,12 +188,12 @@ def _reversal_mean(block: LevelBlock, stimulus: Stimulus, heard: pd.DataFrame) -
     return stimulus.level_of(float(np.mean(means))) if means else None
 
 
-def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdFound]) -> ThresholdFound:
+def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate]) -> ThresholdEstimate:
     mean, low, high = _mean(stimulus, [one.threshold for one in own], own)
-    return ThresholdFound(None, number_or_none(standard), len(own), mean, low, high)
+    return ThresholdEstimate(None, number_or_none(standard), len(own), mean, low, high)
 
 
-def _with_compared(stimulus: Stimulus, group: ThresholdFound, own: Sequence[ThresholdFound]) -> ThresholdFound:
+def _with_compared(stimulus: Stimulus, group: ThresholdEstimate, own: Sequence[ThresholdEstimate]) -> ThresholdEstimate:
     """Return the group with its level at the published percentage, where all participants have theirs."""
     compared = [one.compared for one in own if one.compared is not None]
     if len(compared) < len(own):
@@ -203,7 +203,7 @@ def _with_compared(stimulus: Stimulus, group: ThresholdFound, own: Sequence[Thre
 
 
 def _mean(
-    stimulus: Stimulus, levels: Sequence[float], own: Sequence[ThresholdFound]
+    stimulus: Stimulus, levels: Sequence[float], own: Sequence[ThresholdEstimate]
 ) -> tuple[float, float | None, float | None]:
     """Return the random-effects mean of participants' levels with its interval, by the variances of thresholds."""
     mean = group_mean([stimulus.coordinate(level) for level in levels], [one.variance or 0.0 for one in own])
@@ -289,19 +289,19 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
         )
 
 
-def percent_compared(found: LevelsFound) -> float | None:
+def percent_compared(found: LevelsResult) -> float | None:
     """Return the percentage of successes at which thresholds are compared with published ones; None: at no other."""
     return compared_percent(found.published) if any(one.compared is not None for one in Thresholds.of(found)) else None
 
 
-def with_device(found: LevelsFound, one: ThresholdFound) -> float | None:
+def with_device(found: LevelsResult, one: ThresholdEstimate) -> float | None:
     """Return a Weber fraction of damping with the device's own in the standard, ΔB/(B + b); None where unknown."""
     if found.device is None or one.standard is None or (found.vary, found.level_kind) != ("damping_nspm", "weber"):
         return None
     return one.threshold * one.standard / (one.standard + found.device.damping_nspm)
 
 
-def _named_people(own: Sequence[ThresholdFound], some: Sequence[ThresholdFound]) -> str:
+def _named_people(own: Sequence[ThresholdEstimate], some: Sequence[ThresholdEstimate]) -> str:
     """Return whose thresholds they are: at each standard where there are several, at most `MOST_NAMED` by name."""
     if len(some) > MOST_NAMED:
         return f"{len(some)} of {len(own)} thresholds"
@@ -309,7 +309,7 @@ def _named_people(own: Sequence[ThresholdFound], some: Sequence[ThresholdFound])
     return listed([f"{one.participant} at {one.standard:g}" if several else str(one.participant) for one in some])
 
 
-class Thresholds(LevelStatistic[ThresholdFound]):
+class Thresholds(LevelStatistic[ThresholdEstimate]):
     """The group's threshold of each standard, followed by those of its participants."""
 
     key = "thresholds"
@@ -322,10 +322,10 @@ class Thresholds(LevelStatistic[ThresholdFound]):
     def shown(self) -> Sequence[Shown]:
         found, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
 
-        def fit(one: ThresholdFound) -> str:
+        def fit(one: ThresholdEstimate) -> str:
             return "–" if one.fit_p is None else f"{one.fit_p:.3f}{'' if one.fits else ': the function does not fit'}"
 
-        def drift(one: ThresholdFound) -> str:
+        def drift(one: ThresholdEstimate) -> str:
             return "–" if one.drift is None else f"{one.drift:+.2f}{'!' if one.drifts else ''}".replace("-", "−")
 
         return (
@@ -398,10 +398,10 @@ class Thresholds(LevelStatistic[ThresholdFound]):
         if not own:
             return
 
-        def shifted(one: ThresholdFound) -> bool:
+        def shifted(one: ThresholdEstimate) -> bool:
             return one.flat_width is not None and abs(one.flat_width - one.threshold) > SHIFT * abs(one.threshold)
 
-        kinds: tuple[tuple[Callable[[ThresholdFound], bool], str], ...] = (
+        kinds: tuple[tuple[Callable[[ThresholdEstimate], bool], str], ...] = (
             (shifted, f"the prior of the width shifts a threshold by more than {100 * SHIFT:.0f} %: too few answers"),
             (
                 lambda one: one.beyond == "above",
@@ -467,7 +467,7 @@ class Thresholds(LevelStatistic[ThresholdFound]):
         )
 
     @classmethod
-    def common_methods(cls, blocks: Sequence[LevelsFound]) -> Iterator[str]:
+    def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
         if any(map(cls.of, blocks)):
             yield (
                 "Thresholds are posterior medians over a grid with equal-tailed 95 % intervals, from all counted "
@@ -479,7 +479,7 @@ class Thresholds(LevelStatistic[ThresholdFound]):
 
 
 @dataclass(frozen=True, slots=True)
-class ExponentFound:
+class ExponentEstimate:
     """A participant's exponent: of a power law, from ``n`` levels, or Weber's, of the JND over ``n`` standards.
 
     Where ``participant`` is None, it is the mean over ``n`` participants, with its 95 % interval by Student's t.
@@ -506,7 +506,7 @@ def estimate_slope(levels: ArrayLike, answers: ArrayLike) -> float:
     return float(np.polyfit(places, means, 1)[0])
 
 
-def estimated_exponents(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ExponentFound]:
+def estimated_exponents(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ExponentEstimate]:
     """Yield the exponent of the group, followed by those of the participants with answers at two levels or more.
 
     Trials of one requested level are at the mean of their delivered levels.
@@ -520,7 +520,7 @@ def estimated_exponents(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Exp
         delivered = of_person["level_delivered"].astype(float).groupby(asked).transform("mean")
         levels = delivered.where(delivered > 0, asked).to_numpy()
         if (count := len(np.unique(levels))) >= 2:
-            own.append(ExponentFound(str(person), count, estimate_slope(levels, of_person["value"].astype(float))))
+            own.append(ExponentEstimate(str(person), count, estimate_slope(levels, of_person["value"].astype(float))))
     if own:
         yield mean_over(own, "exponent")
     yield from own
@@ -538,7 +538,7 @@ def jnd_slope(standards: ArrayLike, jnds: ArrayLike) -> float:
     return float(slope)
 
 
-def weber_exponents(thresholds: Sequence[ThresholdFound], level_kind: str) -> Iterator[ExponentFound]:
+def weber_exponents(thresholds: Sequence[ThresholdEstimate], level_kind: str) -> Iterator[ExponentEstimate]:
     """Yield the exponent of the group, followed by those of the participants with thresholds at two standards or more.
 
     A JND is weber × standard, or the difference itself; a value has none.
@@ -553,13 +553,13 @@ def weber_exponents(thresholds: Sequence[ThresholdFound], level_kind: str) -> It
             if one.participant == person and one.standard is not None and one.standard > 0 and one.threshold > 0
         ]
         if len(places) >= 2:
-            own.append(ExponentFound(person, len(places), jnd_slope(*np.array(places).T)))
+            own.append(ExponentEstimate(person, len(places), jnd_slope(*np.array(places).T)))
     if own:
         yield mean_over(own, "exponent")
     yield from own
 
 
-class Exponents(LevelStatistic[ExponentFound]):
+class Exponents(LevelStatistic[ExponentEstimate]):
     """Exponents of the power law, or Weber's: that of the group, followed by those of its participants."""
 
     key = "exponents"
@@ -627,7 +627,7 @@ class Exponents(LevelStatistic[ExponentFound]):
                 )
 
     @classmethod
-    def common_methods(cls, blocks: Sequence[LevelsFound]) -> Iterator[str]:
+    def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
         held = [found for found in blocks if cls.of(found)]
         if any(found.summary == "geometric mean" for found in held):
             yield (

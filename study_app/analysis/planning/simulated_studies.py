@@ -17,7 +17,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.analysis.data.blocks import Block as AskedBlock
+from study_app.analysis.data.blocks import Block as StatementBlock
 from study_app.analysis.data.blocks import Decided, Item, Setting, read_decided, spoken
 from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
@@ -33,17 +33,17 @@ from study_app.protocol.table import text_in
 
 LOWEST, HIGHEST = 1, POINTS
 ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
-"""(Block, condition) → what was felt there in rehearsed trials."""
+"""(Block, condition) → features of rehearsed trials."""
 
 
 @dataclass(frozen=True, slots=True)
-class Planned(AskedBlock):
+class Planned(StatementBlock):
     """A main block that asks something: its settings in the order of the tests, delays ascending.
 
-    ``felt`` has what was felt in each setting. ``groups`` are those that have the block, where not all do.
+    ``features`` are those of rehearsed trials of each setting; ``groups`` those that have the block, where not all do.
     """
 
-    felt: tuple[tuple[TrialFeatures, ...], ...]
+    features: tuple[tuple[TrialFeatures, ...], ...]
     repetitions: int
     groups: tuple[str, ...]
 
@@ -76,7 +76,7 @@ class Plan:
         return tuple(item.id for block in self.blocks for item in block.items if item.id not in OPINIONS)
 
 
-def plan(protocol: Protocol, felt: ConditionFeatures) -> Plan:
+def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     """Return what can be planned of a protocol; AnalysisError says that no block compares settings and asks of them."""
     language = spoken({"study": {"languages": protocol.study.languages}})
     asked = _compared(protocol)
@@ -90,7 +90,7 @@ def plan(protocol: Protocol, felt: ConditionFeatures) -> Plan:
         protocol.study.name,
         text_in(protocol.study.title, language),
         protocol.study.version,
-        tuple(_planned(protocol, block, felt, language) for block in asked),
+        tuple(_planned(protocol, block, features, language) for block in asked),
         read_decided([table]),
     )
 
@@ -104,7 +104,7 @@ def _compared(protocol: Protocol) -> list[Block]:
     return [block for block in protocol.main_blocks if _statements(protocol, block) and len(block.conditions) > 1]
 
 
-def _planned(protocol: Protocol, block: Block, felt: ConditionFeatures, language: str) -> Planned:
+def _planned(protocol: Protocol, block: Block, features: ConditionFeatures, language: str) -> Planned:
     conditions = {name: protocol.conditions[name] for name in block.conditions}
     kind = protocol.compared_in(block.id)
     assert kind is not None  # noqa: S101 - a main block
@@ -125,7 +125,7 @@ def _planned(protocol: Protocol, block: Block, felt: ConditionFeatures, language
         ),
         labels=tuple(map(str, range(LOWEST, HIGHEST + 1))),
         cannot_judge=None,
-        felt=tuple(tuple(felt[block.id, name]) for name in names),
+        features=tuple(tuple(features[block.id, name]) for name in names),
         repetitions=block.repetitions,
         groups=having if len(having) < len(protocol.groups) else (),
     )
@@ -163,7 +163,7 @@ def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinio
         person = rater(rng.random)
         for place, block in enumerate(plan.blocks):
             items = [item.id for item in block.items]
-            found[place].append(simulate_ratings(items, block.felt, block.repetitions, person, rng))
+            found[place].append(simulate_ratings(items, block.features, block.repetitions, person, rng))
     return tuple(
         Opinions(np.array([thought for thought, _ in block]), np.array([noise for _, noise in block]))
         for block in found

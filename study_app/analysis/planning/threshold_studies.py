@@ -51,7 +51,7 @@ class Case:
 
 
 @dataclass
-class Found:
+class PrecisionResult:
     """What studies of one block found with so many trials for each standard.
 
     ``errors`` are of each study the errors of the participants' thresholds, (people, standards), in natural logarithms;
@@ -99,7 +99,7 @@ def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
     return found
 
 
-def study_batch(case: Case, sizes: Sequence[int]) -> Found:
+def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
     """Return what the studies of a batch find.
 
     ``sizes`` ascend; smaller studies have the first participants of the largest.
@@ -121,7 +121,7 @@ def study_batch(case: Case, sizes: Sequence[int]) -> Found:
         np.concatenate([one.reshape(BATCH, people, -1) for one in it], 2) for it in zip(*parts, strict=True)
     )
     errors = (medians - truth) * (math.log(10) if log else 1 / truth)
-    found = Found()
+    found = PrecisionResult()
     full = plan.measures(means)
     for one, median, variance, measured in zip(errors, medians, variances, full.ravel().tolist(), strict=True):
         of_people, of_variances = median.mean(axis=1), variance.sum(axis=1) / plan.standards**2
@@ -140,9 +140,9 @@ def study_batch(case: Case, sizes: Sequence[int]) -> Found:
     return found
 
 
-def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Found:
+def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> PrecisionResult:
     """Return what the studies of a batch find of d′, d_a or exponents: their means have Student's interval."""
-    people, found = sizes[-1], Found()
+    people, found = sizes[-1], PrecisionResult()
     truth = plan.value * np.exp(math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people)))
     estimates = plan.estimates(truth.reshape(-1), rng).reshape(BATCH, people)
     for own, true in zip(estimates, truth, strict=True):
@@ -164,7 +164,7 @@ def _estimates(plan: ThresholdPlan, truth: Array, rng: np.random.Generator) -> t
 
 def sweep(
     planned: PrecisionPlans, sizes: Sequence[int], studies: int, seed: int, executor: Executor
-) -> Iterator[tuple[int, dict[tuple[str, int], Found]]]:
+) -> Iterator[tuple[int, dict[tuple[str, int], PrecisionResult]]]:
     """Yield after every round of batches how many studies were simulated so far, and what was found in them all.
 
     ``studies`` is how many there are for each block and number of trials; ``sizes`` ascend. Every batch draws from a
@@ -178,7 +178,7 @@ def sweep(
         for place, block in enumerate(planned)
         for trials in planned[block]
     ]
-    total = {key: Found() for key in keys}
+    total = {key: PrecisionResult() for key in keys}
     found = executor.map(study_batch, cases, [tuple(sizes)] * len(cases))
     for number, (case, one) in enumerate(zip(cases, found, strict=True), start=1):
         done = (number - 1) // len(keys) * BATCH
@@ -234,7 +234,7 @@ class Precisions:
     studies: int
     asked: int
     seed: int
-    found: Mapping[tuple[str, int], Found]
+    found: Mapping[tuple[str, int], PrecisionResult]
 
     @property
     def precision(self) -> float | None:

@@ -28,12 +28,12 @@ from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.report.html_page import attempted, bullets, drawn, heading, paragraph, render, table, table_of
 from study_app.analysis.results import (
     VERDICTS_MEAN,
-    BlockFound,
+    BlockResult,
     Delivered,
     Failures,
-    QuestionFound,
+    QuestionResult,
     Results,
-    ScoreFound,
+    ScoreResult,
     counted,
     lead,
     listed,
@@ -124,7 +124,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         )
 
 
-def _mixed_up(found: BlockFound, results: Results) -> Iterator[str]:
+def _mixed_up(found: BlockResult, results: Results) -> Iterator[str]:
     """Name the settings that everybody met at the same place, where more than one order was to be expected."""
     counts = results.orders.get(found.id)
     if counts is None or counts.orders < 2 or len(counts.codes) < 2:
@@ -153,7 +153,7 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
         yield f"Sessions and analysis: liquid-study {__version__}."
 
 
-def _of_statements(study: Study, results: Results, blocks: list[BlockFound]) -> Iterator[str]:
+def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     yield _presented(study, results)
     quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
     yield (
@@ -210,7 +210,7 @@ def _presented(study: Study, results: Results) -> str:
     return f"The study presented {'; '.join(parts)}; {blind}."
 
 
-def _common(results: Results, blocks: list[BlockFound]) -> Iterator[str]:
+def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     decided = results.decided
     if decided.binding:
         which = "all statements were primary" if not decided.primary else f"primary: {', '.join(decided.primary)}"
@@ -305,7 +305,7 @@ def empty_studies(participants: int) -> str:
 
 
 def block(
-    found: BlockFound, results: Results, drawn: Sequence[Picture], failures: Failures | None = None
+    found: BlockResult, results: Results, drawn: Sequence[Picture], failures: Failures | None = None
 ) -> Iterator[str]:
     """Yield the section of one block; a part that fails is said in its place, and kept in ``failures``."""
     yield heading(2, lead(found))
@@ -321,7 +321,7 @@ def block(
 
 
 def _parts(
-    found: BlockFound, results: Results, pictures: Mapping[str, Picture]
+    found: BlockResult, results: Results, pictures: Mapping[str, Picture]
 ) -> Iterator[tuple[str, Callable[[], Iterable[str]]]]:
     """Yield what the parts of a block's section are, and how each is made."""
     if said := said_of_presentations(found):
@@ -353,7 +353,7 @@ def counts_of_answers(results: Results) -> Iterator[str]:
             yield _measures(found)
 
 
-def _measures(found: BlockFound) -> str:
+def _measures(found: BlockResult) -> str:
     order = [item.id for item in found.items]
     return table_of(
         sorted(found.measures, key=lambda row: order.index(str(row["item"]))),
@@ -373,7 +373,7 @@ def places(results: Results) -> dict[str, str]:
     """Return where questions were asked: id → title of the section, in the order of the session."""
     levels = {one.block for one in results.levels}
 
-    def kind(one: QuestionFound) -> str:
+    def kind(one: QuestionResult) -> str:
         return "form" if one.is_form else "levels" if one.where in levels else "other questions"
 
     return {one.where: f"{one.title}: {kind(one)}" for one in results.questions}
@@ -409,7 +409,7 @@ def question_section(where: str, study: Study, results: Results, drawn_: Sequenc
         yield from level_section(one, drawn_, study.estimator)
 
 
-def _scores(scores: Sequence[ScoreFound]) -> Iterator[str]:
+def _scores(scores: Sequence[ScoreResult]) -> Iterator[str]:
     if not scores:
         return
     yield heading(3, "Scores")
@@ -490,7 +490,7 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
     )
 
 
-def _means(found: BlockFound, rows: Sequence[Any], by: By) -> str:
+def _means(found: BlockResult, rows: Sequence[Any], by: By) -> str:
     return table_of(
         rows,
         ("Statement", lambda one: short(found, one.item)),
@@ -617,7 +617,7 @@ def motion(results: Results) -> Iterator[str]:
     )
 
 
-def _of(measured: Performance, found: BlockFound, **wanted: str) -> Iterator[Moved]:
+def _of(measured: Performance, found: BlockResult, **wanted: str) -> Iterator[Moved]:
     """Yield the measures of a block, by code or by name."""
     for one in measured.moved:
         if one.block == found.id and all(getattr(one, field) == value for field, value in wanted.items()):
@@ -625,7 +625,7 @@ def _of(measured: Performance, found: BlockFound, **wanted: str) -> Iterator[Mov
 
 
 def _motion_rows(
-    found: BlockFound, measured: Performance, measures: Sequence[str], delivered: Sequence[Delivered]
+    found: BlockResult, measured: Performance, measures: Sequence[str], delivered: Sequence[Delivered]
 ) -> list[list[str]]:
     kept = {one.code: _within(one) for one in delivered if one.block == found.id}
     rows = []

@@ -33,10 +33,10 @@ from study_app.analysis.report import sections
 from study_app.analysis.report.html_page import attempted, box, bullets, heading, page, paragraph, render, table
 from study_app.analysis.report.sections import methods, version_words
 from study_app.analysis.results import (
-    BlockFound,
+    BlockResult,
     Failure,
     Failures,
-    LevelsFound,
+    LevelsResult,
     Progress,
     Results,
     counted,
@@ -57,9 +57,9 @@ OF_FORMAT_2: Final = {Results: frozenset({"questions", "scores", "levels"}), Set
 
 def plain(value: Any) -> Any:
     """Return a result as JSON's objects, arrays, texts, numbers, true, false and null."""
-    if isinstance(value, BlockFound):
+    if isinstance(value, BlockResult):
         return {name: plain(entry) for name, entry in _entries(value)}
-    if isinstance(value, LevelsFound):
+    if isinstance(value, LevelsResult):
         entries = {field.name: getattr(value, field.name) for field in fields(value) if field.name != "statistics"}
         return plain(entries | level_entries(value))
     if is_dataclass(value) and not isinstance(value, type):
@@ -77,7 +77,7 @@ def plain(value: Any) -> Any:
     return value
 
 
-def _entries(found: BlockFound) -> Iterator[tuple[str, Any]]:
+def _entries(found: BlockResult) -> Iterator[tuple[str, Any]]:
     """Yield a block's fields, the findings about settings in their midst and those about sessions last."""
     tested = [finding for finding in all_findings() if finding.what]
     for field in fields(found):
@@ -239,7 +239,7 @@ def report(
     """
     progress("reading", 0.0)
     study = load_study(folder)
-    if not asks(study):
+    if not has_questions(study):
         raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to report")
     files, found = report_files(study, progress)
     progress("writing", 0.95)
@@ -251,7 +251,7 @@ def report(
     return written
 
 
-def asks(study: Study) -> bool:
+def has_questions(study: Study) -> bool:
     """Return whether a study has answers to report."""
     return bool(study.blocks or study.others.questions)
 

@@ -195,11 +195,11 @@ def _looked_for(people: int) -> list[range]:
     return found
 
 
-def _studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> threshold_studies.Found:
+def _studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> threshold_studies.PrecisionResult:
     """Return what simulated studies of so many participants find, as ``power`` does."""
     from study_app.analysis.planning import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
 
-    total = threshold_studies.Found()
+    total = threshold_studies.PrecisionResult()
     for number in range(THRESHOLD_STUDIES // threshold_studies.BATCH):
         check()
         case = threshold_studies.Case("", plan, (SEED, 0, plan.trials, number))

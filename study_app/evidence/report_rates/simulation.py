@@ -20,7 +20,7 @@ from scipy.stats import binomtest
 
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import Array
-from study_app.analysis.evaluate import found_in
+from study_app.analysis.evaluate import evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, common_ms
 from study_app.analysis.findings.finding import FOUND, BlockAnswers, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
@@ -28,7 +28,7 @@ from study_app.analysis.findings.statement_tests import DelayTrend, OverAll, Pai
 from study_app.analysis.planning.power_curves import interval
 from study_app.analysis.planning.simulated_studies import Opinions, Plan, people
 from study_app.analysis.report.sections import answers as answered
-from study_app.analysis.results import BlockFound, Failures, Results
+from study_app.analysis.results import BlockResult, Failures, Results
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.thresholds import noticed
 from study_app.evidence.table import Evidence, Table
@@ -270,7 +270,7 @@ def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) ->
     given = answers(simulation, cell.generator, cell.extent, cell.participants, seed, study)
     people = tuple(f"P{number:03d}" for number in range(cell.participants))
     found: dict[Event, bool] = {}
-    results: list[BlockFound] = []
+    results: list[BlockResult] = []
     for place, (block, values) in enumerate(zip(simulation.blocks, given, strict=True)):
         single = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
         asked = of_tables(
@@ -282,7 +282,7 @@ def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) ->
             failures=failures,
             verdicts_only=True,
         )
-        result = found_in(None, asked)
+        result = evaluate_block(None, asked)
         if cell.extent != "partial":  # with draws of its own: the same draws in all studies would shift the rate
             result = OverAll.add_to(result, over_all(replace(asked, seed=1 + study), DRAWS))
         results.append(result)
@@ -301,7 +301,7 @@ def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) ->
     return found
 
 
-def _in_liquids(asked: BlockAnswers, found: BlockFound, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
+def _in_liquids(asked: BlockAnswers, found: BlockResult, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
     if cell.extent == "empty":
         yield (
             ("settings differ in a statement", "at most 5 %"),
@@ -317,7 +317,7 @@ def _in_liquids(asked: BlockAnswers, found: BlockFound, cell: Cell, _truth: Arra
         yield ("liquids recognised", "counted"), _recognised(found)
 
 
-def _recognised(found: BlockFound) -> bool:
+def _recognised(found: BlockResult) -> bool:
     recognition = LiquidRecognition.of(found)
     return recognition is not None and recognition.verdict in FOUND
 
@@ -334,7 +334,7 @@ def _equal_pairs(block: Block, extent: Extent) -> set[tuple[str, str]]:
     }
 
 
-def _in_delays(asked: BlockAnswers, found: BlockFound, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
+def _in_delays(asked: BlockAnswers, found: BlockResult, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
     block = asked.block
     null = [block.settings[at].delay_ms or 0.0 for at in alike(block, cell.extent)]
     if cell.extent == "empty":
@@ -352,12 +352,12 @@ def _in_delays(asked: BlockAnswers, found: BlockFound, cell: Cell, truth: Array)
         yield ("detection threshold printed", "counted"), _printed(found)
 
 
-def _printed(found: BlockFound) -> bool:
+def _printed(found: BlockResult) -> bool:
     threshold = DetectionThreshold.of(found)
     return threshold is not None and threshold.effect is not None
 
 
-def _equivalence(asked: BlockAnswers, found: BlockFound, truth: Array) -> Iterator[tuple[Event, bool]]:
+def _equivalence(asked: BlockAnswers, found: BlockResult, truth: Array) -> Iterator[tuple[Event, bool]]:
     """Yield whether a delay is called equivalent that is not: the one nearest to the bound, and on the first page."""
     bound = asked.decided.equivalence_bound
     if bound is None or not ContrastsWithControl.of(found):

@@ -12,7 +12,7 @@ from study_app.analysis.findings.delays import ContrastsWithControl, ContrastWit
 from study_app.analysis.findings.finding import MANY
 from study_app.analysis.findings.mixed_models import MixedModel
 from study_app.analysis.report.sections import limits
-from study_app.analysis.results import BlockFound
+from study_app.analysis.results import BlockResult
 from study_app.analysis.results import Results as Found
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.outcome import FEW, holm
@@ -37,10 +37,10 @@ def against(differences: Mapping[float, list[int]], expected: Direction | None) 
 
 def delays(
     differences: Mapping[float, list[int]], lowest: tuple[Lowest, ...] = (), expected: Direction | None = "increasing"
-) -> BlockFound:
+) -> BlockResult:
     """Return a block of delays in which answers to one statement differ so from those at 0 ms."""
     at = (0.0, *differences)
-    return BlockFound(
+    return BlockResult(
         id="delays",
         title="Delays",
         kind="delays",
@@ -55,7 +55,7 @@ def delays(
     )
 
 
-def found(block: BlockFound) -> Found:
+def found(block: BlockResult) -> Found:
     return Found(NOTHING_DECIDED, (), (block,), (), {}, None, 1)
 
 

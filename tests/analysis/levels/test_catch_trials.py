@@ -12,10 +12,10 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.levels.answers import Answers, of_group
-from study_app.analysis.levels.evaluate import levels_found
+from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.thresholds import Thresholds
 from study_app.analysis.levels.tracks import TRACK, answers_of, tracks
-from study_app.analysis.results import LevelsFound
+from study_app.analysis.results import LevelsResult
 
 pytestmark = pytest.mark.slow
 
@@ -31,8 +31,8 @@ def opened(study: Study) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def staircase(study: Study) -> LevelsFound:
-    return next(found for found in levels_found(study) if found.block == "staircase")
+def staircase(study: Study) -> LevelsResult:
+    return next(found for found in level_results(study) if found.block == "staircase")
 
 
 def test_a_catch_trial_is_never_a_reversal(opened: pd.DataFrame) -> None:
@@ -59,7 +59,7 @@ def test_answers_to_catch_trials_enter_no_step_of_a_track(opened: pd.DataFrame) 
 
 
 def test_answers_to_catch_trials_are_apart_from_those_at_their_level(
-    staircase: LevelsFound, opened: pd.DataFrame
+    staircase: LevelsResult, opened: pd.DataFrame
 ) -> None:
     own = opened[(opened["block"] == "staircase") & (opened["participant"] == "P001") & (opened["standard"] == 4)]
     shown = [one for one in Answers.of(staircase) if one.participant == "P001" and one.standard == 4]
@@ -69,7 +69,7 @@ def test_answers_to_catch_trials_are_apart_from_those_at_their_level(
     assert not any(one.catch for one in of_group(staircase))
 
 
-def test_figures_mark_catch_trials_by_crosses(study: Study, staircase: LevelsFound, opened: pd.DataFrame) -> None:
+def test_figures_mark_catch_trials_by_crosses(study: Study, staircase: LevelsResult, opened: pd.DataFrame) -> None:
     own = opened[opened["block"] == "staircase"]
     caught = own["catch"].astype(bool)
     pictures = {picture.name: picture for picture in level_pictures(study, [staircase], ["svg"])}

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study_app.analysis.levels.thresholds import ThresholdFound, estimated_exponents, weber_exponents
+from study_app.analysis.levels.thresholds import ThresholdEstimate, estimated_exponents, weber_exponents
 from tests.analysis.levels.level_studies import block
 
 LEVELS = (0.5, 2.0, 8.0)
@@ -58,10 +58,10 @@ def test_choices_modulus_trials_and_a_single_level_have_no_exponent() -> None:
 STANDARDS = (4.0, 8.0, 16.0, 32.0)
 
 
-def observers(*exponents: float, weber: bool = True) -> list[ThresholdFound]:
+def observers(*exponents: float, weber: bool = True) -> list[ThresholdEstimate]:
     """Return thresholds of observers whose JND is 0.5 standard^exponent."""
     return [
-        ThresholdFound(f"P{number:03d}", s, 60, 0.5 * s ** (exponent - weber), None, None)
+        ThresholdEstimate(f"P{number:03d}", s, 60, 0.5 * s ** (exponent - weber), None, None)
         for s in STANDARDS
         for number, exponent in enumerate(exponents, start=1)
     ]

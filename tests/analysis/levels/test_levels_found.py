@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.blocks import LevelBlock, Setting
-from study_app.analysis.levels.evaluate import levels_found
+from study_app.analysis.levels.evaluate import level_results
 from study_app.protocol.trials.designs import Rated
 from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import Stimulus
@@ -77,4 +77,4 @@ def test_what_is_found_in_answers_to_levels(pytestconfig: pytest.Config) -> None
     made = study(delays([0, 50]), list(everybody(delays([0, 50]), 2, lambda *_: 4)))
     answered = opened.assign(onset_s=1.0, first_choice_s=1.0 + opened["response_s"], counted=opened["analysed"])
     asked = replace(made, levels=tuple(every), intervals=intervals(opened), answered=answered)
-    compare(GOLDEN / "levels-found.txt", value_lines(levels_found(asked, opened)), pytestconfig)
+    compare(GOLDEN / "levels-found.txt", value_lines(level_results(asked, opened)), pytestconfig)

@@ -11,11 +11,11 @@ import pytest
 from study_app import figure_style
 from study_app.analysis.data.blocks import LevelBlock, OwnDynamics, PublishedValue
 from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.levels.answers import Answers, LevelAnswers, SettingFound
+from study_app.analysis.levels.answers import Answers, LevelAnswers, SettingEstimate
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_methods, level_section
-from study_app.analysis.levels.sensitivities import SensitivityFound
-from study_app.analysis.levels.thresholds import ExponentFound, ThresholdFound, Thresholds
-from study_app.analysis.results import Failures, GroupAnswers, LevelsFound
+from study_app.analysis.levels.sensitivities import SensitivityEstimate
+from study_app.analysis.levels.thresholds import ExponentEstimate, ThresholdEstimate, Thresholds
+from study_app.analysis.results import Failures, GroupAnswers, LevelsResult
 from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.methods import Constant, QuestPlus, UpDown
 from study_app.protocol.trials.stimuli import Stimulus
@@ -36,7 +36,7 @@ DESIGNS = {
 }  # fmt: skip
 
 
-def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
+def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
     """Return a block and what was found in it; each number that may be missing is so in a quarter of cases."""
     rng = np.random.default_rng(number)
 
@@ -64,7 +64,7 @@ def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
         return LevelAnswers(person, standard, level, level, n, len(people) if person is None else 1, count, value,
                             low, high, catch)  # fmt: skip
 
-    def threshold(person: str | None, standard: float | None) -> ThresholdFound:
+    def threshold(person: str | None, standard: float | None) -> ThresholdEstimate:
         value = around(ends[1] / 3)
         own: dict[str, Any] = {}
         if percent:
@@ -77,22 +77,22 @@ def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
                 "reversal_mean": some(around(value)), "target_percent": 70.7,
             }  # fmt: skip
         low, high = some((value * 0.7, value * 1.5)) or (None, None)
-        return ThresholdFound(person, standard, int(rng.integers(2, 120)), value, low, high, **own)
+        return ThresholdEstimate(person, standard, int(rng.integers(2, 120)), value, low, high, **own)
 
-    def set_by(person: str | None, standard: float | None) -> SettingFound:
+    def set_by(person: str | None, standard: float | None) -> SettingEstimate:
         n, value = int(rng.integers(1, 6)), around(ends[0] * 5)
         ends_ = (value * 0.8, value * 1.3)
         levels_ = tuple(around(value) for _ in range(n)) if person else ()
         high = tuple(bool(one) for one in rng.integers(0, 2, n)) if person else ()
         error = None if standard is None else float(rng.normal(0, 0.1))
-        return SettingFound(person, standard, n, value, *(some(ends_) or (None, None)), some(around(0.1)), error,
+        return SettingEstimate(person, standard, n, value, *(some(ends_) or (None, None)), some(around(0.1)), error,
                             some(float(rng.normal(0, 0.1))), levels_, high)  # fmt: skip
 
-    def sensed(person: str | None, standard: float | None) -> SensitivityFound:
+    def sensed(person: str | None, standard: float | None) -> SensitivityEstimate:
         d, n = some(around(1.3)), len(people) if person is None else 20
         shares = {"first": float(rng.random()), "second": float(rng.random())}
         interval = (some(d - 0.5), d + 0.5) if d else (None, None)
-        return SensitivityFound(
+        return SensitivityEstimate(
             person, n, shares, standard, some("oil", 0.2), some(levels[0], 0.3), d, *interval,
             some(float(rng.normal())), some("differencing"), some(around(1.0)),
         )  # fmt: skip
@@ -105,13 +105,13 @@ def filled(number: int) -> tuple[LevelBlock, LevelsFound]:
         values = standard, *numbers, some(-0.01), some(0.03), some(0.1), some(0.02)
         return dict(zip(names, values, strict=True))
 
-    def exponent(person: str | None) -> ExponentFound:
+    def exponent(person: str | None) -> ExponentEstimate:
         low, high = some((0.4, 1.2)) or (None, None)
-        return ExponentFound(person, int(rng.integers(2, 6)), around(0.8), low, high)
+        return ExponentEstimate(person, int(rng.integers(2, 6)), around(0.8), low, high)
 
     whom = [None, *people]
     revealed = rng.random() < 0.9
-    found = LevelsFound(
+    found = LevelsResult(
         "b", "Block", design, revealed,
         tuple(GroupAnswers(f"V{one}", f"standard {one}", {"n": one, "median": some(1.5), "q1": some(1.0), "q3": 2.0})
               for one in range(2)),

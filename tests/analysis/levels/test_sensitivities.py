@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
-from study_app.analysis.levels.sensitivities import SensitivityFound, sensitivities
+from study_app.analysis.levels.sensitivities import SensitivityEstimate, sensitivities
 from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import Stimulus
@@ -32,7 +32,7 @@ def rows(design: str, chosen: dict[int, float], answers: tuple[str, str], person
     return pd.DataFrame(found, columns=NAMES)
 
 
-def own(block: LevelBlock, frame: pd.DataFrame) -> SensitivityFound:
+def own(block: LevelBlock, frame: pd.DataFrame) -> SensitivityEstimate:
     _, one = sensitivities(block, frame)
     return one
 

@@ -46,7 +46,7 @@ def committed(results: Results, participants: int | None = 3, **changes: object)
     return path
 
 
-def found_in(results: Results) -> tuple[str, ...]:
+def evaluate_block(results: Results) -> tuple[str, ...]:
     found = deviations(load_study(results.folder))
     assert found is not None
     return found.found
@@ -54,7 +54,7 @@ def found_in(results: Results) -> tuple[str, ...]:
 
 def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
     committed(answered)
-    assert found_in(answered) == ()
+    assert evaluate_block(answered) == ()
     text = " ".join(map(str, deviations_section(load_study(answered.folder))))
     assert "No difference was found" in text
     assert HASH in text
@@ -63,11 +63,11 @@ def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
 @pytest.mark.slow
 def test_fewer_participants_and_another_number_than_the_protocols_are_deviations(answered: Results) -> None:
     committed(answered, 12)
-    assert found_in(answered) == ("fewer participants: 3 are analysed, 12 were planned",)
+    assert evaluate_block(answered) == ("fewer participants: 3 are analysed, 12 were planned",)
     committed(answered, 2)
-    assert found_in(answered) == ("more participants: 3 are analysed, 2 were planned",)
+    assert evaluate_block(answered) == ("more participants: 3 are analysed, 2 were planned",)
     committed(answered, None)
-    assert found_in(answered) == ()
+    assert evaluate_block(answered) == ()
 
 
 def test_sessions_under_another_protocol_are_named(answered: Results) -> None:
@@ -75,7 +75,7 @@ def test_sessions_under_another_protocol_are_named(answered: Results) -> None:
     (first, *_) = StudyFolder(answered.folder).sessions()
     content = json.loads(first.receipt.read_text(encoding="utf-8"))
     first.receipt.write_text(json.dumps(content | {"protocol_hash": "cd" * 32}), encoding="utf-8")
-    (line,) = found_in(answered)
+    (line,) = evaluate_block(answered)
     assert line.startswith("1 session ran under another protocol (version 2) than the preregistered one")
     assert line.endswith("P001/1")
 
@@ -84,13 +84,13 @@ def test_sessions_under_another_protocol_are_named(answered: Results) -> None:
 def test_exclusions_by_other_rules_are_listed_and_those_by_its_own_are_not(answered: Results) -> None:
     committed(answered)
     answered.exclude("P001", trial=2, reason="sneezed")
-    (line,) = found_in(answered)
+    (line,) = evaluate_block(answered)
     assert line.startswith("an exclusion by no preregistered rule: ")
     assert line.endswith(": sneezed (AB)")
     by_rule = Exclusion("P002", 1, None, CATCH, "4 of 8 wrong", "2026-01-06T10:00:00.000+01:00")
     listed = (*exclusions(answered.folder), by_rule)
     StudyFolder(answered.folder).exclusions.write_bytes(exclusion_bytes(listed))
-    lines = found_in(answered)
+    lines = evaluate_block(answered)
     assert lines[0] == "fewer participants: 2 are analysed, 3 were planned"
     assert len(lines) == 2
     assert "sneezed" in lines[1]

@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 import pandas as pd
 import pytest
 
-from study_app.analysis.data.blocks import AskedIn, AskedQuestion
+from study_app.analysis.data.blocks import PlacedQuestion, QuestionPlace
 from study_app.analysis.data.questions import MEASURES
 from study_app.protocol.questions import Choice, Context, ItemView, Option, Question, Value, ValueType
 
@@ -48,7 +48,7 @@ RANKING = ToyRanking(id="best", text="Which is best?", short="Best", options=OPT
     ],
 )
 def test_question_says_which_options_an_answer_counts_for(question: Question, counts: dict[str, int]) -> None:
-    asked = AskedQuestion(AskedIn("order", "Order", True, ()), question, Context({}, None, "en"))
+    asked = PlacedQuestion(QuestionPlace("order", "Order", True, ()), question, Context({}, None, "en"))
     answers = pd.DataFrame(
         {"response": RESPONSES, "value": None, "cannot_judge": False, "participant": ["P1", "P2", "P3", "P4"]}
     )

@@ -15,7 +15,7 @@ from study_app.analysis.figures import question_figures
 from study_app.analysis.figures.page_layout import Look, Sheet
 from study_app.analysis.figures.question_figures import QuestionFigure, rows
 from study_app.analysis.report.write_report import report
-from study_app.analysis.results import QuestionFound
+from study_app.analysis.results import QuestionResult
 from study_app.gui.participant import questions as fields
 from study_app.gui.participant.forms.question_field import QuestionField
 from study_app.gui.participant.window import ParticipantWindow
@@ -79,7 +79,7 @@ def sunny(_asked: Any, answers: Any) -> dict[str, Any]:
     return {**counts_of_missing(answers), "sunny": int((answers["response"] == "sunny").sum())}
 
 
-def sun(_asked: Any, found: QuestionFound, look: Look) -> Sheet:
+def sun(_asked: Any, found: QuestionResult, look: Look) -> Sheet:
     return rows([one.name for one in found.groups], [one.numbers["n"] for one in found.groups], look, row_pt=20)[0]
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.analysis.evaluate import found_in
+from study_app.analysis.evaluate import evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
 from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.mixed_models import MixedModel
@@ -58,7 +58,7 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participant
         for block, values in zip(rek.blocks, given, strict=True):
             single_ = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
             whole, quick = (
-                found_in(None, of_tables(block, rek.decided, people, single_, verdicts_only=verdicts_only))
+                evaluate_block(None, of_tables(block, rek.decided, people, single_, verdicts_only=verdicts_only))
                 for verdicts_only in (False, True)
             )
             assert [one.verdict for one in ContrastsWithControl.of(quick)] == [

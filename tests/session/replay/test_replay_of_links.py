@@ -8,7 +8,7 @@ import pytest
 from study_app.analysis.data.blocks import setting_name
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.levels.conduct import Withheld
-from study_app.analysis.levels.evaluate import levels_found
+from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.tracks import tracks
 from study_app.protocol.load import parse
 from study_app.protocol.trials.presentation import presented_by
@@ -117,7 +117,7 @@ def test_the_analysis_finds_delivered_delays_and_what_safety_withheld(rehearsed:
     rows = rows[rows["block"] == "pairs"]
     assert sorted(rows["level"]) == [20, 80]
     assert (rows["level_delivered"] - rows["level"]).abs().max() < 1.5
-    pairs, named = levels_found(study)
+    pairs, named = level_results(study)
     assert [(one["low"], one["n"]) for one in Withheld.of(pairs)] == [(20, 1), (80, 1)]
     assert all(0 <= one["mean_percent"] <= one["most_percent"] < 5 for one in Withheld.of(pairs))
     assert "Force withheld by safety" in "".join(Withheld(pairs).section())

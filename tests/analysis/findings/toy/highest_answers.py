@@ -9,7 +9,7 @@ from scipy.stats import binomtest
 from study_app.analysis.figures.page_layout import Drawing, Look, Picture, Sheet
 from study_app.analysis.findings.finding import Absent, Answer, BlockAnswers, Finding, alone, judged_row
 from study_app.analysis.findings.statement_tests import table_of_tests
-from study_app.analysis.results import BlockFound, NotTested, Tested, short
+from study_app.analysis.results import BlockResult, NotTested, Tested, short
 from study_app.analysis.statistics.outcome import Outcome, clopper_pearson
 
 HIGHEST: Final = 7
@@ -28,7 +28,7 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
     question = "Which statement got most highest answers?"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockFound) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         tests = []
         for item, values in answers.single.items():
             given = values[~np.isnan(values)]
