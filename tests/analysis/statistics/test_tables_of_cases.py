@@ -139,10 +139,6 @@ def of_thresholds() -> Iterator[str]:
     yield from results(
         thresholds.drifts, {f"{drift} {n}": (drift, n) for drift in (None, 0.2, -0.3) for n in (1, 30, 100, 101)}
     )
-    made = {n: np.linspace(-1, 1, n) ** 3 for n in range(1, 6)}
-    yield from results(thresholds.setting_statistics, {
-        f"{n} {high}": (one, np.arange(n) % 2 == high) for n, one in made.items() for high in (0, 1, 2)
-    })  # fmt: skip
 
 
 def of_models() -> Iterator[str]:
