@@ -96,7 +96,7 @@ def of_pairs() -> Iterator[str]:
     yield from results(recognition.named, named_(1, 3))
     names = {name: (recognition.named(one), (0, 1, None)) for name, one in named_(2, 3).items()}
     yield from results(recognition.recognition, names, labels=4)
-    yield from results(thresholds.student_interval, {name: np.asarray(one, float) for name, one in DIFFERENCES.items()})
+    yield from results(outcome.student_interval, {name: np.asarray(one, float) for name, one in DIFFERENCES.items()})
     yield from results(thresholds.group_mean, {
         "one": ([1.0], [0.1]), "two": ([1.0, 2.0], [0.1, 0.2]), "alike": ([1.0, 1.01, 0.99], [0.5, 0.4, 0.6]),
         "apart": ([1.0, 4.0, 9.0, 2.0], [0.01, 0.02, 0.01, 0.03]), "none": ([], []),
