@@ -13,25 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from study_app.devices.emulators import falcon_bridge
+from study_app.devices.emulators import falcon_bridge, falcon_processor
 from study_app.devices.emulators.falcon_arm import ARMS, count, find_angles, find_force, saturate, set_arms
 from study_app.devices.emulators.falcon_bridge import BRIDGE, OUT_RING, byte_at, power_up
-from study_app.devices.emulators.falcon_processor import (
-    FAULTS,
-    LOADER,
-    LONGEST_NS,
-    POWER_OFF,
-    RUN,
-    RUNNING,
-    WAITING,
-    Faults,
-    draw,
-    load,
-    move_until,
-    receive_byte,
-    reset,
-    spelt,
-)
 from study_app.devices.falcon import constants
 from study_app.devices.falcon.bulk import BULK, BulkCalls
 from study_app.devices.falcon.mechanics import DEFAULT_GEOMETRY, Geometry, geometry_named
@@ -45,9 +29,9 @@ from study_app.haptics.model.layout import records
 EMULATOR = np.dtype(
     [
         ("bridge", BRIDGE),
-        ("faults", FAULTS),
-        ("loader", LOADER),
-        ("run", RUN),
+        ("faults", falcon_processor.FAULTS),
+        ("loader", falcon_processor.LOADER),
+        ("run", falcon_processor.RUN),
         ("arms", ARMS),
         ("handle", HANDLE),
         ("hand", HAND),
@@ -130,7 +114,7 @@ def _bulk_in(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
         room = length - moved.value
         if room < constants.USB_PACKET and _arrived_of(bridge, waiting) + constants.STATUS_BYTES > room:
             return constants.ERROR_OVERFLOW
-        noise = int(draw(e.faults) * 0x10000) if e.faults.status_noise else 0
+        noise = int(falcon_processor.draw(e.faults) * 0x10000) if e.faults.status_noise else 0
         got = falcon_bridge.hand_over(bridge, data + moved.value, noise)
         moved.value += got
         if got < constants.USB_PACKET:
@@ -185,11 +169,11 @@ def _advance(e: Any, to_ns: int) -> None:
         bridge.out_first += 1
         if e.powered == 0:
             continue
-        if e.loader.state == RUNNING:
-            receive_byte(e, bridge.out[place], bridge.out_divisor[place], at_ns)
+        if e.loader.state == falcon_processor.RUNNING:
+            falcon_processor.receive_byte(e, bridge.out[place], bridge.out_divisor[place], at_ns)
         else:
-            load(e.loader, bridge, e.faults, bridge.out[place], bridge.out_divisor[place], at_ns)
-            if e.loader.state == RUNNING:
+            falcon_processor.load(e.loader, bridge, e.faults, bridge.out[place], bridge.out_divisor[place], at_ns)
+            if e.loader.state == falcon_processor.RUNNING:
                 run_program(e)
     bridge.now_ns = max(bridge.now_ns, to_ns)
 
@@ -197,7 +181,7 @@ def _advance(e: Any, to_ns: int) -> None:
 @kernel
 def run_program(e: Any) -> None:
     """Begin with encoders at 0, no torque and no arm homed."""
-    e.loader.state = RUNNING
+    e.loader.state = falcon_processor.RUNNING
     _limp(e)
     for arm in range(3):
         e.run.origin[arm] = count(e.arms, arm)
@@ -226,7 +210,7 @@ def control(e: Any, request: int, value: int) -> int:
     dtr = e.bridge.dtr
     falcon_bridge.control(e.bridge, request, value)
     if e.bridge.dtr > dtr and e.bridge.divisor == constants.BAUD_9600 and e.powered != 0:
-        reset(e.loader)
+        falcon_processor.reset(e.loader)
         _limp(e)
     return constants.SUCCESS
 
@@ -237,8 +221,8 @@ def supply(e: Any, on: int) -> None:
     if e.powered == on:
         return
     e.powered = on
-    reset(e.loader)
-    e.loader.state = WAITING
+    falcon_processor.reset(e.loader)
+    e.loader.state = falcon_processor.WAITING
     _limp(e)
 
 
@@ -248,21 +232,21 @@ def let_pass(e: Any, lasting_ns: int) -> None:
     _begin(e)
     end_ns = falcon_bridge.end_of(e.bridge, lasting_ns)
     _advance(e, end_ns)
-    move_until(e, end_ns, max(lasting_ns, LONGEST_NS))
+    falcon_processor.move_until(e, end_ns, max(lasting_ns, falcon_processor.LONGEST_NS))
 
 
 @kernel
 def look(e: Any) -> None:
     """Advance to the clock's present time."""
     _begin(e)
-    move_until(e, e.bridge.now_ns, LONGEST_NS)
+    falcon_processor.move_until(e, e.bridge.now_ns, falcon_processor.LONGEST_NS)
 
 
 @kernel
 def unload(e: Any) -> None:
     """Reset to the state after connection: arms at the grip's place, no program."""
     find_angles(e.arms, e.handle.position_m)
-    e.loader.state = WAITING
+    e.loader.state = falcon_processor.WAITING
 
 
 @kernel
@@ -320,7 +304,7 @@ class Emulator(HandOrders):
         random = random or Random(0)  # noqa: S311 - faults and tremor keep no secrets
         self._now_ns = memory["bridge"]["now_ns"]
         self._tremble(random, tremor_m)
-        self.faults = Faults(self.state.faults, random)
+        self.faults = falcon_processor.Faults(self.state.faults, random)
         power_up(self.state.bridge)
         set_arms(self.state.arms, self.geometry, units_per_nm, arm_offset_rad)
         self.state.handle = new_scripted_handle(quantum_m=0.0)
@@ -420,7 +404,7 @@ class Emulator(HandOrders):
 
     def take(self, fault: str) -> None:
         """Take a fault as a command line gives it: ``drop=0.01``, ``frozen`` or ``power-off``."""
-        if spelt(fault.strip()) == POWER_OFF:
+        if falcon_processor.spelt(fault.strip()) == falcon_processor.POWER_OFF:
             self.power(False)
         else:
             self.faults.take(fault)
@@ -431,7 +415,7 @@ class Emulator(HandOrders):
 
     @property
     def running(self) -> bool:
-        return bool(self.state.powered) and int(self.state.loader.state) == RUNNING
+        return bool(self.state.powered) and int(self.state.loader.state) == falcon_processor.RUNNING
 
     @property
     def loaded(self) -> int:

@@ -20,19 +20,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices.emulators.inverse3_stream import (
-    SERVICE,
-    act,
-    drop,
-    fill,
-    go_on,
-    let_pass,
-    put_bytes,
-    put_frame,
-    rest,
-    stream_functions,
-    take_frames,
-)
+from study_app.devices.emulators import inverse3_stream
+from study_app.devices.emulators.inverse3_stream import SERVICE
 from study_app.devices.hand import HandOrders
 from study_app.devices.simulated import QUANTUM_M, TREMOR_M, new_scripted_handle
 from study_app.errors import DeviceError
@@ -242,7 +231,7 @@ class Service(HandOrders):
         self._answer_message(
             {"inverse3": [{"device_id": DEVICE_ID, "commands": {"set_cursor_force": {"vector": _ZERO}}}]}
         )
-        take_frames(self.state)
+        inverse3_stream.take_frames(self.state)
         self.give_bytes()
         self.disconnected()
 
@@ -333,26 +322,26 @@ class Service(HandOrders):
         state = self.state
         if state.clock == 0 and state.visible == state.read and state.queue_first < state.queue_next:
             state.now_ns = max(state.now_ns, state.queue_ns[state.queue_first % state.queue_ns.size])  # who asks waits
-        let_pass(state)
+        inverse3_stream.let_pass(state)
         places = np.arange(state.read, state.visible) % state.outbox.size
         state.read = state.visible
         return bytes(state.outbox[places].tobytes())
 
     def disconnected(self) -> None:
         """See the end of the stream: the session is over, and its device idle."""
-        rest(self.state)
+        inverse3_stream.rest(self.state)
         self.state.ended = 1
 
     def work(self) -> None:
         """Answer what waits in the inbox."""
-        take_frames(self.state)
+        inverse3_stream.take_frames(self.state)
         while self.state.complex_size:
             state = self.state
             text = state.inbox[state.complex_at : state.complex_at + state.complex_size].tobytes()
             self._answer_message(json.loads(text))
-            drop(state, int(state.complex_end))
+            inverse3_stream.drop(state, int(state.complex_end))
             state.complex_size = 0
-            take_frames(state)
+            inverse3_stream.take_frames(state)
 
     def _answer_handshake(self, asked: bytes) -> None:
         """Answer RFC 6455's opening handshake (§4.2.2), then send the inventory."""
@@ -394,10 +383,10 @@ class Service(HandOrders):
             if entry.get("device_id") == DEVICE_ID:
                 if self.obeys:
                     self._configure(entry.get("configure", {}), session.get("configure", {}))
-                go_on(self.state)
+                inverse3_stream.go_on(self.state)
                 force = entry.get("commands", {}).get("set_cursor_force", {}).get("vector")
                 if force is not None:
-                    act(self.state, float(force["x"]), float(force["y"]), float(force["z"]))
+                    inverse3_stream.act(self.state, float(force["x"]), float(force["y"]), float(force["z"]))
         self._send(self._message(full="force_render_full_state" in session))
         if "configure" in session:
             self._arm()
@@ -417,13 +406,13 @@ class Service(HandOrders):
     def _send(self, message: dict[str, Any]) -> None:
         text, slots = template(message)
         data, places = np.frombuffer(text, np.uint8).copy(), np.array(slots, np.int64)
-        fill(self.state, data, places)
-        put_frame(self.state, 1, data, data.size, 0)
-        let_pass(self.state)
+        inverse3_stream.fill(self.state, data, places)
+        inverse3_stream.put_frame(self.state, 1, data, data.size, 0)
+        inverse3_stream.let_pass(self.state)
 
     def _send_raw(self, data: bytes) -> None:
-        put_bytes(self.state, np.frombuffer(data, np.uint8), len(data))
-        let_pass(self.state)
+        inverse3_stream.put_bytes(self.state, np.frombuffer(data, np.uint8), len(data))
+        inverse3_stream.let_pass(self.state)
 
     def _refresh(self) -> None:
         """Render the state's text anew."""
@@ -436,5 +425,5 @@ class Service(HandOrders):
 
 def service_calls(service: Service) -> tuple[int, int, int]:
     """Return handle and addresses of ``send`` and ``recv`` in place of the system's."""
-    send, receive = stream_functions()
+    send, receive = inverse3_stream.stream_functions()
     return service.handle, int(send.address), int(receive.address)

@@ -22,18 +22,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from study_app.devices.falcon import mechanics
 from study_app.devices.falcon.constants import ERROR_NO_DEVICE
 from study_app.devices.falcon.failures import usb_failure
-from study_app.devices.falcon.mechanics import (
-    REACHED,
-    START_M,
-    Geometry,
-    angles,
-    forward,
-    geometry_named,
-    jacobian,
-    new_mechanism,
-)
 from study_app.errors import DeviceError
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
 from study_app.haptics.model.layout import new_command, new_reading
@@ -73,7 +64,9 @@ class Calibration:
         }
 
 
-def fit(geometry: Geometry, poses: Any, forces_n: Any, units: Any, *, measured: date | None = None) -> Calibration:
+def fit(
+    geometry: mechanics.Geometry, poses: Any, forces_n: Any, units: Any, *, measured: date | None = None
+) -> Calibration:
     """Return the gain, offset and weight of the grip that explain best what the motors held, by least squares.
 
     The grip stands still when motors, its own weight and what pulls at it balance:
@@ -124,20 +117,22 @@ def fit(geometry: Geometry, poses: Any, forces_n: Any, units: Any, *, measured: 
 def left_over(found: Calibration, poses: Any, forces_n: Any, units: Any) -> Any:
     """Return the residual forces (n, 3) [N] of ``found``; arguments as for `fit`."""
     counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
-    return _solve(geometry_named(found.geometry), found.arm_offset_rad, counts, pulled_n, held)[1].reshape(-1, 3)
+    return _solve(mechanics.geometry_named(found.geometry), found.arm_offset_rad, counts, pulled_n, held)[1].reshape(
+        -1, 3
+    )
 
 
-def _solve(geometry: Geometry, offset_rad: float, counts: Any, pulled_n: Any, held: Any) -> tuple[Any, Any]:
+def _solve(geometry: mechanics.Geometry, offset_rad: float, counts: Any, pulled_n: Any, held: Any) -> tuple[Any, Any]:
     """Return the best (1 / gain, own weight) for an offset, and what is left of the forces, flat [N]."""
-    mechanism = new_mechanism(geometry, 1.0, offset_rad)
+    mechanism = mechanics.new_mechanism(geometry, 1.0, offset_rad)
     theta, place_m, rates = np.zeros(3), np.zeros(3), np.zeros((3, 3))
     pushed = np.zeros((len(counts), 3))
     for row, count in enumerate(counts):
-        angles(mechanism, count, theta)
-        place_m[:] = START_M
-        if forward(mechanism, theta, place_m) != REACHED:
+        mechanics.angles(mechanism, count, theta)
+        place_m[:] = mechanics.START_M
+        if mechanics.forward(mechanism, theta, place_m) != mechanics.REACHED:
             raise DeviceError(f"pose {row + 1}: encoders {count.astype(int).tolist()} are no pose of {geometry.name!r}")
-        jacobian(mechanism, theta, place_m, rates)
+        mechanics.jacobian(mechanism, theta, place_m, rates)
         pushed[row] = -rates.T @ held[row]
     down = np.tile([0.0, -1.0, 0.0], len(counts))
     design = np.column_stack([pushed.ravel(), down])
@@ -178,7 +173,7 @@ def load(serial: str) -> Calibration | None:
     file = calibration_file(serial)
     try:
         found = Calibration(**json.loads(file.read_text(encoding="utf-8")))
-        geometry_named(found.geometry)
+        mechanics.geometry_named(found.geometry)
         whole = _GAINS[0] <= found.units_per_nm <= _GAINS[1] and abs(found.arm_offset_rad) <= _OFFSETS_RAD
     except FileNotFoundError:
         return None

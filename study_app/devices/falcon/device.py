@@ -12,27 +12,10 @@ import numpy as np
 
 from study_app.devices.descriptor import OpenRequest
 from study_app.devices.driver import RUNS, AtClose, FramedDevice
-from study_app.devices.falcon import boot, calibration
+from study_app.devices.falcon import boot, calibration, exchange, mechanics
 from study_app.devices.falcon.bulk import BulkCalls
 from study_app.devices.falcon.constants import ERROR_NO_DEVICE
-from study_app.devices.falcon.exchange import (
-    BRIDGE_LOST,
-    COUNTERS,
-    FORCE_LIMIT_N,
-    LEAST_MASS_KG,
-    exchange_functions,
-    new_exchange,
-)
 from study_app.devices.falcon.failures import FAILURES, LONGEST_ROUND_TRIP_S, MOST_BROKEN, usb_failure
-from study_app.devices.falcon.mechanics import (
-    DEFAULT_GEOMETRY,
-    REACHED,
-    WORKSPACE_M,
-    count_at,
-    geometry_named,
-    inverse,
-    new_mechanism,
-)
 from study_app.devices.falcon.replies import ALL_HOMED
 from study_app.devices.falcon.transport import Transport, end_torque, open_transport, quiet
 from study_app.errors import DeviceError
@@ -66,8 +49,8 @@ class FalconDevice(FramedDevice):
     """
 
     name = "falcon"
-    failures, counted, silent, running = FAILURES, COUNTERS, "power", "unplugged"
-    causes: ClassVar[Mapping[int, str]] = {BRIDGE_LOST: "unplugged"}
+    failures, counted, silent, running = FAILURES, exchange.COUNTERS, "power", "unplugged"
+    causes: ClassVar[Mapping[int, str]] = {exchange.BRIDGE_LOST: "unplugged"}
     ends_force: str | None = f"{end_torque.__module__}:{end_torque.__name__}"
 
     def __init__(
@@ -75,22 +58,22 @@ class FalconDevice(FramedDevice):
         serial: str = "",
         *,
         firmware: str | Path | None = None,
-        workspace_m: tuple[float, float, float] = WORKSPACE_M,
-        force_limit_n: float = FORCE_LIMIT_N,
-        geometry: str = DEFAULT_GEOMETRY,
+        workspace_m: tuple[float, float, float] = mechanics.WORKSPACE_M,
+        force_limit_n: float = exchange.FORCE_LIMIT_N,
+        geometry: str = mechanics.DEFAULT_GEOMETRY,
         progress: Callable[[str], object] | None = None,
         cancelled: Callable[[], bool] | None = None,
         patience_s: float = PATIENCE_S,
     ) -> None:
         self._serial, self._firmware, self._patience_s = serial, firmware, patience_s
-        self._geometry = geometry_named(geometry)
+        self._geometry = mechanics.geometry_named(geometry)
         self._progress = progress if progress is not None else str
         self._cancelled = cancelled
         self.reading, self._command = new_reading(), new_command()
-        mechanism = new_mechanism(self._geometry, calibration.UNCALIBRATED_UNITS_PER_NM)
-        memory = new_exchange(BulkCalls(0, 0), mechanism, self._geometry, force_limit_n)
-        super().__init__(memory, workspace_m, force_limit_n, exchange_functions())
-        self._dynamics = Dynamics(None, count_at(mechanism, self._geometry.centre_m), LEAST_MASS_KG)
+        mechanism = mechanics.new_mechanism(self._geometry, calibration.UNCALIBRATED_UNITS_PER_NM)
+        memory = exchange.new_exchange(BulkCalls(0, 0), mechanism, self._geometry, force_limit_n)
+        super().__init__(memory, workspace_m, force_limit_n, exchange.exchange_functions())
+        self._dynamics = Dynamics(None, mechanics.count_at(mechanism, self._geometry.centre_m), exchange.LEAST_MASS_KG)
         self._check_reach(mechanism)
 
     @classmethod
@@ -111,11 +94,13 @@ class FalconDevice(FramedDevice):
         found: dict[str, Any] = {"serial": serial, "firmware": self._run_firmware(connection)}
         round_trip_s, event_character = boot.choose_event_character(connection)
         used = calibration.load(serial) if serial else None
-        geometry = self._geometry if used is None else geometry_named(used.geometry)
+        geometry = self._geometry if used is None else mechanics.geometry_named(used.geometry)
         gain = calibration.UNCALIBRATED_UNITS_PER_NM if used is None else used.units_per_nm
-        mechanism = new_mechanism(geometry, gain, 0.0 if used is None else used.arm_offset_rad)
-        self._dynamics = Dynamics(round_trip_s, count_at(mechanism, geometry.centre_m), LEAST_MASS_KG)
-        self.memory[:] = new_exchange(connection.calls(), mechanism, geometry, self.force_limit_n)
+        mechanism = mechanics.new_mechanism(geometry, gain, 0.0 if used is None else used.arm_offset_rad)
+        self._dynamics = Dynamics(
+            round_trip_s, mechanics.count_at(mechanism, geometry.centre_m), exchange.LEAST_MASS_KG
+        )
+        self.memory[:] = exchange.new_exchange(connection.calls(), mechanism, geometry, self.force_limit_n)
         self._start_guard(connection.name)
         self._home(connection)
         self._begin_anew()
@@ -126,7 +111,7 @@ class FalconDevice(FramedDevice):
     def _finish(self, connection: Transport) -> AtClose:
         """Send zero torque several times, if it was used."""
         falcon = self.exchange
-        gone = falcon.ended == BRIDGE_LOST
+        gone = falcon.ended == exchange.BRIDGE_LOST
         pushing = gone and bool(falcon.units.any())
         used, falcon.handle = bool(falcon.handle), 0
         quieted = not used or quiet(connection) > 0
@@ -185,10 +170,14 @@ class FalconDevice(FramedDevice):
         """Refuse a workspace that the arms do not reach."""
         theta = np.zeros(3)
         for corner in np.array(np.meshgrid(*((-half, half) for half in self.workspace_m))).reshape(3, -1).T:
-            reached = inverse(mechanism, np.add(corner, [0.0, 0.0, self._geometry.centre_m]), theta) == REACHED
+            reached = (
+                mechanics.inverse(mechanism, np.add(corner, [0.0, 0.0, self._geometry.centre_m]), theta)
+                == mechanics.REACHED
+            )
             if not reached or np.abs((theta - mechanism.zero_rad) / mechanism.rad_per_count).max() > _FARTHEST:
                 asked, known = (
-                    " x ".join(f"{2000 * half:g}" for half in size) for size in (self.workspace_m, WORKSPACE_M)
+                    " x ".join(f"{2000 * half:g}" for half in size)
+                    for size in (self.workspace_m, mechanics.WORKSPACE_M)
                 )
                 raise DeviceError(
                     f"a workspace of {asked} mm is more than a Falcon reaches; {known} mm is about the most: make the "
@@ -243,7 +232,7 @@ class FalconDevice(FramedDevice):
         """Fade the force in over half a second from the next tick on, and reset the counters."""
         self.exchange.share = 0.0
         self.exchange.started = 0
-        for name in COUNTERS:
+        for name in exchange.COUNTERS:
             self.exchange[name] = 0
 
     def _tick(self) -> None:

@@ -17,58 +17,14 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.driver import COMMON, FIRST_CAUSE, RUNS, enter, leave, outlasted
+from study_app.devices.falcon import constants, mechanics, replies
 from study_app.devices.falcon.bulk import BULK, BulkCalls
-from study_app.devices.falcon.constants import (
-    ENDPOINT_IN,
-    ENDPOINT_OUT,
-    ERROR_NO_DEVICE,
-    ERROR_TIMEOUT,
-    FLAG_BLUE,
-    FLAG_GREEN,
-    FLAG_HOMING,
-    FLAG_RED,
-    PACKET,
-    SUCCESS,
-    USB_PACKET,
-)
-from study_app.devices.falcon.mechanics import (
-    MECHANISM,
-    OUT_STROKE_M,
-    REACHED,
-    START_M,
-    Geometry,
-    angles,
-    forward,
-    jacobian,
-    motor_units,
-    torques,
-)
-from study_app.devices.falcon.replies import (
-    PARSER,
-    STATUS,
-    feed,
-    give_up_measurement,
-    is_plausible,
-    pack,
-    strip,
-    take_status,
-    update_delay,
-)
-from study_app.haptics.kernels.c_functions import (
-    READ,
-    READ_LOST,
-    READ_NEW,
-    READ_NOTHING_NEW,
-    WRITE,
-    c_function,
-    call_at,
-    record_at,
-)
+from study_app.haptics.kernels import c_functions
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.passivity import SURE_MPS
 from study_app.haptics.kernels.vector import clear, copy, dot, square, square_distance
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.layout import COMMAND, READING, records
+from study_app.haptics.model.layout import READING, records
 from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n
 
 MOST_WAITING_N: Final = 0.5
@@ -86,7 +42,7 @@ def push(falcon: Any) -> None:
     ``held_n`` is then the force of the motors until the next command, where the grip is now, and ``sent_n`` the force
     after it [N].
     """
-    jacobian(falcon.mechanism, falcon.theta, falcon.position_m, falcon.rates)
+    mechanics.jacobian(falcon.mechanism, falcon.theta, falcon.position_m, falcon.rates)
     _motor_force(falcon, falcon.held_n)
     _choose_units(falcon)
     _motor_force(falcon, falcon.sent_n)
@@ -120,8 +76,8 @@ def _choose_units(falcon: Any) -> None:
             falcon.units[i] = 0
         return
     limit_growth(falcon)
-    torques(falcon.rates, falcon.force_n, falcon.torque_nm)
-    falcon.shortened += motor_units(falcon.mechanism, falcon.torque_nm, falcon.units)
+    mechanics.torques(falcon.rates, falcon.force_n, falcon.torque_nm)
+    falcon.shortened += mechanics.motor_units(falcon.mechanism, falcon.torque_nm, falcon.units)
 
 
 @kernel
@@ -167,22 +123,22 @@ _BEYOND = 2  # positions in a row that show an out-stroke: a single one may be f
 _READS = 2  # most reads of the bridge per tick: an answer may contain only status bytes
 _TIMEOUT_MS = 1
 _NORM_SLACK = 1.001
-_DATA = 4 * USB_PACKET
+_DATA = 4 * constants.USB_PACKET
 
 FALCON = np.dtype(
     [
         *COMMON,  # the force sent: at the grip's place at the last command
         ("handle", np.intp),  # of the bridge, and
         ("transfer", np.intp),  # address of its function (``bulk.BULK``)
-        ("mechanism", MECHANISM),
+        ("mechanism", mechanics.MECHANISM),
         ("centre_m", np.float64),  # z of the hand's origin in the Falcon's frame
         ("started", np.int64),  # 1 after the first tick
         # the stream
         ("data", np.uint8, (_DATA,)),
-        ("packet", np.uint8, (PACKET,)),
+        ("packet", np.uint8, (constants.PACKET,)),
         ("transferred", np.int32),
-        ("parser", PARSER),
-        ("status", STATUS),
+        ("parser", replies.PARSER),
+        ("status", replies.STATUS),
         # the pose, in the Falcon's frame
         ("seen_rad", np.float64, (3,)),  # from the last encoder counts
         ("theta", np.float64, (3,)),  # of the last pose
@@ -254,10 +210,8 @@ COUNTERS: Final = (
     "shortened",
 )
 
-_falcon_at = record_at(FALCON)
-_reading_at = record_at(READING)
-_command_at = record_at(COMMAND)
-_transfer = call_at(BULK)
+_falcon_at = c_functions.record_at(FALCON)
+_transfer = c_functions.call_at(BULK)
 
 
 def _offset(field: str) -> int:
@@ -270,14 +224,16 @@ _READING_BYTES = READING.itemsize
 _DATA_AT, _PACKET_AT, _TRANSFERRED_AT = _offset("data"), _offset("packet"), _offset("transferred")
 
 
-def new_exchange(calls: BulkCalls, mechanism: Any, geometry: Geometry, force_limit_n: float = FORCE_LIMIT_N) -> Any:
+def new_exchange(
+    calls: BulkCalls, mechanism: Any, geometry: mechanics.Geometry, force_limit_n: float = FORCE_LIMIT_N
+) -> Any:
     """Return the memory of an exchange over an open bridge, shape (1,): its address is the device's ``context``."""
     memory = records(FALCON, 1)
     falcon = memory[0]
     falcon.handle, falcon.transfer = calls.handle, calls.transfer
     falcon.mechanism = mechanism
     falcon.centre_m = geometry.centre_m
-    falcon.position_m = START_M
+    falcon.position_m = mechanics.START_M
     falcon.delay = 1
     falcon.force_limit_n = force_limit_n
     falcon.slew_n_per_s = slew_limit_n(SLEW_S, Dynamics(mass_kg=LEAST_MASS_KG)) / SLEW_S
@@ -287,14 +243,14 @@ def new_exchange(calls: BulkCalls, mechanism: Any, geometry: Geometry, force_lim
 @cache
 def exchange_functions() -> tuple[Any, Any]:
     """Compile read and write, once for all Falcons."""
-    return c_function(READ, _read), c_function(WRITE, _write)
+    return c_functions.device_functions(_read, _write)
 
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     falcon = _falcon_at(context)
-    answer = READ_LOST
+    answer = c_functions.READ_LOST
     if enter(falcon):
-        answer = _take_reply(falcon, context, now_ns, _reading_at(reading))
+        answer = _take_reply(falcon, context, now_ns, c_functions.reading_at(reading))
         if outlasted(falcon):
             finish(falcon, context)
         leave(falcon)
@@ -302,8 +258,8 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    falcon, asked = _falcon_at(context), _command_at(command)
-    answer = READ_LOST
+    falcon, asked = _falcon_at(context), c_functions.command_at(command)
+    answer = c_functions.READ_LOST
     if enter(falcon):
         answer = _send_force(falcon, context, asked.force_n)
         if outlasted(falcon):
@@ -330,21 +286,21 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
     falcon.apart += 1
     packets = _receive(falcon, context)
     if falcon.ended != RUNS or falcon.unguarded != 0:
-        return READ_LOST
+        return c_functions.READ_LOST
     gap = falcon.started == 0 or elapsed_ns <= 0 or elapsed_ns > LONGEST_GAP_NS
     falcon.started = 1
     if gap:
         falcon.posed_ns = 0
-    punctual = update_delay(falcon, packets, gap)
+    punctual = replies.update_delay(falcon, packets, gap)
     if packets == 0:
         falcon.missing += 1
-        return READ_NOTHING_NEW
+        return c_functions.READ_NOTHING_NEW
     if not punctual:
         falcon.late += 1
-        return READ_NOTHING_NEW
-    if not (take_status(falcon) and is_plausible(falcon) and _locate(falcon)):
+        return c_functions.READ_NOTHING_NEW
+    if not (replies.take_status(falcon) and replies.is_plausible(falcon) and _locate(falcon)):
         falcon.refused += 1
-        return READ_NOTHING_NEW
+        return c_functions.READ_NOTHING_NEW
     _follow(falcon)
     _open_gate(falcon, elapsed_ns * 1e-9)
     for axis in range(3):
@@ -355,7 +311,7 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
         out.delay_ticks = falcon.delay
     falcon.fresh += 1
     falcon.fresh_ns = now_ns
-    return READ_NEW
+    return c_functions.READ_NEW
 
 
 @kernel
@@ -366,7 +322,7 @@ def _send_force(falcon: Any, context: int, force_n: Any) -> int:
     else:  # nor NaN: the servo sends neither
         clear(falcon.force_n)
     _send_packet(falcon, context)
-    return READ_LOST if falcon.ended != RUNS else 0
+    return c_functions.READ_LOST if falcon.ended != RUNS else 0
 
 
 @kernel
@@ -376,8 +332,8 @@ def _send_packet(falcon: Any, context: int) -> None:
     push(falcon)
     waits = falcon.testing > 0 and may_wait(falcon)
     if falcon.testing > 0 and not waits:
-        give_up_measurement(falcon)
-    pack(falcon.units, _lights(falcon), falcon.packet)
+        replies.give_up_measurement(falcon)
+    replies.pack(falcon.units, _lights(falcon), falcon.packet)
     if waits or not _send(falcon, context):
         falcon.units[0], falcon.units[1], falcon.units[2] = before
         copy(falcon.held_n, falcon.sent_n)
@@ -387,8 +343,8 @@ def _send_packet(falcon: Any, context: int) -> None:
 def _lights(falcon: Any) -> int:
     """Return the homing flag, which must stay set, and red before homing, blue before the out-stroke, then green."""
     if falcon.homed == 0:
-        return FLAG_HOMING | FLAG_RED
-    return FLAG_HOMING | (FLAG_BLUE if falcon.pulled_out == 0 else FLAG_GREEN)
+        return constants.FLAG_HOMING | constants.FLAG_RED
+    return constants.FLAG_HOMING | (constants.FLAG_BLUE if falcon.pulled_out == 0 else constants.FLAG_GREEN)
 
 
 @kernel
@@ -400,20 +356,20 @@ def _receive(falcon: Any, context: int) -> Any:
         code = _transfer(
             falcon.transfer,
             falcon.handle,
-            np.uint8(ENDPOINT_IN),
+            np.uint8(constants.ENDPOINT_IN),
             np.intp(context + _DATA_AT),
             np.int32(_DATA),
             np.intp(context + _TRANSFERRED_AT),
             np.uint32(_TIMEOUT_MS),
         )
-        if code == ERROR_NO_DEVICE:
+        if code == constants.ERROR_NO_DEVICE:
             falcon.ended = BRIDGE_LOST
             return 0
-        if code not in (SUCCESS, ERROR_TIMEOUT):
+        if code not in (constants.SUCCESS, constants.ERROR_TIMEOUT):
             falcon.read_errors += 1
             break
-        kept = strip(falcon.data, falcon.transferred, falcon.data)
-        packets += feed(falcon.parser, falcon.data, kept, falcon.status)
+        kept = replies.strip(falcon.data, falcon.transferred, falcon.data)
+        packets += replies.feed(falcon.parser, falcon.data, kept, falcon.status)
         if kept > 0 and falcon.parser.held > 0:
             falcon.cut_short += 1
         if packets > 0:
@@ -425,8 +381,8 @@ def _receive(falcon: Any, context: int) -> Any:
 @kernel
 def _locate(falcon: Any) -> bool:
     """Compute the grip's position; return whether it is possible for a Falcon."""
-    angles(falcon.mechanism, falcon.status.encoders, falcon.seen_rad)
-    if forward(falcon.mechanism, falcon.seen_rad, falcon.position_m) != REACHED:
+    mechanics.angles(falcon.mechanism, falcon.status.encoders, falcon.seen_rad)
+    if mechanics.forward(falcon.mechanism, falcon.seen_rad, falcon.position_m) != mechanics.REACHED:
         return False
     for i in range(3):
         falcon.theta[i] = falcon.seen_rad[i]
@@ -449,7 +405,7 @@ def _follow(falcon: Any) -> None:
 
 @kernel
 def _open_gate(falcon: Any, elapsed_s: float) -> None:
-    falcon.beyond = falcon.beyond + 1 if falcon.position_m[2] > OUT_STROKE_M else 0
+    falcon.beyond = falcon.beyond + 1 if falcon.position_m[2] > mechanics.OUT_STROKE_M else 0
     if falcon.beyond >= _BEYOND:
         falcon.pulled_out = 1
     if falcon.pulled_out != 0:
@@ -463,14 +419,14 @@ def _send(falcon: Any, context: int) -> bool:
     code = _transfer(
         falcon.transfer,
         falcon.handle,
-        np.uint8(ENDPOINT_OUT),
+        np.uint8(constants.ENDPOINT_OUT),
         np.intp(context + _PACKET_AT),
-        np.int32(PACKET),
+        np.int32(constants.PACKET),
         np.intp(context + _TRANSFERRED_AT),
         np.uint32(_TIMEOUT_MS),
     )
-    sent: bool = code in (SUCCESS, ERROR_TIMEOUT) and falcon.transferred == PACKET
-    if code == ERROR_NO_DEVICE:
+    sent: bool = code in (constants.SUCCESS, constants.ERROR_TIMEOUT) and falcon.transferred == constants.PACKET
+    if code == constants.ERROR_NO_DEVICE:
         falcon.ended = BRIDGE_LOST
     elif not sent:
         falcon.write_errors += 1

@@ -23,16 +23,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices.falcon.constants import (
-    HOMED_SHIFT,
-    MOST_TORQUE,
-    PACKET,
-    START,
-    STATUS_BYTES,
-    STOP,
-    USB_PACKET,
-    ZERO,
-)
+from study_app.devices.falcon import constants
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 
@@ -43,7 +34,7 @@ STATUS_BITS = 7
 
 PARSER = np.dtype(
     [
-        ("tail", np.uint8, (PACKET,)),  # the start of an incomplete packet
+        ("tail", np.uint8, (constants.PACKET,)),  # the start of an incomplete packet
         ("held", np.int64),  # its number of bytes
         ("packets", np.int64),  # whole valid packets so far
         ("skipped", np.int64),  # bytes so far that belonged to none
@@ -66,7 +57,7 @@ STATUS = np.dtype(
 def put_number(out: Any, at: int, value: int) -> None:
     """Write ``value``, as 16 bits with sign, into the four bytes of ``out`` from ``at`` on."""
     for nibble in range(NIBBLES):
-        out[at + nibble] = ZERO + ((value >> (4 * nibble)) & 0xF)
+        out[at + nibble] = constants.ZERO + ((value >> (4 * nibble)) & 0xF)
 
 
 @kernel
@@ -74,7 +65,7 @@ def number(data: Any, at: int) -> Any:
     """Return what stands in the four bytes of ``data`` from ``at`` on, -32768 to 32767."""
     value: Any = 0
     for nibble in range(NIBBLES):
-        value += ((np.int64(data[at + nibble]) - ZERO) & 0xF) << (4 * nibble)
+        value += ((np.int64(data[at + nibble]) - constants.ZERO) & 0xF) << (4 * nibble)
     return value - 0x10000 if value >= 0x8000 else value
 
 
@@ -84,12 +75,12 @@ def pack(torques: Any, flags: int, out: Any) -> None:
 
     A torque beyond ``MOST_TORQUE`` is clipped, so that it never overflows into the opposite sign.
     """
-    out[0] = START
+    out[0] = constants.START
     for arm in range(3):
-        put_number(out, 1 + NIBBLES * arm, min(max(torques[arm], -MOST_TORQUE), MOST_TORQUE))
-    out[FLAGS_AT] = ZERO + flags
-    out[UNKNOWN_AT] = ZERO
-    out[PACKET - 1] = STOP
+        put_number(out, 1 + NIBBLES * arm, min(max(torques[arm], -constants.MOST_TORQUE), constants.MOST_TORQUE))
+    out[FLAGS_AT] = constants.ZERO + flags
+    out[UNKNOWN_AT] = constants.ZERO
+    out[constants.PACKET - 1] = constants.STOP
 
 
 @kernel
@@ -100,7 +91,7 @@ def strip(data: Any, length: int, out: Any) -> int:
     """
     kept = 0
     for i in range(length):
-        if i % USB_PACKET >= STATUS_BYTES:
+        if i % constants.USB_PACKET >= constants.STATUS_BYTES:
             out[kept] = data[i]
             kept += 1
     return kept
@@ -121,7 +112,7 @@ def feed(parser: Any, data: Any, length: int, status: Any) -> Any:
     before = parser.packets
     for i in range(length):
         _take(parser, data[i])
-        if parser.held == PACKET:
+        if parser.held == constants.PACKET:
             _read(parser.tail, status)
             parser.packets += 1
             parser.held = 0
@@ -136,7 +127,7 @@ def _take(parser: Any, byte: Any) -> None:
             parser.skipped += 1
             return
         # Among the bytes that fit, only the unknown one can be another start.
-        if parser.held > UNKNOWN_AT and parser.tail[UNKNOWN_AT] == START:
+        if parser.held > UNKNOWN_AT and parser.tail[UNKNOWN_AT] == constants.START:
             parser.skipped += UNKNOWN_AT
             parser.held = 1
         else:
@@ -150,21 +141,21 @@ def _take(parser: Any, byte: Any) -> None:
 def _fits(at: int, byte: int) -> bool:
     """Whether ``byte`` may stand ``at`` that place of a packet."""
     if at == 0:
-        return byte == START
+        return byte == constants.START
     if at < FLAGS_AT:
-        return ZERO <= byte < ZERO + 16
+        return constants.ZERO <= byte < constants.ZERO + 16
     if at == FLAGS_AT:
-        return ZERO <= byte < ZERO + (1 << STATUS_BITS)
-    return at == UNKNOWN_AT or byte == STOP
+        return constants.ZERO <= byte < constants.ZERO + (1 << STATUS_BITS)
+    return at == UNKNOWN_AT or byte == constants.STOP
 
 
 @kernel
 def _read(packet: Any, status: Any) -> None:
     for arm in range(3):
         status.encoders[arm] = number(packet, 1 + NIBBLES * arm)
-    bits = np.int64(packet[FLAGS_AT]) - ZERO
+    bits = np.int64(packet[FLAGS_AT]) - constants.ZERO
     status.buttons = bits & 0xF
-    status.homed = bits >> HOMED_SHIFT
+    status.homed = bits >> constants.HOMED_SHIFT
     status.count += 1
 
 

@@ -17,27 +17,10 @@ from numba import types
 
 from study_app.devices.driver import COMMON, FIRST_CAUSE, enter, leave, outlasted
 from study_app.devices.force_dimension.library import FORCE, FORCE_OFF_CAUSE, STATUS_WORDS
-from study_app.haptics.kernels.c_functions import (
-    READ,
-    READ_LOST,
-    READ_NEW,
-    READ_NOTHING_NEW,
-    WRITE,
-    WRITE_SATURATED,
-    c_function,
-    call_at,
-    record_at,
-)
+from study_app.haptics.kernels import c_functions
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.vector import clear, copy, is_finite
-from study_app.haptics.model.layout import (
-    COMMAND,
-    MEASURED_GRIPPER,
-    MEASURED_ORIENTATION,
-    MEASURED_VELOCITY,
-    READING,
-    records,
-)
+from study_app.haptics.model import layout
 
 # The library's functions end with the device's id (``char ID``). It is passed as a whole word: a C function takes the
 # low byte of the register, and the emulated functions take the word as the address of their memory.
@@ -104,11 +87,17 @@ FUNCTIONS: Final = {
     "stop": "dhdStop",
 }
 
-_device_at = record_at(FORCE_DIMENSION)
-_reading_at = record_at(READING)
-_command_at = record_at(COMMAND)
-_call_vector, _call_fill, _call_buttons = call_at(VECTOR), call_at(FILL), call_at(BUTTONS)
-_call_push, _call_push_all, _call_stop = call_at(PUSH), call_at(PUSH_ALL), call_at(STOP)
+_device_at = c_functions.record_at(FORCE_DIMENSION)
+_call_vector, _call_fill, _call_buttons = (
+    c_functions.call_at(VECTOR),
+    c_functions.call_at(FILL),
+    c_functions.call_at(BUTTONS),
+)
+_call_push, _call_push_all, _call_stop = (
+    c_functions.call_at(PUSH),
+    c_functions.call_at(PUSH_ALL),
+    c_functions.call_at(STOP),
+)
 _fields = FORCE_DIMENSION.fields
 assert _fields is not None  # noqa: S101 - it is a record
 _POSITION, _VELOCITY, _ROTATION, _GAP, _STATUS = (
@@ -118,7 +107,7 @@ _POSITION, _VELOCITY, _ROTATION, _GAP, _STATUS = (
 
 def new_exchange(force_limit_n: float) -> Any:
     """Return the memory of an exchange, shape (1,), without a device: its address is the device's ``context``."""
-    memory = records(FORCE_DIMENSION, 1)
+    memory = layout.records(FORCE_DIMENSION, 1)
     memory[0].force_limit_n = force_limit_n
     return memory
 
@@ -126,14 +115,14 @@ def new_exchange(force_limit_n: float) -> Any:
 @cache
 def exchange_functions() -> tuple[Any, Any]:
     """Compile read and write, once for all devices."""
-    return c_function(READ, _read), c_function(WRITE, _write)
+    return c_functions.device_functions(_read, _write)
 
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     device = _device_at(context)
-    answer = READ_LOST
+    answer = c_functions.READ_LOST
     if enter(device):
-        answer = _take_sample(device, context, now_ns, _reading_at(reading))
+        answer = _take_sample(device, context, now_ns, c_functions.reading_at(reading))
         if outlasted(device):
             finish(device, context)
         leave(device)
@@ -141,8 +130,8 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    device, asked = _device_at(context), _command_at(command)
-    answer = READ_LOST
+    device, asked = _device_at(context), c_functions.command_at(command)
+    answer = c_functions.READ_LOST
     if enter(device):
         answer = _send_force(device, context, asked.force_n)
         if outlasted(device):
@@ -179,7 +168,7 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
         return _end(device, context, ERROR)
     if got == TIMEGUARD:
         device.guarded += 1
-        return READ_NOTHING_NEW
+        return c_functions.READ_NOTHING_NEW
     if not is_finite(device.position_m):
         return _end(device, context, BAD_NUMBER)
     device.fresh += 1
@@ -191,21 +180,21 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
         device.velocity_mps
     ):
         _from_maker(device.velocity_mps, out.velocity_mps)
-        out.measured |= MEASURED_VELOCITY
+        out.measured |= layout.MEASURED_VELOCITY
     if (
         device.wrist != 0
         and np.int32(_call_fill(device.get_orientation, context + _ROTATION, device.id)) >= 0
         and _put_quaternion(device.rotation, out.orientation)
     ):
-        out.measured |= MEASURED_ORIENTATION
+        out.measured |= layout.MEASURED_ORIENTATION
     if (
         device.gripper != 0
         and np.int32(_call_fill(device.get_gripper, context + _GAP, device.id)) >= 0
         and math.isfinite(device.gap_m)
     ):
         out.gripper_m = device.gap_m
-        out.measured |= MEASURED_GRIPPER
-    return READ_NEW
+        out.measured |= layout.MEASURED_GRIPPER
+    return c_functions.READ_NEW
 
 
 @kernel
@@ -261,7 +250,7 @@ def _send_force(device: Any, context: int, force_n: Any) -> int:
     device.sent_n[0], device.sent_n[1], device.sent_n[2] = x_n, y_n, z_n
     if got == MOTOR_SATURATED:
         device.saturated += 1
-        return WRITE_SATURATED
+        return c_functions.WRITE_SATURATED
     return 0
 
 
@@ -278,4 +267,4 @@ def _end(device: Any, context: int, why: int) -> int:
     """End the exchange with zero force."""
     finish(device, context)
     device.ended = why
-    return READ_LOST
+    return c_functions.READ_LOST

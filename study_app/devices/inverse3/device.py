@@ -9,19 +9,9 @@ import numpy as np
 
 from study_app.devices.descriptor import OpenRequest
 from study_app.devices.driver import RELEASED, AtClose, FramedDevice, dynamics_of
-from study_app.devices.inverse3 import exchange
+from study_app.devices.inverse3 import exchange, service
 from study_app.devices.inverse3.exchange import COUNTERS, exchange_functions, finish, new_exchange
 from study_app.devices.inverse3.opening import Messages, open_session
-from study_app.devices.inverse3.service import (
-    FAILURES,
-    HOST,
-    PORT,
-    PORTS,
-    Link,
-    SocketLink,
-    check_force_scale,
-    force_scale,
-)
 from study_app.devices.inverse3.wire import text_hash
 from study_app.errors import DeviceError
 
@@ -43,7 +33,7 @@ class Inverse3Device(FramedDevice):
     """
 
     name = "inverse3"
-    failures, counted, silent, running = FAILURES, COUNTERS, "no-reply", "no-reply"
+    failures, counted, silent, running = service.FAILURES, COUNTERS, "no-reply", "no-reply"
     causes: ClassVar[Mapping[int, str]] = {
         exchange.CLOSED: "closed",
         exchange.BROKE_PROTOCOL: "protocol",
@@ -78,15 +68,15 @@ class Inverse3Device(FramedDevice):
     def of(cls, request: OpenRequest) -> Self:
         return cls(request.argument, progress=request.progress, **request.limits)
 
-    def _connect(self) -> Link:
-        return SocketLink(self._host, self._port)
+    def _connect(self) -> service.Link:
+        return service.SocketLink(self._host, self._port)
 
-    def _prepare(self, connection: Link) -> dict[str, Any]:
+    def _prepare(self, connection: service.Link) -> dict[str, Any]:
         """Choose the device and neutralise the service's settings; the force is zero meanwhile."""
         messages = Messages(connection)
         messages.upgrade(f"{self._host}:{self._port}")
         session = open_session(messages, connection, self._wanted_id)
-        found = session.described | {"force_scale": check_force_scale(self._force_scale())}
+        found = session.described | {"force_scale": service.check_force_scale(self._force_scale())}
         self._dynamics = dynamics_of(session.round_trip_s, None, None, name=self.name, serial=session.device_id)
         self.memory[:] = new_exchange(session.device_id, self.force_limit_n, secrets.randbits(64))
         self.exchange.scan.own_id = text_hash(session.device_id.encode())
@@ -98,7 +88,7 @@ class Inverse3Device(FramedDevice):
             self._progress("The service did not confirm its settings: compare them in Haply Hub.")
         return found
 
-    def _finish(self, connection: Link) -> AtClose:
+    def _finish(self, connection: service.Link) -> AtClose:
         """Send zero force and a close frame."""
         if self.exchange.ended == RELEASED:
             finish(self.exchange, self.context)
@@ -118,14 +108,14 @@ class Inverse3Device(FramedDevice):
         )
 
     def _force_scale(self) -> Any:
-        return force_scale(self._host, (self._port, *PORTS))
+        return service.force_scale(self._host, (self._port, *service.PORTS))
 
 
 def address(where: str) -> tuple[str, int, str]:
     """Return host, port and device id of what follows the device's name: "", "ID", "HOST:PORT" or "HOST:PORT:ID"."""
     parts = where.split(":")
     if len(parts) == 1:
-        return HOST, PORT, parts[0]
+        return service.HOST, service.PORT, parts[0]
     host, port = parts[:2]
     if len(parts) > 3 or not host or not port.isdecimal() or not 0 < int(port) < 65536:
         raise DeviceError(

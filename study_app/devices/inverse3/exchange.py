@@ -15,47 +15,12 @@ import numpy as np
 from numba import types
 
 from study_app.devices.driver import COMMON, FIRST_CAUSE, RUNS, enter, leave, outlasted
-from study_app.devices.inverse3.wire import (
-    BUTTON,
-    BUTTONS,
-    CALIBRATED,
-    CLOSE,
-    INCOMPLETE,
-    LONGEST_CONTROL,
-    NO_DEVICE,
-    NOT_FINITE,
-    NOT_JSON,
-    PING,
-    PONG,
-    POSITION,
-    POWER,
-    READY,
-    SCAN,
-    TEXT,
-    UNDERSTOOD,
-    VELOCITY,
-    VIOLATION,
-    build_frame,
-    next_key,
-    parse_header,
-    put_fixed,
-    put_text,
-    scan,
-)
-from study_app.haptics.kernels.c_functions import (
-    READ,
-    READ_LOST,
-    READ_NEW,
-    READ_NOTHING_NEW,
-    WRITE,
-    c_function,
-    call_at,
-    record_at,
-)
+from study_app.devices.inverse3 import wire
+from study_app.haptics.kernels import c_functions
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.vector import clear, copy
 from study_app.haptics.kernels.vector import square as square_of
-from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, records
+from study_app.haptics.model.layout import MEASURED_VELOCITY, records
 
 TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
 """``send`` and ``recv`` of a socket: (handle, address, bytes, flags) -> how many, 0: closed, below 0: none now."""
@@ -86,7 +51,7 @@ INVERSE3 = np.dtype(
         ("inbox", np.uint8, (INBOX,)),
         ("filled", np.int64),
         ("header", np.int64, (2,)),
-        ("scan", SCAN),
+        ("scan", wire.SCAN),
         # what goes
         ("prefix", np.uint8, (_TEXT,)),  # the command up to its first number
         ("prefix_size", np.int64),
@@ -113,15 +78,13 @@ INVERSE3 = np.dtype(
 
 COUNTERS: Final = ("ticks", "fresh", "missing", "late", "skipped", "unasked", "sent", "answered")
 
-_device_at = record_at(INVERSE3)
-_reading_at = record_at(READING)
-_command_at = record_at(COMMAND)
-_call = call_at(TRANSFER)
+_device_at = c_functions.record_at(INVERSE3)
+_call = c_functions.call_at(TRANSFER)
 _fields = INVERSE3.fields
 assert _fields is not None  # noqa: S101 - it is a record
 _INBOX_AT, _OUTBOX_AT = int(_fields["inbox"][1]), int(_fields["outbox"][1])
 
-_VELOCITY_BITS = 0b111 << VELOCITY
+_VELOCITY_BITS = 0b111 << wire.VELOCITY
 _Y, _Z, _END = (np.frombuffer(text, np.uint8) for text in (b',"y":', b',"z":', b"}}}}]}"))
 
 
@@ -140,14 +103,14 @@ def new_exchange(device_id: str, force_limit_n: float, seed: int) -> Any:
 @cache
 def exchange_functions() -> tuple[Any, Any]:
     """Compile read and write, once for all devices."""
-    return c_function(READ, _read), c_function(WRITE, _write)
+    return c_functions.device_functions(_read, _write)
 
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     device = _device_at(context)
-    answer = READ_LOST
+    answer = c_functions.READ_LOST
     if enter(device):
-        answer = _take_replies(device, context, now_ns, _reading_at(reading))
+        answer = _take_replies(device, context, now_ns, c_functions.reading_at(reading))
         if outlasted(device):
             finish(device, context)
         leave(device)
@@ -155,8 +118,8 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    device, asked = _device_at(context), _command_at(command)
-    answer = READ_LOST
+    device, asked = _device_at(context), c_functions.command_at(command)
+    answer = c_functions.READ_LOST
     if enter(device):
         answer = _send_force(device, context, asked.force_n)
         if outlasted(device):
@@ -189,22 +152,22 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
             break  # nothing more is owed
     if device.answered == answered:
         device.missing += 1
-        return READ_NOTHING_NEW
+        return c_functions.READ_NOTHING_NEW
     row = (device.answered - 1) % _LOG
     device.age_ns = now_ns - device.sent_ns[row]
     if device.age_ns > LONGEST_GAP_NS:
         device.late += 1
-        return READ_NOTHING_NEW
+        return c_functions.READ_NOTHING_NEW
     device.fresh += 1
     device.fresh_ns = now_ns
     value = device.scan.value
-    _put_vector(value, POSITION, out.position_m)
+    _put_vector(value, wire.POSITION, out.position_m)
     if device.scan.known & _VELOCITY_BITS == _VELOCITY_BITS:
-        _put_vector(value, VELOCITY, out.velocity_mps)
+        _put_vector(value, wire.VELOCITY, out.velocity_mps)
         out.measured |= MEASURED_VELOCITY
     out.buttons = device.buttons
     out.delay_ticks = device.ticks - device.sent_tick[row]
-    return READ_NEW
+    return c_functions.READ_NEW
 
 
 @kernel
@@ -223,10 +186,10 @@ def _take_frames(device: Any, context: int) -> int:
     """Take every whole frame out of the inbox; return `RUNS` or why the stream ends."""
     begin = 0
     while True:
-        size = parse_header(device.inbox, begin, device.filled, device.header)
-        if size == VIOLATION:
+        size = wire.parse_header(device.inbox, begin, device.filled, device.header)
+        if size == wire.VIOLATION:
             return BROKE_PROTOCOL
-        if size == INCOMPLETE:
+        if size == wire.INCOMPLETE:
             break
         opcode, length = device.header[0], device.header[1]
         if length > INBOX - size:
@@ -235,11 +198,11 @@ def _take_frames(device: Any, context: int) -> int:
         if end > device.filled:
             break
         begin = end
-        if opcode == CLOSE:
+        if opcode == wire.CLOSE:
             return CLOSED
-        if opcode == PING and length <= LONGEST_CONTROL:
+        if opcode == wire.PING and length <= wire.LONGEST_CONTROL:
             _answer_ping(device, context, at, length)
-        if opcode == TEXT:
+        if opcode == wire.TEXT:
             ended = _take_state(device, at, end)
             if ended != RUNS:
                 return ended
@@ -251,26 +214,26 @@ def _take_frames(device: Any, context: int) -> int:
 
 @kernel
 def _take_state(device: Any, begin: int, end: int) -> int:
-    said = scan(device.inbox, begin, end, device.scan)
-    if said != UNDERSTOOD:
-        if said == NOT_JSON:
+    said = wire.scan(device.inbox, begin, end, device.scan)
+    if said != wire.UNDERSTOOD:
+        if said == wire.NOT_JSON:
             return NOT_A_STATE
-        if said == NO_DEVICE:
+        if said == wire.NO_DEVICE:
             return DEVICE_GONE
-        return BAD_NUMBER if said == NOT_FINITE else NO_POSITION
+        return BAD_NUMBER if said == wire.NOT_FINITE else NO_POSITION
     if device.answered < device.sent:
         device.answered += 1
     else:
         device.unasked += 1
-    if _denied(device.scan, READY) or _denied(device.scan, POWER):
+    if _denied(device.scan, wire.READY) or _denied(device.scan, wire.POWER):
         return NOT_READY
-    if _denied(device.scan, CALIBRATED):
+    if _denied(device.scan, wire.CALIBRATED):
         return UNCALIBRATED
     buttons = 0
-    if device.scan.known >> BUTTON & 1 and device.scan.value[BUTTON] != 0.0:
+    if device.scan.known >> wire.BUTTON & 1 and device.scan.value[wire.BUTTON] != 0.0:
         buttons |= 1
     for k in range(3):
-        if device.scan.known >> (BUTTONS + k) & 1 and device.scan.value[BUTTONS + k] != 0.0:
+        if device.scan.known >> (wire.BUTTONS + k) & 1 and device.scan.value[wire.BUTTONS + k] != 0.0:
             buttons |= 1 << k
     device.buttons = buttons
     return RUNS
@@ -306,11 +269,11 @@ def _command(device: Any, context: int, x_n: float, y_n: float, z_n: float) -> N
     at = 0
     for k in range(device.prefix_size):
         text[k] = device.prefix[k]
-    at = put_fixed(text, device.prefix_size, x_n)
-    at = put_fixed(text, put_text(text, at, _Y), -z_n)
-    at = put_fixed(text, put_text(text, at, _Z), y_n)
-    at = put_text(text, at, _END)
-    device.out_size = build_frame(device.outbox, TEXT, text, at, next_key(device.key))
+    at = wire.put_fixed(text, device.prefix_size, x_n)
+    at = wire.put_fixed(text, wire.put_text(text, at, _Y), -z_n)
+    at = wire.put_fixed(text, wire.put_text(text, at, _Z), y_n)
+    at = wire.put_text(text, at, _END)
+    device.out_size = wire.build_frame(device.outbox, wire.TEXT, text, at, wire.next_key(device.key))
     device.out_sent = 0
     row = device.sent % _LOG
     device.sent_ns[row] = device.now_ns
@@ -343,7 +306,7 @@ def _flush(device: Any, context: int) -> bool:
 def _send_control(device: Any, context: int, opcode: int, length: int) -> None:
     """Send a control frame whose payload is in ``text``, if the frame before went out whole."""
     if _flush(device, context):
-        device.out_size = build_frame(device.outbox, opcode, device.text, length, next_key(device.key))
+        device.out_size = wire.build_frame(device.outbox, opcode, device.text, length, wire.next_key(device.key))
         device.out_sent = 0
         _flush(device, context)
 
@@ -353,7 +316,7 @@ def _answer_ping(device: Any, context: int, at: int, length: int) -> None:
     """Send what a ping holds back (RFC 6455 §5.5.3)."""
     for k in range(length):
         device.text[k] = device.inbox[at + k]
-    _send_control(device, context, PONG, length)
+    _send_control(device, context, wire.PONG, length)
 
 
 @kernel
@@ -363,7 +326,7 @@ def _end(device: Any, context: int, why: int) -> int:
         finish(device, context)
     clear(device.sent_n)  # silence ends a force that could not be taken back
     device.ended = why
-    return READ_LOST
+    return c_functions.READ_LOST
 
 
 @kernel
@@ -371,4 +334,4 @@ def finish(device: Any, context: int) -> None:
     """Send zero force and a close frame (RFC 6455 §5.5.1, status 1000)."""
     _command(device, context, 0.0, 0.0, 0.0)
     device.text[0], device.text[1] = np.uint8(1000 >> 8), np.uint8(1000 & 0xFF)
-    _send_control(device, context, CLOSE, 2)
+    _send_control(device, context, wire.CLOSE, 2)

@@ -29,6 +29,7 @@ from numba.extending import intrinsic
 
 from study_app.haptics.kernels.compiled import CACHE  # chosen before the first function is compiled
 from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import COMMAND, READING
 
 READ = types.int32(types.intp, types.int64, types.intp)
 WRITE = types.int32(types.intp, types.intp)
@@ -122,25 +123,24 @@ def stack_memory(words: int) -> Any:
     return intrinsic(allocate)
 
 
-def _order_memory(_typing_context: Any) -> Any:
-    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
-        builder.fence("acq_rel")
-        return context.get_dummy_value()
+def _fence(order: str) -> Any:
+    def order_memory(_typing_context: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+            builder.fence(order)
+            return context.get_dummy_value()
 
-    return types.none(), generate
+        return types.none(), generate
+
+    return intrinsic(order_memory)
 
 
-fence: Any = intrinsic(_order_memory)
+fence = _fence("acq_rel")
 """Release and acquire fence for compiled code: other threads see earlier writes before later ones."""
-
-
-def _order_all_memory(_typing_context: Any) -> Any:
-    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
-        builder.fence("seq_cst")
-        return context.get_dummy_value()
-
-    return types.none(), generate
-
-
-full_fence: Any = intrinsic(_order_all_memory)
+full_fence = _fence("seq_cst")
 """Full fence for compiled code: other threads see earlier writes before any later read is made."""
+reading_at, command_at = record_at(READING), record_at(COMMAND)
+
+
+def device_functions(read: Callable[..., int], write: Callable[..., int]) -> tuple[Any, Any]:
+    """Compile the functions of a device (``READ``, ``WRITE``); call it once for all devices of a kind."""
+    return c_function(READ, read), c_function(WRITE, write)

@@ -10,34 +10,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.kernels.c_functions import (
-    NOW,
-    READ,
-    READ_LOST,
-    READ_NEW,
-    SLEEP,
-    WRITE,
-    WRITE_SATURATED,
-    call_at,
-    fence,
-)
+from study_app.haptics.kernels import c_functions
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.passivity import log_delivery, log_saturation
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.kernels.sample_validation import FAULT_NS
 from study_app.haptics.kernels.tick import tick
+from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import MOST_DELAY
-from study_app.haptics.model.layout import (
-    BUTTON_STOP,
-    MEASURED_GRIPPER,
-    MEASURED_ORIENTATION,
-    MEASURED_TIME,
-    MEASURED_VELOCITY,
-    STATUS_DEVICE_LOST,
-    STATUS_OK,
-)
 
-_read, _write, _now, _sleep = call_at(READ), call_at(WRITE), call_at(NOW), call_at(SLEEP)
+_read, _write, _now, _sleep = (
+    c_functions.call_at(c_functions.READ),
+    c_functions.call_at(c_functions.WRITE),
+    c_functions.call_at(c_functions.NOW),
+    c_functions.call_at(c_functions.SLEEP),
+)
 
 SLOWER_SAMPLES = 3
 """Consecutive samples with a longer delay before the loop adopts it."""
@@ -131,7 +118,7 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
     ring, written = output.ring, output.written
     host = control[0]
     done = 0
-    while host.run != 0 and host.status == STATUS_OK:
+    while host.run != 0 and host.status == layout.STATUS_OK:
         if ticks >= 0 and done >= ticks:
             return done
         began_ns = _sleep(clock.sleep, clock.context, host.deadline_ns)
@@ -140,23 +127,23 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
         sample.time_ns = began_ns
         sample.lateness_ns = began_ns - host.deadline_ns
         _read_device(sample, safety[0], exchanged.reading, device)
-        if sample.buttons & BUTTON_STOP:
+        if sample.buttons & layout.BUTTON_STOP:
             host.stop = 1
         _take_scene(host, slots, safety[0], sample)
         host.worst_gap_ns = max(host.worst_gap_ns, began_ns - host.began_ns)
         host.began_ns = began_ns
-        if sample.status == STATUS_OK:
+        if sample.status == layout.STATUS_OK:
             safety[0].stop = 1 if host.hung != 0 else host.stop  # recorded in the sample, so that a replay repeats it
             if host.taken % 2 == 0:
                 tick(first, safety[0], sample)
             else:
                 tick(second, safety[0], sample)
-        if _send(sample, safety[0], exchanged.command, device, clock, began_ns) == READ_LOST:
-            sample.status = STATUS_DEVICE_LOST
+        if _send(sample, safety[0], exchanged.command, device, clock, began_ns) == c_functions.READ_LOST:
+            sample.status = layout.STATUS_DEVICE_LOST
         ended_ns = began_ns + sample.busy_ns
         host.hung = 1 if sample.busy_ns >= FAULT_NS else 0
         host.status = sample.status
-        fence()
+        c_functions.fence()
         written[0] += 1
         host.ticks += 1
         done += 1
@@ -171,8 +158,8 @@ def _read_device(sample: Any, safety: Any, reading: Any, device: Any) -> None:
     reading[0].delay_ticks = -1
     reading[0].measured = 0
     answer = _read(device.read, device.context, sample.time_ns, np.intp(reading.ctypes.data))
-    sample.fresh = 1 if answer == READ_NEW else 0
-    sample.status = STATUS_DEVICE_LOST if answer == READ_LOST else STATUS_OK
+    sample.fresh = 1 if answer == c_functions.READ_NEW else 0
+    sample.status = layout.STATUS_DEVICE_LOST if answer == c_functions.READ_LOST else layout.STATUS_OK
     follow_delay(safety, sample, reading[0].delay_ticks)
     sample.buttons = reading[0].buttons
     sample.limiters = 0
@@ -194,11 +181,11 @@ def take_measurements(sample: Any, reading: Any) -> None:
     measured = reading.measured
     sample.measured = measured
     for axis in range(3):
-        sample.device_velocity_mps[axis] = reading.velocity_mps[axis] if measured & MEASURED_VELOCITY else 0.0
+        sample.device_velocity_mps[axis] = reading.velocity_mps[axis] if measured & layout.MEASURED_VELOCITY else 0.0
     for part in range(4):
-        sample.orientation[part] = reading.orientation[part] if measured & MEASURED_ORIENTATION else 0.0
-    sample.gripper_m = reading.gripper_m if measured & MEASURED_GRIPPER else 0.0
-    sample.device_time_ns = reading.device_time_ns if measured & MEASURED_TIME else 0
+        sample.orientation[part] = reading.orientation[part] if measured & layout.MEASURED_ORIENTATION else 0.0
+    sample.gripper_m = reading.gripper_m if measured & layout.MEASURED_GRIPPER else 0.0
+    sample.device_time_ns = reading.device_time_ns if measured & layout.MEASURED_TIME else 0
 
 
 @kernel
@@ -235,7 +222,7 @@ def _send(sample: Any, safety: Any, command: Any, device: Any, clock: Any, began
         if row.sent_n[axis] != sample.device_force_n[axis]:
             log_delivery(safety, sample, row.sent_n)
             break
-    if answer == WRITE_SATURATED:
+    if answer == c_functions.WRITE_SATURATED:
         log_saturation(safety, sample)
     return int(answer)
 
@@ -246,11 +233,11 @@ def _take_scene(host: Any, slots: Any, safety: Any, sample: Any) -> None:
     request, numbers = host.request, host.numbers
     if request != host.taken:
         host.worst_gap_ns = 0  # before the host sees the new ``taken``
-        fence()
+        c_functions.fence()
         host.taken = request
         begin_scene(safety)
     if numbers != host.numbers_taken:
-        fence()
+        c_functions.fence()
         first, second = slots
         if host.taken % 2 == 0:
             _copy_constants(host, first, second, 0)
@@ -284,7 +271,7 @@ def offer_scene(control: Any, slot: int, serial: int) -> None:
     """Request the scene in ``slot``, already packed, for the next tick; discard constants not yet taken."""
     control[0].numbers = control[0].numbers_taken
     control[0].serial[slot] = serial
-    fence()
+    c_functions.fence()
     control[0].request += 1
 
 
@@ -292,7 +279,7 @@ def offer_scene(control: Any, slot: int, serial: int) -> None:
 def offer_numbers(control: Any, slot: int, serial: int) -> None:
     """Request the constants in ``slot``, the spare one, for the active scene from the next tick on."""
     control[0].serial[slot] = serial
-    fence()
+    c_functions.fence()
     control[0].numbers += 1
 
 

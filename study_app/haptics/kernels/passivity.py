@@ -64,18 +64,8 @@ from typing import Any
 from study_app.haptics.kernels.compiled import kernel, part
 from study_app.haptics.kernels.sample_validation import is_gap
 from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm, square, square_distance
+from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import MOST_DELAY
-from study_app.haptics.model.layout import (
-    DEBT_FORGIVEN,
-    DEBT_NONE,
-    DEBT_OWN,
-    DEBT_PUSHED,
-    GROWS_AS_SPEED,
-    GROWS_LESS,
-    LIMITER_ENERGY,
-    LIMITER_SATURATED,
-    Record,
-)
 
 CORNER_RADPS = 2.0 * math.pi * 20.0
 INCREMENTAL_ALLOWANCE_J = 2e-3
@@ -83,7 +73,7 @@ INCREMENTAL_FORGIVEN_W = 5e-3
 
 
 @part
-def begin_incremental(fast: Record) -> None:
+def begin_incremental(fast: layout.Record) -> None:
     """Reset the balance to 0, at rest and without force."""
     for axis in range(3):
         fast.force_n[axis] = fast.force_once_n[axis] = fast.force_twice_n[axis] = 0.0
@@ -94,7 +84,7 @@ def begin_incremental(fast: Record) -> None:
 
 
 @part
-def observe_incremental(fast: Record, axis: int, force_n: float, velocity_mps: float, interval_s: float) -> None:
+def observe_incremental(fast: layout.Record, axis: int, force_n: float, velocity_mps: float, interval_s: float) -> None:
     """Add the work along one axis, from the mean force and velocity since the last sample."""
     x = CORNER_RADPS * interval_s
     kept = 1.0 / (1.0 + x * (1.0 + 0.5 * x))
@@ -112,13 +102,13 @@ def observe_incremental(fast: Record, axis: int, force_n: float, velocity_mps: f
 
 
 @part
-def close_incremental(fast: Record, interval_s: float) -> None:
+def close_incremental(fast: layout.Record, interval_s: float) -> None:
     """Forgive a part of the debt; the balance is at most 0."""
     fast.balance_j = min(fast.balance_j + INCREMENTAL_FORGIVEN_W * interval_s, 0.0)
 
 
 @part
-def filter_storage(model: Any, passivity: Record) -> float:
+def filter_storage(model: Any, passivity: layout.Record) -> float:
     """Return the energy [J at the hand] that the velocity estimator stores because it lags behind.
 
     With v̂' = (v − v̂)/τ a damper F(v̂) takes ∫F v dt = ∫F v̂ dt + τ∫F dv̂ from the hand: the second term is a storage,
@@ -140,9 +130,9 @@ def filter_storage(model: Any, passivity: Record) -> float:
     if power_w <= 0.0:
         return 0.0
     share = 1.0 - 2.0 / 3.0 * math.sqrt(passivity.norm_share)
-    if state.growth == GROWS_AS_SPEED:
+    if state.growth == layout.GROWS_AS_SPEED:
         share = max(share, 1.0 - 0.5 * passivity.norm_share)
-    elif state.growth == GROWS_LESS:
+    elif state.growth == layout.GROWS_LESS:
         share = 1.0
     return float(passivity.gain * share * lag_s * power_w / parameters.scale)
 
@@ -167,7 +157,7 @@ DELIVERY_STEPS_PER_N = 2.0**14
 
 
 @kernel
-def reset_observer(passivity: Record) -> None:
+def reset_observer(passivity: layout.Record) -> None:
     """Reset to 0, with no force sent: earlier forces belong to another liquid."""
     passivity.balance_j = 0.0
     passivity.late_balance_j = 0.0
@@ -189,7 +179,7 @@ def reset_observer(passivity: Record) -> None:
     clear(passivity.slow_mps)
     passivity.fast_s = passivity.quiet_s = 0.0
     passivity.gap_s = math.inf
-    passivity.debt = DEBT_NONE
+    passivity.debt = layout.DEBT_NONE
     passivity.longest_m = 0.0
     passivity.strongest_n = 0.0
     passivity.gain = 1.0
@@ -200,7 +190,7 @@ def reset_observer(passivity: Record) -> None:
 
 
 @part
-def update_observer(model: Any, safety: Record, interval_s: float) -> None:
+def update_observer(model: Any, safety: layout.Record, interval_s: float) -> None:
     """Add the work of the last step to the balances; ``interval_s`` is 0 without a new sample.
 
     Several forces sent between two samples count by their mean over time.
@@ -266,7 +256,7 @@ def update_observer(model: Any, safety: Record, interval_s: float) -> None:
 
 
 @part
-def _watch_motion(parameters: Record, passivity: Record, interval_s: float) -> None:
+def _watch_motion(parameters: layout.Record, passivity: layout.Record, interval_s: float) -> None:
     """Measure for how long the hand moved fast of late, for how long it is quiet, and since when no sample was missing.
 
     Its velocity counts without what is slow: a filter of 10 Hz separates shaking from stirring. It is fast if the
@@ -286,14 +276,16 @@ def _watch_motion(parameters: Record, passivity: Record, interval_s: float) -> N
 
 
 @part
-def _row_before(passivity: Record, ticks: int) -> int:
+def _row_before(passivity: layout.Record, ticks: int) -> int:
     """Return the row of the force that was sent ``ticks`` before the last one."""
     row: int = passivity.row - ticks
     return row if row >= 0 else row + MOST_DELAY + 2
 
 
 @part
-def _least_favourable(passivity: Record, state: Record, row: int, interval_s: float) -> tuple[float, float, float]:
+def _least_favourable(
+    passivity: layout.Record, state: layout.Record, row: int, interval_s: float
+) -> tuple[float, float, float]:
     """Return the force of a row [N]; of saturated motors the one, from 0 on, that absorbs least in the newest step.
 
     Without a new sample, ``interval_s`` 0, the last velocity stands for the step.
@@ -310,7 +302,7 @@ def _least_favourable(passivity: Record, state: Record, row: int, interval_s: fl
 
 
 @part
-def _left_j(passivity: Record) -> float:
+def _left_j(passivity: layout.Record) -> float:
     """Return the distance of the lowest balance from the allowed debt [J]; below 0 it is a debt."""
     return float(ALLOWANCE_J + min(passivity.balance_j, passivity.late_balance_j, passivity.later_balance_j))
 
@@ -321,11 +313,11 @@ def _forgive(balance_j: float, forgiven_j: float) -> float:
 
 
 @part
-def reduce_gain(parameters: Record, passivity: Record, sample: Record) -> None:
+def reduce_gain(parameters: layout.Record, passivity: layout.Record, sample: layout.Record) -> None:
     """Multiply the force by a gain, which a debt reduces at once and which recovers within seconds."""
     left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
     left_j = _judge_debt(parameters, passivity, left_j)
-    if passivity.debt == DEBT_FORGIVEN:
+    if passivity.debt == layout.DEBT_FORGIVEN:
         passivity.gain = min(passivity.gain + parameters.period_s / REGAINED_S, 1.0)
     elif parameters.link.acts == 0:
         passivity.gain = min(passivity.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
@@ -334,23 +326,23 @@ def reduce_gain(parameters: Record, passivity: Record, sample: Record) -> None:
     if left_j < 0.0:
         passivity.gain = min(passivity.gain, HALVING_J / (HALVING_J - left_j))
     if passivity.gain < 1.0:
-        sample.limiters |= LIMITER_ENERGY
+        sample.limiters |= layout.LIMITER_ENERGY
         for axis in range(3):
             lift_n = passivity.lift_n[axis]
             sample.device_force_n[axis] = lift_n + (sample.device_force_n[axis] - lift_n) * passivity.gain
 
 
 @part
-def _judge_debt(parameters: Record, passivity: Record, left_j: float) -> float:
+def _judge_debt(parameters: layout.Record, passivity: layout.Record, left_j: float) -> float:
     """Say why a debt began, and forgive one that a push caused once the hand is quiet; return the energy left [J]."""
-    if left_j < 0.0 and passivity.debt in (DEBT_NONE, DEBT_FORGIVEN):
+    if left_j < 0.0 and passivity.debt in (layout.DEBT_NONE, layout.DEBT_FORGIVEN):
         pushed = passivity.fast_s > LEAST_PUSH_S and passivity.gap_s > PUSHED_S
-        passivity.debt = DEBT_PUSHED if pushed else DEBT_OWN
+        passivity.debt = layout.DEBT_PUSHED if pushed else layout.DEBT_OWN
     elif left_j >= 0.0 and passivity.gain >= 1.0:
-        passivity.debt = DEBT_NONE
+        passivity.debt = layout.DEBT_NONE
     quiet = passivity.quiet_s >= parameters.rules.quiet_s and parameters.link.acts == 0
-    if passivity.debt == DEBT_PUSHED and quiet:
-        passivity.debt = DEBT_FORGIVEN
+    if passivity.debt == layout.DEBT_PUSHED and quiet:
+        passivity.debt = layout.DEBT_FORGIVEN
         passivity.balance_j = max(passivity.balance_j, 0.0)
         passivity.late_balance_j = max(passivity.late_balance_j, 0.0)
         passivity.later_balance_j = max(passivity.later_balance_j, 0.0)
@@ -360,7 +352,7 @@ def _judge_debt(parameters: Record, passivity: Record, left_j: float) -> float:
 
 
 @part
-def apply_controller(parameters: Record, safety: Record, sample: Record) -> None:
+def apply_controller(parameters: layout.Record, safety: layout.Record, sample: layout.Record) -> None:
     """Change the force to be sent so that a debt is repaid, and cannot grow by more than one step's work."""
     passivity = safety.passivity
     left_j = _left_j(passivity)
@@ -370,12 +362,12 @@ def apply_controller(parameters: Record, safety: Record, sample: Record) -> None
     )
     changed = given or kept
     if changed or passivity.settling:  # also the tick after, in which the force returns
-        sample.limiters |= LIMITER_ENERGY
+        sample.limiters |= layout.LIMITER_ENERGY
     passivity.settling = changed
 
 
 @part
-def _limit_norm(most_n: float, passivity: Record, force_n: Any) -> bool:
+def _limit_norm(most_n: float, passivity: layout.Record, force_n: Any) -> bool:
     """Shorten the force, without buoyancy, to ``most_n``; return whether it was longer."""
     lift_n = passivity.lift_n
     size_n = distance(force_n, lift_n)
@@ -387,7 +379,7 @@ def _limit_norm(most_n: float, passivity: Record, force_n: Any) -> bool:
 
 
 @part
-def _limit_power(parameters: Record, safety: Record, left_j: float, force_n: Any) -> bool:
+def _limit_power(parameters: layout.Record, safety: layout.Record, left_j: float, force_n: Any) -> bool:
     """Reduce the force along the motion to the power that the energy left allows; in debt, add damping.
 
     Return whether the force was changed.
@@ -419,7 +411,7 @@ def _limit_power(parameters: Record, safety: Record, left_j: float, force_n: Any
 
 
 @part
-def log_command(passivity: Record, force_n: Any) -> None:
+def log_command(passivity: layout.Record, force_n: Any) -> None:
     """Log the commanded force as the one that the device sends."""
     stored_j = passivity.stored_j[passivity.row]
     passivity.row = passivity.row + 1 if passivity.row <= MOST_DELAY else 0
@@ -429,7 +421,7 @@ def log_command(passivity: Record, force_n: Any) -> None:
 
 
 @kernel
-def log_delivery(safety: Record, sample: Record, sent_n: Any) -> None:
+def log_delivery(safety: layout.Record, sample: layout.Record, sent_n: Any) -> None:
     """Log the force that the device sent instead of the last command: ``sent_n`` (3,) [N on the hand].
 
     Both are rounded to the resolution of a recording, so that the tick can be recomputed from it. If they are equal
@@ -450,14 +442,14 @@ def log_delivery(safety: Record, sample: Record, sent_n: Any) -> None:
 
 
 @kernel
-def log_saturation(safety: Record, sample: Record) -> None:
+def log_saturation(safety: layout.Record, sample: layout.Record) -> None:
     """Log that the device's motors may have given only a part of the last force."""
-    sample.limiters |= LIMITER_SATURATED
+    sample.limiters |= layout.LIMITER_SATURATED
     copy(sample.device_force_n, safety.passivity.saturated_n[safety.passivity.row])
 
 
 @part
-def _log(passivity: Record, force_n: Any) -> None:
+def _log(passivity: layout.Record, force_n: Any) -> None:
     """Store the force of this tick, without buoyancy."""
     sent_n = passivity.sent_n[passivity.row]
     for axis in range(3):
@@ -468,7 +460,7 @@ def _log(passivity: Record, force_n: Any) -> None:
 
 
 @part
-def log_acted(passivity: Record, force_n: Any) -> None:
+def log_acted(passivity: layout.Record, force_n: Any) -> None:
     """Log the force that acted on the hand in this tick, if the observer counted another one."""
     acted_n = passivity.acted_n[passivity.row]
     for axis in range(3):

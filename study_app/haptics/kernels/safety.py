@@ -32,21 +32,8 @@ from study_app.haptics.kernels.passivity import (
     update_observer,
 )
 from study_app.haptics.kernels.vector import clear, copy, distance, dot, is_finite, norm, square, square_distance
+from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
-from study_app.haptics.model.layout import (
-    LIMITER_ENERGY,
-    LIMITER_FADE,
-    LIMITER_NON_FINITE,
-    LIMITER_NORM,
-    LIMITER_SLEW,
-    LIMITER_SLOPE,
-    LIMITER_STALE,
-    LIMITER_STOP,
-    SAFETY,
-    STATUS_NON_FINITE,
-    Record,
-    records,
-)
 
 _MASK = 0xFFFFFFFF
 _FACTOR = 0x45D9F3B
@@ -54,7 +41,7 @@ _PER_STEP = 2.0**-32
 
 
 @kernel
-def delay_force(link: Record, state: Record, forces_n: Any, force_n: Any) -> bool:
+def delay_force(link: layout.Record, state: layout.Record, forces_n: Any, force_n: Any) -> bool:
     """Replace ``force_n`` (3,) [N] by the force that arrives in this tick; return whether one has arrived so far.
 
     The force of tick n is due at n + delay + jitter; a force older than the last one sent is skipped. If a force is
@@ -99,7 +86,7 @@ def new_safety(device_limit_n: float = math.inf, delay_ticks: int = ASSUMED_TICK
 
     ``delay_ticks`` is the assumed delay of a force, in writes.
     """
-    safety = records(SAFETY, 1)
+    safety = layout.records(layout.SAFETY, 1)
     safety[0].fade_s = START_FADE_S
     reset_observer(safety[0].passivity)
     safety[0].device_limit_n = device_limit_n
@@ -108,7 +95,7 @@ def new_safety(device_limit_n: float = math.inf, delay_ticks: int = ASSUMED_TICK
 
 
 @kernel
-def begin_scene(safety: Record) -> None:
+def begin_scene(safety: layout.Record) -> None:
     """Fade in the force of another scene with its energy at 0; restart a start fade that has not ended.
 
     Damping sent for the last scene is removed in the next tick, which reports it.
@@ -120,7 +107,7 @@ def begin_scene(safety: Record) -> None:
 
 
 @part
-def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None:
+def guard(model: Any, safety: layout.Record, sample: layout.Record, interval_s: float) -> None:
     """Convert the force of the effects into the force to be sent, ``sample.device_force_n``.
 
     ``interval_s`` is the time since the last accepted sample, 0 if this tick has none.
@@ -138,8 +125,8 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
         clear(lift_n)
         safety.fade = 0.0  # the first force that arrives fades in
     if not (is_finite(force_n) and is_finite(lift_n)):
-        sample.limiters |= LIMITER_NON_FINITE
-        sample.status = STATUS_NON_FINITE
+        sample.limiters |= layout.LIMITER_NON_FINITE
+        sample.status = layout.STATUS_NON_FINITE
         clear(force_n)
         clear(lift_n)
     limit_n = min(parameters.force_limit_n, safety.device_limit_n)
@@ -167,7 +154,7 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
 
 
 @part
-def limit_slope(model: Any, safety: Record, sample: Record) -> None:
+def limit_slope(model: Any, safety: layout.Record, sample: layout.Record) -> None:
     """Shorten each liquid's damping to F·min(1, B|w|/|F|): the secant of the maximum stable damping.
 
     Delayed drag is limited by the rest of B at its own, greater speed: in fast strokes it follows so soon that released
@@ -182,42 +169,42 @@ def limit_slope(model: Any, safety: Record, sample: Record) -> None:
         local = model.liquid_states[i]
         if local.share > 0.0:
             if square(local.excess_n) > 0.0:
-                sample.limiters |= LIMITER_SLOPE
+                sample.limiters |= layout.LIMITER_SLOPE
                 for axis in range(3):
                     sample.device_force_n[axis] -= local.excess_n[axis]
             most_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * local.share / shares
             if square(local.damping_n) > most_nspm * most_nspm * square(local.relative_mps):
-                sample.limiters |= LIMITER_SLOPE
+                sample.limiters |= layout.LIMITER_SLOPE
                 excess = 1.0 - most_nspm * norm(local.relative_mps) / norm(local.damping_n)
                 for axis in range(3):
                     sample.device_force_n[axis] -= excess * local.damping_n[axis]
             if local.late_mps > 0.0:
                 most_n = max(most_nspm - local.prompt_nspm, 0.0) * local.late_mps
                 if square(local.late_n) > most_n * most_n:
-                    sample.limiters |= LIMITER_SLOPE
+                    sample.limiters |= layout.LIMITER_SLOPE
                     excess = 1.0 - most_n / norm(local.late_n)
                     for axis in range(3):
                         sample.device_force_n[axis] -= excess * local.late_n[axis]
 
 
 @part
-def limit_inertia(model: Any, safety: Record, sample: Record) -> None:
+def limit_inertia(model: Any, safety: layout.Record, sample: layout.Record) -> None:
     """Reduce inertial forces to their stable share (`pack`): they also damp fast motion."""
     for i in range(model.parameters[0].liquids):
         local = model.liquid_states[i]
         excess = 1.0 - model.liquids[i].inertia_share[safety.delay_ticks]
         if excess > 0.0 and local.share > 0.0:
-            sample.limiters |= LIMITER_SLOPE
+            sample.limiters |= layout.LIMITER_SLOPE
             for k in range(local.inertial):
                 for axis in range(3):
                     sample.device_force_n[axis] -= excess * local.inertia_n[k, axis]
 
 
 @part
-def _limit_norm(force_n: Any, lift_n: Any, limit_n: float, sample: Record) -> None:
+def _limit_norm(force_n: Any, lift_n: Any, limit_n: float, sample: layout.Record) -> None:
     """Shorten the force to the limit, keeping its direction."""
     if square(force_n) > limit_n * limit_n:
-        sample.limiters |= LIMITER_NORM
+        sample.limiters |= layout.LIMITER_NORM
         _scale(force_n, lift_n, limit_n / norm(force_n))
 
 
@@ -229,13 +216,13 @@ def _scale(force_n: Any, lift_n: Any, factor: float) -> None:
 
 
 @part
-def _fade(force_n: Any, lift_n: Any, parameters: Record, safety: Record, sample: Record) -> None:
+def _fade(force_n: Any, lift_n: Any, parameters: layout.Record, safety: layout.Record, sample: layout.Record) -> None:
     """Scale the force while it fades in or out (no usable sample, or a late tick).
 
     The scene sets the fade-in time; after a start it is at least 500 ms.
     """
     if safety.withheld or safety.late_s > 0.0:
-        sample.limiters |= safety.withheld if safety.withheld else LIMITER_STALE
+        sample.limiters |= safety.withheld if safety.withheld else layout.LIMITER_STALE
         lasted_s = max(safety.late_s, safety.tick_s if safety.withheld else 0.0)
         safety.fade = max(safety.fade - lasted_s / parameters.rules.fade_out_s, 0.0)
         if safety.late_s >= LATE_S:
@@ -243,14 +230,16 @@ def _fade(force_n: Any, lift_n: Any, parameters: Record, safety: Record, sample:
     else:
         safety.fade = min(safety.fade + safety.tick_s / max(safety.fade_s, parameters.fade_s), 1.0)
     if safety.fade < 1.0:
-        sample.limiters |= LIMITER_FADE
+        sample.limiters |= layout.LIMITER_FADE
         _scale(force_n, lift_n, safety.fade)
     else:
         safety.fade_s = 0.0
 
 
 @part
-def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record, sample: Record) -> None:
+def _limit_slew(
+    force_n: Any, parameters: layout.Record, state: layout.Record, safety: layout.Record, sample: layout.Record
+) -> None:
     """Limit the change of the force from tick to tick (`slope_limits.slew_limit_n`), without pushing the hand on.
 
     After an energy debt the limit is reduced by the controller's gain; it is least during a fade in. A force that falls
@@ -262,7 +251,7 @@ def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record,
     most_n = parameters.slew_n * of_limit
     if square_distance(force_n, safety.slewed_n) <= most_n * most_n:
         return
-    sample.limiters |= LIMITER_SLEW
+    sample.limiters |= layout.LIMITER_SLEW
     passivity = safety.passivity
     v_mps, lift_n, before_n = state.estimate_mps, passivity.lift_n, passivity.lift_before_n
     wanted_nmps = dot(force_n, v_mps)
@@ -276,11 +265,11 @@ def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record,
         for axis in range(3):
             force_n[axis] -= excess_nmps * v_mps[axis] / square_mps2
         if square_distance(force_n, safety.slewed_n) > most_n * most_n:
-            sample.limiters |= LIMITER_ENERGY
+            sample.limiters |= layout.LIMITER_ENERGY
 
 
 @part
-def _log_request(parameters: Record, state: Record, safety: Record, limit_n: float) -> None:
+def _log_request(parameters: layout.Record, state: layout.Record, safety: layout.Record, limit_n: float) -> None:
     """Set the force of the effects within norm and fade, from which the share withheld counts.
 
     A force link sends the force of earlier ticks: there the force after its limits counts.
@@ -293,10 +282,10 @@ def _log_request(parameters: Record, state: Record, safety: Record, limit_n: flo
 
 
 @part
-def _zero_force(force_n: Any, safety: Record, sample: Record) -> None:
+def _zero_force(force_n: Any, safety: layout.Record, sample: layout.Record) -> None:
     """Set zero force now; afterwards the force fades in as at the start."""
     if safety.stop != 0:
-        sample.limiters |= LIMITER_STOP
+        sample.limiters |= layout.LIMITER_STOP
     if safety.fault != 0:
         sample.status = safety.fault
     safety.fade = 0.0

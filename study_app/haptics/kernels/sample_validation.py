@@ -7,15 +7,8 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import copy, norm, square, square_distance
+from study_app.haptics.model import layout
 from study_app.haptics.model.estimators import DEVICE
-from study_app.haptics.model.layout import (
-    LIMITER_GLITCH,
-    LIMITER_STALE,
-    MEASURED_VELOCITY,
-    STATUS_OK,
-    STATUS_STALE_FAULT,
-    Record,
-)
 
 SHORTEST_S = 0.2e-3
 LONGEST_S = 20e-3
@@ -35,7 +28,9 @@ def clamp(interval_s: float) -> float:
 
 
 @part
-def accept_sample(parameters: Record, state: Record, safety: Record, sample: Record) -> float:
+def accept_sample(
+    parameters: layout.Record, state: layout.Record, safety: layout.Record, sample: layout.Record
+) -> float:
     """Take the sample's position into the scene and return Δt [s], or 0 if no sample is accepted.
 
     Δt is the time since the last accepted sample, so that the next one covers any gap; the first takes the nominal
@@ -48,17 +43,17 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
     """
     if sample.fresh == 0:
         if state.rejected > 0:
-            sample.limiters |= LIMITER_GLITCH
+            sample.limiters |= layout.LIMITER_GLITCH
         return 0.0
     interval_s: float = parameters.period_s
     if state.tracking:
         interval_s = clamp((sample.time_ns - state.accepted_ns) * 1e-9)
     if not _plausible(parameters, state, safety, sample, interval_s):
-        sample.limiters |= LIMITER_GLITCH
+        sample.limiters |= layout.LIMITER_GLITCH
         state.rejected += 1
         if state.rejected == REFUSALS_IN_A_ROW:
             state.tracking = 0
-            safety.withheld |= LIMITER_GLITCH
+            safety.withheld |= layout.LIMITER_GLITCH
         return 0.0
     hand_m = sample.position_m
     if is_gap(parameters, interval_s) and not _within_reach(parameters, state, 0.0, 0.0, hand_m, interval_s):
@@ -77,7 +72,7 @@ def accept_sample(parameters: Record, state: Record, safety: Record, sample: Rec
 
 
 @part
-def place(state: Record, x_m: float, y_m: float, z_m: float) -> None:
+def place(state: layout.Record, x_m: float, y_m: float, z_m: float) -> None:
     """Move the body to a place of the scene; without tracking, the previous place is the same."""
     copy(state.position_m, state.previous_m)
     state.position_m[0] = x_m
@@ -88,13 +83,15 @@ def place(state: Record, x_m: float, y_m: float, z_m: float) -> None:
 
 
 @part
-def _in_scene(parameters: Record, hand_m: Any) -> tuple[float, float, float]:
+def _in_scene(parameters: layout.Record, hand_m: Any) -> tuple[float, float, float]:
     scale, origin_m = parameters.scale, parameters.origin_m
     return scale * hand_m[0] + origin_m[0], scale * hand_m[1] + origin_m[1], scale * hand_m[2] + origin_m[2]
 
 
 @part
-def _plausible(parameters: Record, state: Record, safety: Record, sample: Record, interval_s: float) -> bool:
+def _plausible(
+    parameters: layout.Record, state: layout.Record, safety: layout.Record, sample: layout.Record, interval_s: float
+) -> bool:
     """Return whether the position is plausible for a hand, and within reach of the last accepted one."""
     hand_m = sample.position_m
     for axis in range(3):
@@ -117,13 +114,13 @@ def _plausible(parameters: Record, state: Record, safety: Record, sample: Record
 
 
 @part
-def is_gap(parameters: Record, interval_s: float) -> bool:
+def is_gap(parameters: layout.Record, interval_s: float) -> bool:
     """Return whether so much time between two samples is a gap."""
     return bool(interval_s > parameters.rules.gap_ticks * parameters.period_s)
 
 
 @part
-def _note_step(state: Record, hand_m: Any, interval_s: float) -> None:
+def _note_step(state: layout.Record, hand_m: Any, interval_s: float) -> None:
     """Store the velocity of the step to an accepted position; none is known of the first one.
 
     A repeated position does not change the speeds: the device may have repeated a sample.
@@ -144,7 +141,7 @@ def _note_step(state: Record, hand_m: Any, interval_s: float) -> None:
 
 @part
 def _within_reach(
-    parameters: Record, state: Record, force_n: float, late_m: float, hand_m: Any, interval_s: float
+    parameters: layout.Record, state: layout.Record, force_n: float, late_m: float, hand_m: Any, interval_s: float
 ) -> bool:
     """Return whether hand and force can have accelerated the handle to a position from its last step.
 
@@ -177,16 +174,16 @@ def can_have_moved(from_m: Any, to_m: Any, interval_s: float) -> bool:
 
 
 @part
-def _has_velocity(sample: Record) -> bool:
+def _has_velocity(sample: layout.Record) -> bool:
     """Return whether the device measured a velocity that is plausible for a hand."""
     for axis in range(3):
         if not abs(sample.device_velocity_mps[axis]) <= FASTEST_HAND_MPS:  # NaN neither
             return False
-    return bool(sample.measured & MEASURED_VELOCITY)
+    return bool(sample.measured & layout.MEASURED_VELOCITY)
 
 
 @part
-def watchdog(parameters: Record, safety: Record, sample: Record) -> None:
+def watchdog(parameters: layout.Record, safety: layout.Record, sample: layout.Record) -> None:
     """Set the tick's duration, and start a fade after 5 ms without a usable sample; after 50 ms, zero and fault.
 
     A late tick counts alike, even with a new sample, since the device held an old force meanwhile: its fade is where
@@ -204,6 +201,6 @@ def watchdog(parameters: Record, safety: Record, sample: Record) -> None:
     if age_ns == 0:
         safety.withheld = 0
     elif age_ns > STALE_NS:
-        safety.withheld |= LIMITER_STALE
-    if age_ns >= FAULT_NS and safety.fault == STATUS_OK:
-        safety.fault = STATUS_STALE_FAULT
+        safety.withheld |= layout.LIMITER_STALE
+    if age_ns >= FAULT_NS and safety.fault == layout.STATUS_OK:
+        safety.fault = layout.STATUS_STALE_FAULT

@@ -24,18 +24,7 @@ from study_app.haptics.kernels.regions import update_volume_fractions
 from study_app.haptics.kernels.safety import guard
 from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
 from study_app.haptics.kernels.vector import clear, copy, subtract
-from study_app.haptics.model.effects import (
-    added_mass,
-    buoyancy,
-    current,
-    drag,
-    history,
-    local_wake,
-    non_newtonian,
-    surface,
-    unsteady_drag,
-    wake,
-)
+from study_app.haptics.model import effects
 from study_app.haptics.model.layout import GROWS_AS_SQUARE, LIMITER_ESTIMATOR, STATUS_OK, Record
 
 
@@ -81,7 +70,7 @@ def step_model(model: Any, interval_s: float, delay_ticks: int) -> None:
             apply_effects(model, i, interval_s, delay_ticks)
         else:
             model.liquid_states[i].ticks = 0
-    if parameters.effects & buoyancy.BIT:
+    if parameters.effects & effects.buoyancy.BIT:
         buoyancy_force(model)
 
 
@@ -93,35 +82,35 @@ def apply_effects(model: Any, i: int, interval_s: float, delay_ticks: int) -> No
     """
     parameters, state = model.parameters[0], model.state[0]
     liquid, local, rows = model.liquids[i], model.liquid_states[i], model.rows
-    copy(state.estimate_mps if liquid.drag.law == drag.LAW_LINEAR else state.velocity_mps, local.motion_mps)
+    copy(state.estimate_mps if liquid.drag.law == effects.drag.LAW_LINEAR else state.velocity_mps, local.motion_mps)
     clear(local.wake_mps)
     clear(local.damping_n)
     clear(local.excess_n)
     local.late_mps = 0.0
     local.inertial = 0
-    if liquid.effects & current.BIT:
+    if liquid.effects & effects.current.BIT:
         current_velocity(liquid, local, state)
-    if liquid.effects & wake.BIT:
+    if liquid.effects & effects.wake.BIT:
         wake_velocity(parameters, liquid, local, state, rows.segments)
-    if liquid.effects & local_wake.BIT:
+    if liquid.effects & effects.local_wake.BIT:
         local_wake_velocity(parameters, liquid, local, state, rows.cells, interval_s)
     subtract(local.motion_mps, local.wake_mps, local.relative_mps)
     copy(local.wake_mps, state.wake_mps)
-    if liquid.effects & surface.BIT:
+    if liquid.effects & effects.surface.BIT:
         wetted_fraction(local)
-    if liquid.effects & drag.BIT:
+    if liquid.effects & effects.drag.BIT:
         drag_force(liquid, local, state)
-    if liquid.effects & added_mass.BIT:
+    if liquid.effects & effects.added_mass.BIT:
         added_mass_force(parameters, liquid, local, state, delay_ticks, interval_s)
-    if liquid.effects & history.BIT:
+    if liquid.effects & effects.history.BIT:
         basset_force(parameters, liquid, local, state, rows, delay_ticks, interval_s)
-    if liquid.effects & unsteady_drag.BIT:
+    if liquid.effects & effects.unsteady_drag.BIT:
         unsteady_drag_force(parameters, liquid, local, state, delay_ticks, interval_s)
-    if liquid.effects & non_newtonian.BIT:
+    if liquid.effects & effects.non_newtonian.BIT:
         non_newtonian_force(parameters, liquid, local, state, delay_ticks, interval_s)
-    if liquid.effects & wake.BIT:
+    if liquid.effects & effects.wake.BIT:
         update_wake(liquid, local, state, rows.elements, rows.segments, interval_s)
-    if liquid.effects & local_wake.BIT:
+    if liquid.effects & effects.local_wake.BIT:
         deposit_local_wake(liquid, local, state, rows.cells, interval_s)
     local.ticks += 1
 

@@ -23,12 +23,7 @@ from typing import Any
 from study_app.haptics.kernels.compiled import part
 from study_app.haptics.kernels.vector import clear, copy, norm, square
 from study_app.haptics.model import laws
-from study_app.haptics.model.effects.non_newtonian import (
-    KIND_CARREAU,
-    KIND_HERSCHEL_BULKLEY,
-    KIND_MAXWELL,
-    VISCOUS_SHARE,
-)
+from study_app.haptics.model.effects import non_newtonian
 from study_app.haptics.model.laws import finite_reynolds
 from study_app.haptics.model.layout import GROWS_AS_SPEED, GROWS_LESS, Record
 
@@ -65,9 +60,9 @@ def non_newtonian_force(
             tracks.step_m[axis] = state.position_m[axis] - state.previous_m[axis] - drift_mps * interval_s
     limit_nspm = parameters.slope_limit_nspm[delay_ticks]
     state.growth = max(state.growth, GROWS_AS_SPEED)
-    if law.kind == KIND_HERSCHEL_BULKLEY:
+    if law.kind == non_newtonian.KIND_HERSCHEL_BULKLEY:
         _yielding(parameters, law, tracks, local, state, limit_nspm)
-    elif law.kind == KIND_MAXWELL:
+    elif law.kind == non_newtonian.KIND_MAXWELL:
         _viscoelastic(law, tracks, local, state, interval_s)
     else:
         _viscous(law, local, state, limit_nspm)
@@ -83,7 +78,9 @@ def _yielding(parameters: Record, law: Any, tracks: Record, local: Record, state
     beyond_n = (_inertial_factor(law, whole_n, speed_mps) - 1.0) * whole_n
     if speed_mps > 0.0:
         resistance_nspm = local.frontal * (viscous_n + beyond_n) / speed_mps
-        stable_nspm = min(resistance_nspm, VISCOUS_SHARE * limit_nspm) if law.yield_n > 0.0 else resistance_nspm
+        stable_nspm = (
+            min(resistance_nspm, non_newtonian.VISCOUS_SHARE * limit_nspm) if law.yield_n > 0.0 else resistance_nspm
+        )
         _add_limited_force(local, state, w, stable_nspm)
         _add_excess_force(local, state, w, resistance_nspm - stable_nspm)
     state.growth = GROWS_LESS
@@ -150,7 +147,7 @@ def _viscous(law: Any, local: Record, state: Record, limit_nspm: float) -> None:
     speed_mps = norm(w)
     if speed_mps == 0.0:
         return
-    if law.kind == KIND_CARREAU:
+    if law.kind == non_newtonian.KIND_CARREAU:
         force_n = _carreau(speed_mps, law.stokes_nspm, law.time_spm, law.exponent)
         state.growth = GROWS_LESS
         _add_limited_force(

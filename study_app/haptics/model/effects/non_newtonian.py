@@ -4,18 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
+from study_app.haptics.model import laws
 from study_app.haptics.model.effect import FLOAT, INT, Effect, ExtremesLike, Fields, LiquidLike, Parameter, SceneLike
-from study_app.haptics.model.laws import (
-    CARREAU_RATE,
-    RESOLVED_S,
-    Carreau,
-    HerschelBulkley,
-    Maxwell,
-    Rheology,
-    even_n,
-    viscous_factors,
-    yield_n,
-)
 
 BIT = 1 << 9
 
@@ -50,7 +40,7 @@ def steady_n(
 ) -> tuple[float, float]:
     """Return the force [N] in uniform motion: that of the yield stress, and the viscous part."""
     diameter_m = scene.body.diameter_m
-    return even_n(liquid.non_newtonian, liquid.density_kg_m3, diameter_m, speed_mps, steepest_nspm)
+    return laws.even_n(liquid.non_newtonian, liquid.density_kg_m3, diameter_m, speed_mps, steepest_nspm)
 
 
 def _bound_n(extremes: ExtremesLike) -> float | None:
@@ -66,7 +56,7 @@ def _exerted_n(extremes: ExtremesLike) -> float | None:
     if rheology is None:
         return None
     even_motion_n = sum(steady_n(extremes.scene, extremes.liquid, extremes.relative_mps))
-    if not isinstance(rheology, Maxwell) or extremes.speed_mps == 0.0:
+    if not isinstance(rheology, laws.Maxwell) or extremes.speed_mps == 0.0:
         return even_motion_n
     return even_motion_n / math.hypot(1.0, rheology.relaxation_time_s * extremes.acceleration_mps2 / extremes.speed_mps)
 
@@ -82,22 +72,22 @@ def _problem(liquid: LiquidLike) -> str | None:
 def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
     rheology, diameter_m = liquid.non_newtonian, scene.body.diameter_m
     record.inertia_kg_m = 3 * math.pi * liquid.density_kg_m3 * diameter_m**2
-    if isinstance(rheology, HerschelBulkley):
+    if isinstance(rheology, laws.HerschelBulkley):
         record.kind = KIND_HERSCHEL_BULKLEY
-        record.viscous, record.plastic = viscous_factors(rheology, diameter_m)
+        record.viscous, record.plastic = laws.viscous_factors(rheology, diameter_m)
         record.exponent = rheology.flow_index / 2
-        record.yield_n = yield_n(rheology, diameter_m)
+        record.yield_n = laws.yield_n(rheology, diameter_m)
         record.stiffness_npm = STIFFNESS_NPM / scene.scale
         record.full_nspm = FULL_NSPM / scene.scale
         return
     record.stokes_nspm = 3 * math.pi * diameter_m * rheology.zero_shear_viscosity_pa_s
-    if isinstance(rheology, Carreau):
+    if isinstance(rheology, laws.Carreau):
         record.kind = KIND_CARREAU
-        record.time_spm = CARREAU_RATE * 2 * rheology.time_constant_s / diameter_m
+        record.time_spm = laws.CARREAU_RATE * 2 * rheology.time_constant_s / diameter_m
         record.exponent = (rheology.flow_index - 1) / 2
-    elif isinstance(rheology, Maxwell):
+    elif isinstance(rheology, laws.Maxwell):
         record.kind = KIND_MAXWELL
-        record.relaxation_s = rheology.relaxation_time_s if rheology.relaxation_time_s >= RESOLVED_S else 0.0
+        record.relaxation_s = rheology.relaxation_time_s if rheology.relaxation_time_s >= laws.RESOLVED_S else 0.0
     else:
         record.kind = KIND_SHEAR_THICKENING
         record.thickened_nspm = 3 * math.pi * diameter_m * rheology.thickened_viscosity_pa_s
@@ -142,7 +132,7 @@ EFFECT = Effect(
     format=2,
     bars=lambda extremes: (_REPLACES, "non-Newtonian drag instead: the liquid has the parameters of a flow curve"),
     note=lambda liquid: f"; {liquid.non_newtonian.kind}, {_NOT_MODELLED}",
-    model=Rheology,
+    model=laws.Rheology,
     missing='kind = "herschel-bulkley", "carreau", "maxwell" or "shear-thickening", ...',
     excludes=_REPLACES,
     replaces=("viscosity_pa_s",),
