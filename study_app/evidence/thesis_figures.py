@@ -23,8 +23,7 @@ from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Given, Liquid, Scene
 from study_app.haptics.runtime.offline import Table, simulate
-from study_app.store.atomic import write_file
-from study_app.store.output_files import make_folder
+from study_app.store.output_files import write_files
 
 RATE_HZ: Final = 1000.0
 LENGTH: Final = 5000
@@ -183,21 +182,18 @@ def figures(to: Path) -> tuple[Path, ...]:
 
     Raises
     ------
-    StoreError
-        The folder or a file cannot be written.
+    AnalysisError
+        The folder cannot be written.
     """
-    make_folder(to)
-    written = []
+    files: dict[str, bytes] = {}
     for make in FIGURES:
         shown = make()
         drawn = draw(shown)
         title = f"Fig. {shown.number}: {shown.title}"
-        files = {kind: style.file_bytes(drawn, kind, title, style.PLOT_SETTINGS) for kind in style.FORMATS}
-        files["txt"] = f"{title}. {shown.caption}\n".encode()
-        for kind, content in files.items():
-            write_file(to / f"{shown.name}.{kind}", content)
-            written.append(to / f"{shown.name}.{kind}")
-    return tuple(written)
+        for kind in style.FORMATS:
+            files[f"{shown.name}.{kind}"] = style.file_bytes(drawn, kind, title, style.PLOT_SETTINGS)
+        files[f"{shown.name}.txt"] = f"{title}. {shown.caption}\n".encode()
+    return write_files(to, files)
 
 
 @style.own_settings(style.PLOT_SETTINGS)

@@ -12,7 +12,7 @@ from study_app.evidence.accuracy import candidates
 from study_app.evidence.cfd.stored_flows import held_out, solver_truths, stored, training
 from study_app.evidence.expected_error import Expected, expected
 from study_app.evidence.reference_solutions import error_of, measured_drag_n
-from study_app.evidence.table import Evidence
+from study_app.evidence.table import Evidence, Table
 from study_app.haptics.model.laws import LAWS, finite_reynolds
 from study_app.haptics.model.scene import Liquid, Scene
 
@@ -121,7 +121,7 @@ def spread(reynolds: float) -> float:
 def evidence(found: tuple[Surveyed, ...]) -> Evidence:
     """Return liquids, and drag laws over the Reynolds number, as Markdown."""
     highest = max(it.case.reynolds for it in (*stored(), *training(), *held_out()))
-    lines = [f"| {' | '.join(_HEADINGS)} |", f"|---|---:|---|{'---:|' * (len(_HEADINGS) - 3)}"]
+    liquids = []
     for it in found:
         least, greatest = it.solver_reynolds
         checked_mps = min(it.speed_mps, highest * it.mps_per_reynolds)
@@ -138,14 +138,17 @@ def evidence(found: tuple[Surveyed, ...]) -> Evidence:
             _percent(it.expected.error_share),
             f"{it.expected.cost_ns:.0f}",
         )
-        lines.append(f"| {' | '.join(cells)} |")
-    lines += ["", _WHAT.format(highest), "", f"| Re | {' | '.join(PUBLISHED)} | unsteady drag | experiments | spread |"]
-    lines.append("|---:" * (len(PUBLISHED) + 4) + "|")
+        liquids.append(cells)
+    laws = []
     for reynolds in REYNOLDS:
         drags = [law(reynolds) for law in (*PUBLISHED.values(), finite_reynolds)]
-        values = " | ".join(f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured(reynolds)))
-        lines.append(f"| {reynolds:,g} | {values} | {_percent(spread(reynolds))} |")
-    text = "\n".join(lines) + "\n"
+        values = [f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured(reynolds))]
+        laws.append((f"{reynolds:,g}", *values, _percent(spread(reynolds))))
+    tables = (
+        Table(_HEADINGS, liquids, left=3),
+        Table(("Re", *PUBLISHED, "unsteady drag", "experiments", "spread"), laws),
+    )
+    text = f"{tables[0].markdown()}\n\n{_WHAT.format(highest)}\n\n{tables[1].markdown()}\n"
     return Evidence(text, {FILE: text})
 
 

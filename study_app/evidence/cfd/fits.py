@@ -16,9 +16,9 @@ from matplotlib.ticker import MaxNLocator
 
 from study_app import figure_style as style
 from study_app.evidence.cfd.solved_cases import RAMP, STOP, Case
-from study_app.evidence.cfd.stored_flows import Table
+from study_app.evidence.cfd.stored_flows import Table as SolvedTable
 from study_app.evidence.reference_solutions import measured_drag_n
-from study_app.evidence.table import Evidence, plot_files
+from study_app.evidence.table import Evidence, Table, plot_files
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.laws import LAWS
@@ -29,7 +29,6 @@ from study_app.haptics.runtime.offline import simulate
 from study_app.lab.identify.fit import fit
 from study_app.lab.identify.measured_force import along_a_line
 from study_app.lab.identify.parameters import find
-from study_app.store.tables.csv_files import csv_text_of
 
 RATE_HZ: Final = 1000.0
 LAW: Final = "brown-lawler"
@@ -90,7 +89,7 @@ class Fitted:
     warnings: tuple[str, ...] = ()
 
 
-def fit_all(tables: Sequence[Table], progress: Callable[[str], None] = lambda _: None) -> tuple[Fitted, ...]:
+def fit_all(tables: Sequence[SolvedTable], progress: Callable[[str], None] = lambda _: None) -> tuple[Fitted, ...]:
     """Return every model fitted to every table, each tried on the others of the same liquid."""
     found = []
     for table in tables:
@@ -102,7 +101,7 @@ def fit_all(tables: Sequence[Table], progress: Callable[[str], None] = lambda _:
     return tuple(found)
 
 
-def fit_one(model: Model, table: Table) -> tuple[dict[str, float], tuple[str, ...]]:
+def fit_one(model: Model, table: SolvedTable) -> tuple[dict[str, float], tuple[str, ...]]:
     """Return the parameters of the best fit of the model to the table, and the warnings of the fit."""
     if not model.free:
         return {}, ()
@@ -113,9 +112,9 @@ def fit_one(model: Model, table: Table) -> tuple[dict[str, float], tuple[str, ..
 
 def judge(
     model: Model,
-    table: Table,
+    table: SolvedTable,
     values: Mapping[str, float],
-    others: Sequence[Table] = (),
+    others: Sequence[SolvedTable] = (),
     warnings: tuple[str, ...] = (),
 ) -> Fitted:
     """Return the errors of a model with these parameters against the table, and against others of the liquid."""
@@ -168,7 +167,7 @@ def force_along(model: Model, case: Case, values: Mapping[str, float], motion: M
     return force_n
 
 
-def even(table: Table) -> tuple[Motion, Floats]:
+def even(table: SolvedTable) -> tuple[Motion, Floats]:
     """Return a table's motion and force (n,) with a row for every tick, so that all times weigh alike."""
     t_s, velocity_mps, force_n = table.columns.values()
     even_s = np.arange(math.floor(t_s[-1] * RATE_HZ) + 1) / RATE_HZ
@@ -197,7 +196,7 @@ AFTER: Final = 8.0
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw(tables: Sequence[Table], fits: Sequence[Fitted]) -> Figure:
+def draw(tables: Sequence[SolvedTable], fits: Sequence[Fitted]) -> Figure:
     """Draw, for the fastest motion through each liquid, the force from its start to 8 D/U after its stop."""
     shown = {table.case.liquid_id: table for table in sorted(tables, key=lambda it: it.case.speed_mps)}
     height_pt = PANEL_PT * len(shown) + 30
@@ -212,7 +211,7 @@ def draw(tables: Sequence[Table], fits: Sequence[Fitted]) -> Figure:
     return figure
 
 
-def _panel(ax: Axes, table: Table, fits: Sequence[Fitted]) -> None:
+def _panel(ax: Axes, table: SolvedTable, fits: Sequence[Fitted]) -> None:
     case, (motion, force_n) = table.case, even(table)
     t_s = motion.t_s
     kept = t_s <= (STOP + AFTER) * case.unit_s
@@ -254,64 +253,57 @@ def clift(reynolds: float) -> float:
     return 24 / reynolds * (1 + 0.1935 * math.pow(reynolds, 0.6305))
 
 
-def steady_markdown(table: Table) -> str:
+def steady_markdown(table: SolvedTable) -> str:
     """Return steady drag as a Markdown table: the solver's C_d, and by how much others differ from it."""
     names = ["coarser grid", "half the box", "Clift et al. 1978", "Mittal 1999", "experiments", *LAWS, "C_d 0.47"]
-    lines = [f"| Re | C_d, solver | {' | '.join(names)} |", "|---:" * (len(names) + 2) + "|"]
+    rows = []
     for reynolds, solved, coarse, narrow in zip(*(it.tolist() for it in table.columns.values()), strict=True):
         others = [coarse, narrow, clift(reynolds), MITTAL.get(reynolds), _measured(reynolds)]
         others += [law(reynolds) * 24 / reynolds for law in LAWS.values()]
         shares = ["" if it is None else _signed(it / solved - 1) for it in (*others, CONSTANT)]
-        lines.append(f"| {reynolds:g} | {solved:.4g} | {' | '.join(shares)} |")
-    return "\n".join(lines)
+        rows.append((f"{reynolds:g}", f"{solved:.4g}", *shares))
+    return Table(("Re", "C_d, solver", *names), rows).markdown()
 
 
 def fits_markdown(fits: Sequence[Fitted]) -> str:
     """Return the fits as Markdown, a table for every motion."""
     parts = []
     for case in dict.fromkeys(it.case for it in fits):
-        lines = [
-            f"{case.liquid_id}, {case.speed_mps:g} m/s (Re {case.reynolds:.3g})",
-            "",
-            "| model | fitted | RMS error | greatest error | within target | push after the stop | other speed |",
-            "|---|---|---:|---:|---:|---:|---:|",
-        ]
-        lines += [_row(it) for it in fits if it.case == case]
-        parts.append("\n".join(lines))
+        parts.append(f"{case.liquid_id}, {case.speed_mps:g} m/s (Re {case.reynolds:.3g})")
+        parts.append(Table(_HEADINGS, [_row(it) for it in fits if it.case == case], left=2).markdown())
     return "\n\n".join([*parts, "\\* at the edge of what a scene permits: the best value may lie beyond."])
 
 
 def fits_csv(fits: Sequence[Fitted]) -> str:
     """Return the fits as CSV, named `COLUMNS`; parameters as ``name=value`` apart by blanks."""
-    rows: list[Sequence[str]] = [COLUMNS]
+    rows = []
     for it in fits:
         numbers = (it.rms_n, it.worst_n, it.share, it.within, it.push, it.carried)
         given = " ".join(f"{name}={value!r}" for name, value in it.values.items())
         rows.append([it.case.name, it.model.name, given, *(f"{number:.6g}" for number in numbers)])
-    return csv_text_of(rows)
+    return Table(COLUMNS, rows).csv()
 
 
-def evidence(tables: Sequence[Table], drag: Table, fits: Sequence[Fitted]) -> Evidence:
+def evidence(tables: Sequence[SolvedTable], drag: SolvedTable, fits: Sequence[Fitted]) -> Evidence:
     """Return the fits as CSV, both tables as Markdown, and the figure."""
     text = f"{steady_markdown(drag)}\n\n{fits_markdown(fits)}\n"
     files = {FITS_FILE: fits_csv(fits), "cfd.md": text}
     return Evidence(text, files, plot_files("cfd", "Models against a fluid solver", draw, tables, fits))
 
 
-def _row(it: Fitted) -> str:
-    edges = _at_the_edge(it)
-    fitted = ", ".join(f"{name} {value:.3g}{'*' if name in edges else ''}" for name, value in it.values.items())
-    fitted = fitted or "nothing"
-    return (
-        f"| {it.model.name} | {fitted} | {it.rms_n:.2g} N ({it.share:.1%}) | {it.worst_n:.2g} N | {it.within:.0%} | "
-        f"{_signed(it.push, 0)} | {it.carried:.1%} |"
-    )
+_HEADINGS: Final = (
+    "model", "fitted", "RMS error", "greatest error", "within target", "push after the stop", "other speed",
+)  # fmt: skip
 
 
-def _at_the_edge(it: Fitted) -> set[str]:
-    """Return which fitted parameters are the least or the greatest that a scene permits."""
+def _row(it: Fitted) -> tuple[str, ...]:
     ranges = find(scene_of(it.model, it.case), it.case.liquid_id, it.model.free) if it.model.free else ()
-    return {one.name for one in ranges if not one.least * (1 + EDGE) < it.values[one.name] < one.most * (1 - EDGE)}
+    within = {one.name for one in ranges if one.least * (1 + EDGE) < it.values[one.name] < one.most * (1 - EDGE)}
+    fitted = ", ".join(f"{name} {value:.3g}{'' if name in within else '*'}" for name, value in it.values.items())
+    return (
+        *(it.model.name, fitted or "nothing", f"{it.rms_n:.2g} N ({it.share:.1%})", f"{it.worst_n:.2g} N"),
+        *(f"{it.within:.0%}", _signed(it.push, 0), f"{it.carried:.1%}"),
+    )
 
 
 def _measured(reynolds: float) -> float:

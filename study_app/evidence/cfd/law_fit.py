@@ -14,11 +14,11 @@ from scipy.optimize import least_squares
 
 from study_app.errors import StudyError
 from study_app.evidence.cfd.fits import MODELS, judge
-from study_app.evidence.cfd.stored_flows import LEFT_OUT, LEFT_OUT_FILE, Table
+from study_app.evidence.cfd.stored_flows import LEFT_OUT, LEFT_OUT_FILE
+from study_app.evidence.cfd.stored_flows import Table as SolvedTable
 from study_app.evidence.reference_model import CONSTANTS, Constants, late_mps
-from study_app.evidence.table import Evidence
+from study_app.evidence.table import Evidence, Table
 from study_app.haptics.model.motion import Floats
-from study_app.store.tables.csv_files import csv_text_of
 
 STEP: Final = 0.005
 """Interval between the rows that are compared [D/U]."""
@@ -35,7 +35,7 @@ class MotionError:
     Each is (RMS, greatest).
     """
 
-    table: Table
+    table: SolvedTable
     others: Constants
     fitted: tuple[float, float] | None
     left_out: tuple[float, float]
@@ -53,7 +53,7 @@ class Refit:
 class _Solved:
     """One solved motion on even times, in the units of its liquid."""
 
-    def __init__(self, table: Table) -> None:
+    def __init__(self, table: SolvedTable) -> None:
         case = table.case
         t = np.arange(0.0, case.profile.end, STEP)
         self._case = case
@@ -87,7 +87,9 @@ class _Solved:
 
 
 def refit(
-    tables: Sequence[Table], held_out: Sequence[Table] = (), progress: Callable[[str], None] = lambda _: None
+    tables: Sequence[SolvedTable],
+    held_out: Sequence[SolvedTable] = (),
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Refit:
     """Return the constants by all tables, each of equal weight, and each table's errors when it is left out.
 
@@ -112,14 +114,14 @@ def refit(
     return Refit(constants, tuple(errors))
 
 
-def _as_run(table: Table) -> tuple[float, float]:
+def _as_run(table: SolvedTable) -> tuple[float, float]:
     """Return the errors of the program's tick."""
     (program,) = [it for it in MODELS if it.effects == ("unsteady_drag",)]
     judged = judge(program, table, {})
     return judged.share, judged.worst_n / float(np.abs(table.columns["force_n"]).max())
 
 
-def fit_constants(tables: Sequence[Table]) -> Constants:
+def fit_constants(tables: Sequence[SolvedTable]) -> Constants:
     """Return the constants by all tables, each of equal weight."""
     return _fit([_Solved(it) for it in tables], BEGIN)
 
@@ -139,23 +141,19 @@ def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
 
 def evidence(found: Refit) -> Evidence:
     """Return constants and errors as Markdown, and the constants without each motion as CSV."""
-    lines = ["| constant | fitted | in the program |", "|---|---:|---:|"]
-    lines += [
-        f"| {name} | {fitted:.3g} | {own:g} |"
-        for name, fitted, own in zip(Constants._fields, found.constants, CONSTANTS, strict=True)
-    ]
-    lines += [
-        "",
-        "RMS error as a share of the RMS force (greatest error as a share of the greatest force)",
-        "",
-        "| motion | liquid | Re | fitted to all | left out of the fit | program, 1 kHz |",
-        "|---|---|---:|---:|---:|---:|",
-    ]
+    values = zip(Constants._fields, found.constants, CONSTANTS, strict=True)
+    constants = [(name, f"{fitted:.3g}", f"{own:g}") for name, fitted, own in values]
+    motions = []
     for it in sorted(found.errors, key=lambda one: one.table.case.reynolds):
         errors = (it.fitted, it.left_out, it.program)
-        shares = " | ".join("held out" if one is None else f"{one[0]:.1%} ({one[1]:.1%})" for one in errors)
+        shares = ["held out" if one is None else f"{one[0]:.1%} ({one[1]:.1%})" for one in errors]
         case = it.table.case
-        lines.append(f"| {case.title} | {case.liquid_id} | {case.reynolds:.3g} | {shares} |")
-    text = "\n".join(lines) + "\n"
+        motions.append((case.title, case.liquid_id, f"{case.reynolds:.3g}", *shares))
+    headings = ("motion", "liquid", "Re", "fitted to all", "left out of the fit", "program, 1 kHz")
+    text = (
+        f"{Table(('constant', 'fitted', 'in the program'), constants, left=1).markdown()}\n\n"
+        "RMS error as a share of the RMS force (greatest error as a share of the greatest force)\n\n"
+        f"{Table(headings, motions, left=2).markdown()}\n"
+    )
     rows = [[it.table.case.name, *(f"{value:.6g}" for value in it.others)] for it in found.errors if it.fitted]
-    return Evidence(text, {LEFT_OUT_FILE: csv_text_of([LEFT_OUT, *rows]), "refit.md": text})
+    return Evidence(text, {LEFT_OUT_FILE: Table(LEFT_OUT, rows).csv(), "refit.md": text})

@@ -4,6 +4,7 @@ import csv
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Final
@@ -67,37 +68,27 @@ def notes_of(case: SolvedCase) -> dict[str, str]:
     }
 
 
-def stored(folder: Traversable | None = None) -> tuple[Table, ...]:
-    """Return the tables of `MOTION`, of the package or of a folder, by liquid and speed.
+def stored(folder: Traversable | None = None, of: str = "") -> tuple[Table, ...]:
+    """Return the tables of `MOTION`, of the package or of a folder or of one in it (``of``), by liquid and speed.
 
     Raises
     ------
     StudyError
         There is none, or one cannot be understood.
     """
-    return _motions(folder or package())
+    place = folder or package()
+    place = place / of if of else place
+    names = place.iterdir() if place.is_dir() else ()
+    files = sorted((it for it in names if it.name.endswith("mmps.csv")), key=lambda it: it.name)
+    if not files:
+        raise StudyError(f"{place} holds no tables of the fluid solver: make them with liquid-study cfd --solve")
+    return tuple(read(it, MOTION, OF_THE_MODEL) for it in files)
 
 
-def training(folder: Traversable | None = None) -> tuple[Table, ...]:
-    """Return the tables of the motions that constants are fitted to in addition to those of `stored`.
-
-    Raises
-    ------
-    StudyError
-        There is none, or one cannot be understood.
-    """
-    return _motions((folder or package()) / TRAINING_FOLDER)
-
-
-def held_out(folder: Traversable | None = None) -> tuple[Table, ...]:
-    """Return the tables of the motions that no fit uses.
-
-    Raises
-    ------
-    StudyError
-        There is none, or one cannot be understood.
-    """
-    return _motions((folder or package()) / HELD_OUT_FOLDER)
+training: Final = partial(stored, of=TRAINING_FOLDER)
+"""Motions that constants are fitted to in addition to those of `stored`."""
+held_out: Final = partial(stored, of=HELD_OUT_FOLDER)
+"""Motions that no fit uses."""
 
 
 def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
@@ -122,22 +113,8 @@ def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
         ) from error
 
 
-def _motions(place: Traversable) -> tuple[Table, ...]:
-    names = place.iterdir() if place.is_dir() else ()
-    files = sorted((it for it in names if it.name.endswith("mmps.csv")), key=lambda it: it.name)
-    if not files:
-        raise StudyError(f"{place} holds no tables of the fluid solver: make them with liquid-study cfd --solve")
-    return tuple(read(it, MOTION, OF_THE_MODEL) for it in files)
-
-
 def steady(folder: Traversable | None = None) -> Table:
-    """Return the table of `STEADY`.
-
-    Raises
-    ------
-    StudyError
-        It is not there, or cannot be understood.
-    """
+    """Return the table of `STEADY`; errors are those of `read`."""
     return read((folder or package()) / STEADY_FILE, STEADY)
 
 

@@ -22,7 +22,7 @@ from study_app.errors import StudyError
 from study_app.evidence.cfd.flow import ORDER, Flow, Grid, library
 from study_app.evidence.cfd.solver import made
 from study_app.evidence.cfd.stored_flows import package, read, text
-from study_app.evidence.table import Evidence
+from study_app.evidence.table import Evidence, Table
 from study_app.haptics.model.laws import HerschelBulkley, creeping_n
 from study_app.haptics.model.motion import Floats
 from study_app.store.atomic import write_file
@@ -133,13 +133,7 @@ def _solved(flow_index: float) -> list[tuple[float, ...]]:
 
 
 def stored_materials(folder: Traversable | None = None) -> dict[str, Floats]:
-    """Return the columns of the stored table.
-
-    Raises
-    ------
-    StudyError
-        It is not there, or cannot be understood.
-    """
+    """Return the columns of the stored table; errors are those of `stored_flows.read`."""
     return read((folder or package()) / FILE, COLUMNS).columns
 
 
@@ -160,22 +154,16 @@ def evidence(columns: dict[str, Floats]) -> Evidence:
     """Return the comparison as a table."""
     wrong = errors(columns)
     grid, smooth = (float(np.abs(columns[name] / columns["drag"] - 1).max()) for name in COLUMNS[3:])
-    lines = [
-        "Creeping drag of a sphere in Herschel–Bulkley liquids, over 3πD² K (U/D)^n: solver (error of the law).",
-        "",
-        "| Bi | " + " | ".join(f"n {index:g}" for index in INDICES) + " |",
-        "|---:|" + "---:|" * len(INDICES),
-    ]
-    for bingham in BINGHAM:
+    rows = [[f"{bingham:g}"] for bingham in BINGHAM]
+    for row, bingham in zip(rows, BINGHAM, strict=True):
         here = columns["bingham"] == bingham
-        cells = [
-            f"{drag:.3f} ({100 * error:+.1f} %)" for drag, error in zip(columns["drag"][here], wrong[here], strict=True)
-        ]
-        lines.append(f"| {bingham:g} | " + " | ".join(cells) + " |")
-    lines += [
-        "",
+        pairs = zip(columns["drag"][here], wrong[here], strict=True)
+        row += [f"{drag:.3f} ({100 * error:+.1f} %)" for drag, error in pairs]
+    table = Table(("Bi", *(f"n {index:g}" for index in INDICES)), rows)
+    text = (
+        "Creeping drag of a sphere in Herschel–Bulkley liquids, over 3πD² K (U/D)^n: solver (error of the law).\n\n"
+        f"{table.markdown()}\n\n"
         f"The law errs by at most {np.abs(wrong).max():.1%} (permitted: {PERMITTED:.0%}). Edges twice as long change "
-        f"the drag by at most {grid:.2%}, 3.3 times the ε by {smooth:.2%}.",
-    ]
-    text = "\n".join(lines) + "\n"
+        f"the drag by at most {grid:.2%}, 3.3 times the ε by {smooth:.2%}.\n"
+    )
     return Evidence(text, {COMPARISON_FILE: text})

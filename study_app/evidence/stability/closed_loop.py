@@ -347,7 +347,7 @@ def run(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any,
         _answer(model, safety, sample, loop)
         force = sample.device_force_n
         _push(handle, loop, force)
-        _write_down(model, safety, sample, handle, loop, trace[k])
+        _record(model, safety, sample, handle, loop, trace[k])
         if not (is_finite(force) and is_finite(handle.position_m)):
             loop.broken = 1
         k += 1
@@ -381,7 +381,7 @@ def follow(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: A
         _see(sample, handle, pace, loop)
         _answer(model, safety, sample, loop)
         _push(handle, loop, sample.device_force_n)
-        _write_down(model, safety, sample, handle, loop, trace[k])
+        _record(model, safety, sample, handle, loop, trace[k])
 
 
 @kernel
@@ -406,23 +406,29 @@ def _push(handle: Any, loop: Any, force_n: Any) -> None:
 
 
 @kernel
-def _write_down(model: Any, safety: Any, sample: Any, handle: Any, loop: Any, row: Any) -> None:
-    """Fill one row of the trace."""
+def _record(model: Any, safety: Any, sample: Any, handle: Any, loop: Any, row: Any) -> None:
+    """Write one row of the trace."""
+    write_row(model, safety, sample, handle, row)
     row.t_s = loop.now_s
     row.fresh, row.measured = sample.fresh, loop.measured
     copy(loop.error_m, row.error_m)
+    copy(safety.passivity.lift_n if loop.safe else model.state[0].lift_n, row.lift_n)
+    row.delay = handle.delay
+
+
+@kernel
+def write_row(model: Any, safety: Any, sample: Any, handle: Any, row: Any) -> None:
+    """Write motion and forces of a tick into a row of the trace."""
     copy(handle.position_m, row.position_m)
     copy(handle.velocity_mps, row.velocity_mps)
     copy(sample.force_n, row.asked_n)
     copy(sample.device_force_n, row.sent_n)
     copy(handle.force_n, row.acting_n)
-    copy(safety.passivity.lift_n if loop.safe else model.state[0].lift_n, row.lift_n)
     for axis in range(3):
         row.drift_mps[axis] = model.state[0].drift_mps[axis] / model.parameters[0].scale
     row.reserve_j = safety.passivity.reserve_j
     row.permitted_n = norm(safety.permitted_n)
     row.withheld_n = distance(safety.permitted_n, sample.device_force_n)
-    row.delay = handle.delay
     row.limiters = sample.limiters
 
 

@@ -20,7 +20,7 @@ from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
 from study_app.devices.simulated import ScriptedDevice
 from study_app.evidence.stability.bench import FORCE_LIMIT_N, Bench, fast_part, given_out_j, lasts_s, lowest_balance
-from study_app.evidence.stability.closed_loop import TRACE, place
+from study_app.evidence.stability.closed_loop import TRACE, place, write_row
 from study_app.evidence.stability.stability_cases import GRIPS, LETS_GO, Case, scene_of
 from study_app.evidence.stability.verdict import (
     ALLOWANCE_J,
@@ -39,7 +39,7 @@ from study_app.haptics.kernels.c_functions import Driver
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.loop import CONTROL, ClockCalls, DeviceCalls, Output, Records, run
 from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.vector import copy, distance, norm
+from study_app.haptics.kernels.vector import copy
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading, records
 from study_app.haptics.runtime.clocks.clock import VirtualClock
@@ -191,20 +191,10 @@ def _follow(
         if run(control, models, safety, exchanged, output, device, clock, one) < 1:
             return k
         sample = output.ring[(output.written[0] - 1) % output.ring.shape[0]]
-        row, model = trace[k], models[0]
-        row.t_s = k * 1e-9 * control[0].period_ns
-        copy(handle.position_m, row.position_m)
-        copy(handle.velocity_mps, row.velocity_mps)
-        copy(sample.force_n, row.asked_n)
-        copy(sample.device_force_n, row.sent_n)
-        copy(handle.force_n, row.acting_n)
-        copy(safety[0].passivity.lift_n, row.lift_n)
-        for axis in range(3):
-            row.drift_mps[axis] = model.state[0].drift_mps[axis] / model.parameters[0].scale
-        row.reserve_j = safety[0].passivity.reserve_j
-        row.permitted_n, row.withheld_n = norm(safety[0].permitted_n), distance(safety[0].permitted_n, row.sent_n)
-        row.delay = DELAY
-        row.limiters = sample.limiters
+        write_row(models[0], safety[0], sample, handle, trace[k])
+        trace[k].t_s = k * 1e-9 * control[0].period_ns
+        copy(safety[0].passivity.lift_n, trace[k].lift_n)
+        trace[k].delay = DELAY
     return int(trace.shape[0])
 
 

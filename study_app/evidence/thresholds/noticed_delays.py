@@ -42,12 +42,7 @@ LIKERT, FORCED_CHOICE = "rek2024", "delaydetect"
 class Person:
     """Someone who takes part in both procedures.
 
-    Attributes
-    ----------
-    observer : Observer
-        What is discriminated; its ``delay_noise_s`` is the spread of a delay as it is perceived.
-    rater : Rater
-        How statements are rated; its ``threshold_s`` is the criterion.
+    ``observer.delay_noise_s`` is the spread of a delay as it is perceived, ``rater.threshold_s`` the criterion.
     """
 
     observer: Observer
@@ -56,16 +51,10 @@ class Person:
 
 @dataclass(frozen=True, slots=True)
 class Rated:
-    """The ratings of all people under one mean criterion.
+    """The ratings of all people under one mean criterion [s].
 
-    Attributes
-    ----------
-    criterion_s : float
-        Mean criterion of the people [s].
-    adapted_s : float
-        How far the delay that seems to be none has moved [s].
-    found : Threshold
-        The delay at which half of the ratings agree, as in the report.
+    ``adapted_s`` is how far the delay that seems to be none has moved [s]; ``found`` the delay at which half of the
+    ratings agree, as in the report.
     """
 
     criterion_s: float
@@ -77,12 +66,8 @@ class Rated:
 class Compared:
     """What both procedures find of the same people.
 
-    Attributes
-    ----------
-    detected_ms : tuple of float
-        Threshold of the group in the forced choice, low and high [ms].
-    rated : tuple of Rated
-        The ratings, by criterion; the last one after adaptation.
+    ``detected_ms`` is the group's threshold in the forced choice, low and high [ms]; ``rated`` are the ratings by
+    criterion, the last one after adaptation.
     """
 
     people: int
@@ -119,14 +104,7 @@ def detected(people: Sequence[Person], seed: int) -> tuple[float, float, float]:
 def rated(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: int) -> Rated:
     """Return the delay from which people agree that it is different, in `LIKERT`.
 
-    Parameters
-    ----------
-    criterion_s : float
-        Mean criterion [s]; people keep their distances from the mean.
-    adapted_s : float
-        How far the delay that seems to be none has moved [s].
-    seed : int
-        Of all randomness; the same noise for every criterion.
+    People keep their distances from the mean criterion [s]; the noise is the same for every criterion.
     """
     delays_ms = delays_of(load(LIKERT))
     answers = []
