@@ -122,8 +122,7 @@ def identify(
     """
     from study_app.lab.identify import measured_force as measurements
     from study_app.lab.identify import preset as identified
-    from study_app.lab.identify.fit import Fit, fit
-    from study_app.lab.identify.flow_curve import CurveFit, fit_curve
+    from study_app.lab.identify.fit import CurveFit, Fit, fit, fit_curve
 
     chosen = _changed(scene, liquid, changes)
     read = measurements.read(measured)

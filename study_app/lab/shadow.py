@@ -121,15 +121,10 @@ class _Presented:
 
 
 class Shadow:
-    """The two settings, computed outside the servo.
+    """The two settings, computed outside the servo, with the device's own force limit [N] and dynamics.
 
-    Parameters
-    ----------
-    rest : the scene without liquids that the servo begins with
-    elements : capacity for wake elements
-    limit_n : the device's own force limit [N]
-    dynamics : of the device
-    alone : the samples are not from a servo: both sides show recomputed results
+    ``rest`` is the scene without liquids that the servo begins with, ``elements`` the capacity of a wake. ``alone``:
+    the samples are not from a servo, so that both sides show recomputed results.
     """
 
     def __init__(

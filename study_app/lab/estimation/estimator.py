@@ -80,8 +80,8 @@ class OnlineEstimator:
         ``("drag_coefficient",)``, or with ``"length"``, ``"scaling"`` or both.
     memory_s : float
         Age at which a row has the weight 1/e [s].
-
-        executor : Executor, optional Searches for the wake; by default `take` does so itself.
+    executor : Executor, optional
+        Searches for the wake; by default `take` does so itself.
 
     Raises
     ------

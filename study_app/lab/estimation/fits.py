@@ -76,17 +76,9 @@ def refusal(scene: Scene, names: tuple[str, ...]) -> str:
 
 
 class LiquidModel:
-    """A scene's liquid along a motion given in pieces.
+    """The liquid of a scene with one, along a motion given in pieces.
 
-    Parameters
-    ----------
-    scene : Scene
-        With one liquid, whose effects are named or chosen by the gate.
-
-    Raises
-    ------
-    StudyError
-        Its force does not depend on the drag coefficient.
+    A `StudyError` is raised where its force does not depend on the drag coefficient.
     """
 
     def __init__(self, scene: Scene, rate_hz: float) -> None:
@@ -152,17 +144,7 @@ class Information(NamedTuple):
 
 
 def information(normal: Floats, variance_n2: float, following: float) -> Information:
-    """Return the information of a motion.
-
-    Parameters
-    ----------
-    normal : (p, p) array
-        Jᵀ W J [N²].
-    variance_n2 : float
-        σ² [N²].
-    following : float
-        ρ, counted from 0 to 0.999.
-    """
+    """Return the information of a motion from Jᵀ W J (p, p) [N²], σ² [N²], and ρ, counted from 0 to 0.999."""
     rho = min(max(following, 0.0), 0.999)
     matrix = normal * ((1 - rho) / (1 + rho) / max(variance_n2, LEAST_DEVIATION_N**2))
     sizes, directions = np.linalg.eigh(matrix)
@@ -184,13 +166,7 @@ _GG, _GY, _YY, _GG1, _GY1, _YY1 = range(_SUMS)
 
 
 class RecursiveDrag:
-    """Estimates the drag coefficient from all rows so far.
-
-    Parameters
-    ----------
-    memory_s : float
-        τ [s]: a row of this age counts by 1/e.
-    """
+    """Estimates the drag coefficient from all rows so far; a row of the age ``memory_s`` counts by 1/e."""
 
     def __init__(self, memory_s: float) -> None:
         self._memory_s = memory_s
@@ -297,18 +273,9 @@ class _At:
 
 
 class WakeSearch:
-    """A search over rows for the parameters ``names`` of a scene.
+    """A search over rows for the parameters ``names``, the drag coefficient among them; the scene has the others.
 
-    Parameters
-    ----------
-    scene : Scene
-        With one liquid; it has the fixed parameters.
-    names : sequence of str
-        Of `NAMES`, the drag coefficient among them.
-    from_rest : bool
-        Whether the first row is the start of the stream.
-    memory_s : float
-        A row of this age counts by 1/e.
+    ``from_rest`` is whether the first row is the start of the stream; a row of the age ``memory_s`` counts by 1/e.
     """
 
     def __init__(

@@ -101,10 +101,7 @@ class Chosen:
 class LiveEstimation:
     """An estimation that runs with the lab's servo; its owner calls `poll` with each frame.
 
-    Parameters
-    ----------
-    executor : Executor, optional
-        Searches for the wake, and connects to streams; by default `poll` does so itself.
+    ``executor`` searches for the wake, and connects to streams; by default `poll` does so itself.
     """
 
     def __init__(self, executor: Executor | None = None) -> None:

@@ -114,15 +114,8 @@ _MOST_BYTES: Final = 65_536
 class GrowingCsv:
     """A file with the columns of `HEADER`, in any order; other columns and lines that begin with # are ignored.
 
-    Parameters
-    ----------
-    path : Path
-        It may have rows already, or only a header. A last line is read once its line end is written.
-
-    Raises
-    ------
-    StudyError
-        It cannot be read, or has another header.
+    It may have rows already, or only a header. A last line is read once its line end is written. A `StudyError` is
+    raised where it cannot be read, or has another header.
     """
 
     def __init__(self, path: Path) -> None:
@@ -149,13 +142,16 @@ class GrowingCsv:
         for line in self._bytes():
             self._line += 1
             if line.strip() and not line.startswith("#"):
-                numbered.append((self._line, next(csv.reader([line]))))
+                numbered.append((self._line, line))
         if numbered and not self._places:
-            self._take_header(numbered.pop(0)[1])
+            self._take_header(next(csv.reader([numbered.pop(0)[1]])))
         if not numbered:
             return no_rows()
-        rows = np.array([self._row(number, fields) for number, fields in numbered])
-        self._check_times(rows[:, 0], numbered)
+        rows = np.array([numbers_in(self.path, number, line, self._places) for number, line in numbered])
+        falls = np.flatnonzero(np.diff(rows[:, 0], prepend=self._last_s) <= 0)
+        if len(falls):
+            raise StudyError(f"{self.path}, line {numbered[falls[0]][0]}: t_s must increase, but does not here")
+        self._last_s = float(rows[-1, 0])
         if self._has_velocities:
             return Rows(rows[:, 0], rows[:, 1:4], rows[:, 7:], rows[:, 4:7], np.ones(len(rows), bool))
         return self._centred.take(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
@@ -189,27 +185,29 @@ class GrowingCsv:
         self._has_velocities = all(name in names for name in VELOCITIES)
         self._places = [names.index(name) for name in wanted + (VELOCITIES if self._has_velocities else ())]
 
-    def _row(self, number: int, fields: list[str]) -> list[float]:
-        if len(fields) <= max(self._places):
-            raise StudyError(f"{self.path}, line {number}: has {len(fields)} fields, fewer than the header names")
-        row = []
-        for place in self._places:
-            try:
-                value = float(fields[place])
-            except ValueError:
-                value = math.nan
-            if not math.isfinite(value):
-                raise StudyError(
-                    f"{self.path}, line {number}: {fields[place][:SHOWN]!r} is not a finite number; correct it"
-                )
-            row.append(value)
-        return row
 
-    def _check_times(self, t_s: Floats, numbered: list[tuple[int, list[str]]]) -> None:
-        falls = np.flatnonzero(np.diff(t_s, prepend=self._last_s) <= 0)
-        if len(falls):
-            raise StudyError(f"{self.path}, line {numbered[falls[0]][0]}: t_s must increase, but does not here")
-        self._last_s = float(t_s[-1])
+def numbers_in(path: Path, number: int, line: str, places: list[int]) -> list[float]:
+    """Return the numbers at these places of a line of a CSV file.
+
+    Raises
+    ------
+    StudyError
+        The line has too few fields, or one is not a finite number.
+    """
+    fields = next(csv.reader([line]))
+    if len(fields) <= max(places):
+        raise StudyError(f"{path}, line {number}: has {len(fields)} fields, fewer than the header names")
+    row = []
+    for field in (fields[place] for place in places):
+        try:
+            row.append(float(field))
+        except ValueError:
+            row.append(math.nan)
+        if not math.isfinite(row[-1]):
+            raise StudyError(
+                f"{path}, line {number}: {field[:SHOWN]!r} is not a finite number; correct it or remove the row"
+            )
+    return row
 
 
 LABELS: Final = (*PLACES[1:], *FORCES)
@@ -224,19 +222,10 @@ def available() -> bool:
 
 
 class LslForce:
-    """The first stream with the labels `LABELS`, and VELOCITIES where they are known.
+    """The first stream with the labels `LABELS`, and VELOCITIES where they are known, called ``name``, "" for any.
 
-    Parameters
-    ----------
-    name : str
-        Of the stream; "" takes any.
-    executor : Executor, optional
-        Connects to streams, which may not answer for a second; by default `poll` does so itself.
-
-    Raises
-    ------
-    StudyError
-        ``pylsl`` or its library is not installed.
+    ``executor`` connects to streams, which may not answer for a second; by default `poll` does so itself. A
+    `StudyError` is raised where ``pylsl`` or its library is not installed.
     """
 
     def __init__(self, name: str = "", executor: Executor | None = None) -> None:
@@ -373,14 +362,9 @@ class DeviceForce:
 
 
 class OtherLiquidForce:
-    """The force of another liquid on the same motion, with sensor noise: known values for trials of the estimation.
+    """The force of another liquid on the same motion, with noise of this standard deviation along each axis [N].
 
-    Parameters
-    ----------
-    scene : Scene
-        Of that liquid.
-    noise_n : float
-        Standard deviation along each axis [N].
+    Its values are known, for trials of the estimation.
     """
 
     def __init__(self, scene: Scene, noise_n: float = NOISE_N) -> None:

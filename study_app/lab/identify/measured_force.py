@@ -11,9 +11,9 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.signal import savgol_filter
 
 from study_app.errors import StudyError
-from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES, Floats, Motion, refuse_device
+from study_app.haptics.model.motion import PLACES, VELOCITIES, Floats, Motion, refuse_device
+from study_app.lab.estimation.sources import FORCES, numbers_in
 
-FORCES: Final = ("fx_n", "fy_n", "fz_n")
 ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")
 FLOW_CURVE: Final = ("shear_rate_per_s", "shear_stress_pa")
 LONGEST_S: Final = 0.05
@@ -90,27 +90,7 @@ def read(path: Path) -> Measured | FlowCurve:
 def _rows(path: Path, numbered: list[tuple[int, str]], places: list[int]) -> Floats:
     if not numbered:
         raise StudyError(f"{path} has a header and no rows: give one for each moment that was measured")
-    rows = []
-    for number, line in numbered:
-        fields = next(csv.reader([line]))
-        if len(fields) <= max(places):
-            raise StudyError(f"{path}, line {number}: has {len(fields)} fields, fewer than the header names")
-        row = [_number(fields[place]) for place in places]
-        if None in row:
-            bad = fields[places[row.index(None)]]
-            raise StudyError(
-                f"{path}, line {number}: {bad[:SHOWN]!r} is not a finite number; correct it or remove the row"
-            )
-        rows.append(row)
-    return np.array(rows, float)
-
-
-def _number(field: str) -> float | None:
-    try:
-        value = float(field)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
+    return np.array([numbers_in(path, number, line, places) for number, line in numbered], float)
 
 
 def _measured(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:

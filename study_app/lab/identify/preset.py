@@ -4,22 +4,18 @@ import hashlib
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from study_app import figure_style as style
-from study_app.haptics.runtime.offline import Table
-from study_app.lab.identify import fit_figure, flow_curve_figure
+from study_app.lab.identify import figures
 from study_app.lab.identify.estimates import CONFIDENCE, Estimates
-from study_app.lab.identify.fit import Fit
-from study_app.lab.identify.flow_curve import CurveFit
+from study_app.lab.identify.fit import CurveFit, Fit
 from study_app.lab.identify.measured_force import FLOW_CURVE
 from study_app.lab.identify.parameters import Parameter
 from study_app.protocol.scene_file import for_new_file, scene_text
-from study_app.store.atomic import write_file
-from study_app.store.output_files import make_folder
-from study_app.store.tables import csv_files
+from study_app.store.output_files import write_files
+from study_app.store.tables.csv_files import csv_text_of
 
-COLUMNS: Final = tuple(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz")
+COLUMNS: Final = ("t_s", *(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz"))
+CURVE_COLUMNS: Final = (*FLOW_CURVE, "fitted_pa", "residual_pa")
 
 
 def text(found: Estimates) -> str:
@@ -42,46 +38,23 @@ def write(found: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
 
     Raises
     ------
-    StudyError
-        A file cannot be written.
+    AnalysisError
+        The folder cannot be written.
     """
-    make_folder(to)
     name = f"{found.liquid_id}-fit"
-    written = [to / f"{found.liquid_id}.toml", to / f"{name}.txt", to / f"{name}.csv"]
-    write_file(written[0], preset(found, source).encode())
-    write_file(written[1], f"{text(found)}\n".encode())
     if isinstance(found, CurveFit):
-        table, drawn, what = curve_residuals(found), flow_curve_figure.draw(found), "flow curve"
+        residual_pa = found.curve.stress_pa - found.fitted_pa
+        values = [found.curve.rate_per_s, found.curve.stress_pa, found.fitted_pa, residual_pa]
+        columns, figure, what = CURVE_COLUMNS, figures.draw_curve(found), "flow curve"
     else:
-        table, drawn, what = residuals(found), fit_figure.draw(found), "force"
-    csv_files.write_columns(written[2], table)
-    for kind in style.FORMATS:
-        written.append(to / f"{name}.{kind}")
-        write_file(
-            written[-1],
-            style.file_bytes(drawn, kind, f"{found.liquid_id}: measured and fitted {what}", style.PLOT_SETTINGS),
-        )
-    return tuple(written)
-
-
-def residuals(found: Fit) -> Table:
-    """Return times, measured and fitted forces and residuals, one row per measurement."""
-    table = np.recarray(len(found.motion.t_s), [(name, np.float64) for name in ("t_s", *COLUMNS)])
-    table["t_s"] = found.motion.t_s
-    values = np.column_stack([found.measured_n, found.fitted_n, found.residual_n])
-    for name, column in zip(COLUMNS, values.T, strict=True):
-        table[name] = column
-    return table
-
-
-def curve_residuals(found: CurveFit) -> Table:
-    """Return shear rates, measured and fitted stresses and residuals, one row per shear rate."""
-    columns = (found.curve.rate_per_s, found.curve.stress_pa, found.fitted_pa, found.curve.stress_pa - found.fitted_pa)
-    names = (*FLOW_CURVE, "fitted_pa", "residual_pa")
-    table = np.recarray(len(found.fitted_pa), [(name, np.float64) for name in names])
-    for name, column in zip(names, columns, strict=True):
-        table[name] = column
-    return table
+        values = [found.motion.t_s, *found.measured_n.T, *found.fitted_n.T, *found.residual_n.T]
+        columns, figure, what = COLUMNS, figures.draw_force(found), "force"
+    table = csv_text_of([columns, *zip(*(column.tolist() for column in values), strict=True)])
+    title = f"{found.liquid_id}: measured and fitted {what}"
+    drawn = {f"{name}.{kind}": style.file_bytes(figure, kind, title, style.PLOT_SETTINGS) for kind in style.FORMATS}
+    texts = {f"{found.liquid_id}.toml": preset(found, source), f"{name}.txt": f"{text(found)}\n"}
+    contents = {file: said.encode() for file, said in texts.items()}
+    return write_files(to, {**contents, f"{name}.csv": table.encode(), **drawn})
 
 
 def preset(found: Estimates, source: Path) -> str:

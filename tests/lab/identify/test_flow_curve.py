@@ -10,8 +10,7 @@ from study_app.haptics.model.laws import stress_pa
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.lab.identify import measured_force
-from study_app.lab.identify.fit import fit
-from study_app.lab.identify.flow_curve import fit_curve
+from study_app.lab.identify.fit import fit, fit_curve
 from study_app.lab.identify.measured_force import FlowCurve
 from study_app.protocol.load import load_scene
 from tests.haptics.materials import PRESETS, tank

@@ -1,4 +1,4 @@
-"""A fit as a figure: the force measured and fitted, and the residual over time and over speed."""
+"""Fits as figures: force over time with its residual over time and speed, or stress over shear rate."""
 
 import textwrap
 from typing import Any, Final
@@ -6,11 +6,12 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from study_app import figure_style as style
+from study_app.haptics.model.laws import stress_pa
 from study_app.haptics.model.motion import Floats
-from study_app.lab.identify.fit import Fit
+from study_app.lab.identify.fit import CURVE_TABLE, CurveFit, Fit
 
 MEASURED: Final = "#b4bec7"
 TOP_PT: Final = 40.0
@@ -28,7 +29,7 @@ LEAST_IN_BIN: Final = 20
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw(found: Fit) -> Figure:
+def draw_force(found: Fit) -> Figure:
     """Draw the force, measured and fitted, over time; below it the residual over time, and along the motion."""
     caption = textwrap.wrap(_caption(found), CAPTION_LETTERS)
     height_pt = TOP_PT + FORCE_PT + GAP_PT + RESIDUAL_PT + FOOT_PT + LINE_PT * len(caption)
@@ -159,3 +160,48 @@ def _name_curves(axes: Axes, columns: int) -> None:
         borderpad=0,
         borderaxespad=0.3,
     )
+
+
+MARGIN: Final = 1.3
+CURVE_LETTERS: Final = 96
+
+
+@style.own_settings(style.PLOT_SETTINGS)
+def draw_curve(found: CurveFit) -> Figure:
+    """Draw measured and fitted stress over the shear rate, both logarithmic, and the residual in per cent below."""
+    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 4.2), facecolor="white", layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    figure.suptitle(f"{found.liquid_id}: measured and fitted flow curve", fontsize=9, fontweight="bold")
+    rates = found.curve.rate_per_s
+    (liquid,) = (it for it in found.scene.liquids if it.id == found.liquid_id)
+    fine = np.geomspace(rates.min() / MARGIN, rates.max() * MARGIN, 200)
+    look = {"color": style.AXES["x"]["color"]}
+    above.loglog(
+        fine, [stress_pa(getattr(liquid, CURVE_TABLE), rate) for rate in fine.tolist()], **look, label="fitted"
+    )
+    above.loglog(rates, found.curve.stress_pa, "o", color=style.ZERO, markersize=3.2, label="measured")
+    above.yaxis.set_major_formatter(ScalarFormatter())
+    above.yaxis.set_minor_formatter(ScalarFormatter())
+    above.set_ylabel("Shear stress [Pa]")
+    above.legend(loc="upper left", frameon=False)
+    above.text(
+        0.99,
+        0.03,
+        "\n".join(f"{it.name}  {' · '.join(found.row(it))}" for it in found.parameters),
+        transform=above.transAxes,
+        ha="right",
+        va="bottom",
+    )
+    _curve_residual(below, found)
+    caption = "Least squares of the residual as a share of the stress, with 95 % intervals."
+    caption += "".join(f" Warning: {warning}." for warning in found.warnings)
+    below.set_xlabel("Shear rate [1/s]\n" + "\n".join(textwrap.wrap(caption, CURVE_LETTERS)))
+    return figure
+
+
+def _curve_residual(axes: Axes, found: CurveFit) -> None:
+    residual = 100 * (1 - found.fitted_pa / found.curve.stress_pa)
+    axes.axhline(0, color=style.ZERO, linewidth=0.6, zorder=1)
+    axes.semilogx(found.curve.rate_per_s, residual, "o", color=style.ZERO, markersize=3.2)
+    axes.xaxis.set_major_formatter(ScalarFormatter())
+    axes.set_ylabel("Residual [%]")
