@@ -24,7 +24,7 @@ import pandas as pd
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.levels.thresholds import (
-    ThresholdFound,
+    ThresholdEstimate,
     estimate_slope,
     estimated_exponents,
     jnd_slope,
@@ -225,7 +225,7 @@ class KnownThreshold(KnownValue):
         return Verdict(self.name, what, value, limit, abs(error) <= SPREADS * spread)
 
 
-def _estimated(row: ThresholdFound) -> Estimated:
+def _estimated(row: ThresholdEstimate) -> Estimated:
     assert row.low is not None and row.high is not None  # noqa: S101, PT018 - ten participants have an interval
     return Estimated(row.threshold, row.low, row.high)
 
