@@ -94,7 +94,10 @@ def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, C
     speed_mps, rate_per_s = box.speed_mps or math.nan, reference_solutions.strokes_per_s(alone)
     motion = stroke(speed_mps, rate_per_s, CYCLES, alone.rate_hz)
     if "unsteady_drag" in kept:
-        true_n = _unsteady_n(alone, motion, speed_mps, rate_per_s)
+        even_s = np.full(len(motion.t_s), 1 / alone.rate_hz)
+        lift_n = np.array([0.0, _lift_n(alone), 0.0])
+        v, dv = _stroke(speed_mps, rate_per_s, motion.t_s)
+        true_n = unsteady_n(alone, vectors_x(v), vectors_x(dv), even_s) + lift_n
         against = "the law of unsteady drag, which is within 8 % of a fluid solver at Re 0.3 to 100, and buoyancy"
     elif "non_newtonian" in kept:
         true_n = _non_newtonian_n(alone, motion, speed_mps, rate_per_s)
@@ -139,7 +142,7 @@ def physical_n(scene: Scene, speed_mps: float, rate_per_s: float, t_s: Floats) -
     """
     liquid, radius_m = scene.liquids[0], scene.body.diameter_m / 2
     mu, rho, volume_m3 = liquid.viscosity_pa_s or math.nan, liquid.density_kg_m3, scene.body.volume_m3
-    v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
+    v, dv = _stroke(speed_mps, rate_per_s, t_s)
     drag_n = np.sign(v) * reference_solutions.measured_drag_n(liquid, scene.body.diameter_m, np.abs(v))
     added_n = 0.5 * rho * volume_m3 * dv
     delta_m = math.sqrt(2 * mu / (rho * rate_per_s))
@@ -147,19 +150,15 @@ def physical_n(scene: Scene, speed_mps: float, rate_per_s: float, t_s: Floats) -
     return np.column_stack([-drag_n - added_n - history_n, np.full_like(v, _lift_n(scene)), np.zeros_like(v)])
 
 
-def _unsteady_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s: float) -> Floats:
-    """Return unsteady drag by its equations, of a stroke whose acceleration is known, and buoyancy, (n, 3) [N]."""
-    t_s = motion.t_s
-    v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
-    even_s = np.full(len(t_s), 1 / scene.rate_hz)
-    force_n: Floats = unsteady_n(scene, vectors_x(v), vectors_x(dv), even_s) + np.array([0.0, _lift_n(scene), 0.0])
-    return force_n
+def _stroke(speed_mps: float, rate_per_s: float, t_s: Floats) -> tuple[Floats, Floats]:
+    """Return velocity and acceleration (n,) of a stroke along x."""
+    return speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
 
 
 def _non_newtonian_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s: float) -> Floats:
     """Return non-Newtonian drag by its equations, added mass and buoyancy, (n, 3) [N]."""
     liquid, t_s = scene.liquids[0], motion.t_s
-    v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
+    v, dv = _stroke(speed_mps, rate_per_s, t_s)
     added_n = 0.5 * liquid.density_kg_m3 * scene.body.volume_m3 * dv
     drag_n = non_newtonian_n(scene, vectors_x(v), np.full(len(t_s), 1 / scene.rate_hz))
     force_n: Floats = drag_n - vectors_x(added_n) + np.array([0.0, _lift_n(scene), 0.0])

@@ -321,16 +321,10 @@ def over_stokes(reynolds: float) -> float:
 def unsteady_n(
     scene: Scene, w_mps: Floats, acceleration_mps2: Floats, interval_s: Floats, constants: Constants = CONSTANTS
 ) -> Floats:
-    """Return the force (n, 3) [N] in the scene's first liquid, at rest and everywhere.
+    """Return the force (n, 3) [N] in the scene's first liquid, which has a viscosity, at rest and everywhere.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its first liquid has a viscosity.
-    w_mps : Floats
-        Velocities (n, 3) [m/s, scene]; the body begins as if it had always moved at the first.
-    acceleration_mps2 : Floats
-        Their derivatives (n, 3) [m/s²].
+    ``w_mps`` (n, 3) are velocities [m/s, scene], and ``acceleration_mps2`` their derivatives; the body begins as if it
+    had always moved at the first.
     """
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     density_kg_m3, viscosity_pa_s = liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan
@@ -376,18 +370,10 @@ STEPS: Final = 50
 
 
 def non_newtonian_n(scene: Scene, w_mps: Floats, interval_s: Floats, *, slack_m: float = 0.0) -> Floats:
-    """Return the force (n, 3) [N] in the scene's first liquid, at rest and everywhere.
+    """Return the force (n, 3) [N] in the scene's first liquid, which has a flow curve, at rest and everywhere.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its first liquid has a flow curve.
-    w_mps : (n, 3) array
-        Velocities [m/s, scene].
-    interval_s : (n,) array
-        Times since the tick before [s].
-    slack_m : float
-        Motion within it relaxes no elastic stress [m, scene]: two encoder counts in the servo.
+    ``w_mps`` (n, 3) are velocities [m/s, scene], ``interval_s`` (n,) the times since the tick before [s]. Motion within
+    ``slack_m`` [m, scene] relaxes no elastic stress: two encoder counts in the servo.
     """
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     law = liquid.non_newtonian

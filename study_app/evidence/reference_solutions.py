@@ -232,7 +232,7 @@ def strokes_per_s(scene: Scene) -> float:
 
 
 RELATIVE: Final = 0.05
-FELT_N: Final = 0.05
+PERCEPTIBLE_N: Final = 0.05
 """The accuracy target: max(5 % of the force, 0.05 N), below the smallest difference of force that people feel, 7 %."""
 ROUNDING: Final = 1e-9
 """Errors below this share of the force are rounding errors, and count as equal."""
@@ -260,10 +260,10 @@ def error_of(forces_n: Sequence[Floats], truth: Truth) -> Error:
     wrong_n = np.linalg.norm(felt_n - true_n, axis=1)
     true_rms_n, true_most_n = _rms(sizes_n), float(sizes_n.max())
     rms_n, most_n = _rms(wrong_n), float(wrong_n.max())
-    counts = (sizes_n >= min(FELT_N, RELATIVE * true_most_n)) & (np.linalg.norm(felt_n, axis=1) > 0)
+    counts = (sizes_n >= min(PERCEPTIBLE_N, RELATIVE * true_most_n)) & (np.linalg.norm(felt_n, axis=1) > 0)
     cross = np.linalg.norm(np.cross(felt_n[counts], true_n[counts]), axis=1)
     angles = np.degrees(np.arctan2(cross, (felt_n[counts] * true_n[counts]).sum(axis=1)))
-    target = max(RELATIVE, FELT_N / true_rms_n)
+    target = max(RELATIVE, PERCEPTIBLE_N / true_rms_n)
     direction_deg = _rms(angles) if len(angles) else math.nan
     return Error(rms_n, most_n, rms_n / true_rms_n, most_n / true_most_n, direction_deg, target)
 

@@ -86,6 +86,14 @@ def plot_files(name: str, title: str, draw: Callable[..., Figure], *of: Any) -> 
     return files
 
 
+def duration(ns: float) -> str:
+    """Return a time on an axis: 10 ns, 1 µs, 100 s."""
+    for unit, size in (("s", 1e9), ("ms", 1e6), ("µs", 1e3)):
+        if ns >= size:
+            return f"{ns / size:g} {unit}"
+    return f"{ns:g} ns"
+
+
 def run(
     measure: Callable[..., Found],
     cases: Iterable[Sequence[Any]],

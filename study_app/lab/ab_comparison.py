@@ -93,7 +93,7 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Workbench:
-    """Settings A and B; ``presented`` is the one that the hand feels.
+    """Settings A and B; ``presented`` is the one presented to the hand.
 
     While ``blind`` the assignment is hidden: ``first`` is the one called "setting 1", and nothing can be edited.
     ``held`` is the parameter whose slider is being dragged.

@@ -76,7 +76,7 @@ Vector = tuple[float, float, float]
 WORKSPACE_M: Final[Vector] = (0.1, 0.06, 0.06)
 FORCE_LIMIT_N: Final = 8.0
 ELEMENTS: Final = 100_000  # greatest length of a wake
-SPACING_NS: Final = 50_000_000  # duration of a fade: with faster changes by a slider no scene would be noticed
+SPACING_NS: Final = 50_000_000  # duration of a fade: with faster changes by a slider no scene would reach the hand
 _LONGEST_GAP_NS: Final = 200_000_000
 
 
@@ -114,7 +114,7 @@ class Live:
         self._dropped = 0
         self.hand = hand_of(device)
         self._counts = LimiterCounts()
-        self.bench: Workbench | None = None
+        self.workbench: Workbench | None = None
         self._due: Workbench | None = None
         self._loaded_ns: int | None = None
         self._closed = False
@@ -136,14 +136,14 @@ class Live:
         StudyError
             The servo cannot present it, or has stopped itself.
         """
-        before = self.bench
+        before = self.workbench
         goes_on = self._due is None and before is not None and before.presented == bench.presented and not anew
         if goes_on and before is not None and before.in_hand.scene == bench.in_hand.scene:
             self.servo.check()
             side = other(bench.presented)
-            self.bench = bench
+            self.workbench = bench
             for shadow in (self.shadow, *([self._ghost.shadow] if self._ghost is not None else ())):
-                shadow.put_other(side, self._presentable(bench.setting(side).scene))
+                shadow.set_other(side, self._presentable(bench.setting(side).scene))
             return
         if goes_on and self.servo.may_adjust(self._presentable(bench.in_hand.scene)):
             self._present(bench, goes_on=True)
@@ -198,9 +198,9 @@ class Live:
             self._lead()
         else:
             self._ghost = _Ghost(motion, self.servo.rate_hz, self.device.force_limit_n, self.servo.now_ns())
-            if self.bench is not None:
-                a, b = (self._presentable(it.scene) for it in (self.bench.a, self.bench.b))
-                self._ghost.begin(self.bench.presented, a, b)
+            if self.workbench is not None:
+                a, b = (self._presentable(it.scene) for it in (self.workbench.a, self.workbench.b))
+                self._ghost.begin(self.workbench.presented, a, b)
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
         """Set the pointer [m, hand frame] of a device that has one, unless a path moves it."""
@@ -223,7 +223,7 @@ class Live:
 
     def limiters(self) -> tuple[LimiterCount, ...]:
         """Return which limiters acted in the last 10 s."""
-        scene = Scene() if self.bench is None else self.bench.in_hand.scene
+        scene = Scene() if self.workbench is None else self.workbench.in_hand.scene
         limit_n = min(self.device.force_limit_n, scene.force_limit_n)
         slew_n = slew_limit_n(1 / self.servo.rate_hz, self.device.dynamics, scene.velocity)
         return self._counts.rows(limit_n, slew_n)
@@ -281,7 +281,7 @@ class Live:
         """Present the selected setting with the servo, and update the shadows."""
         a, b = (self._presentable(it.scene) for it in (bench.a, bench.b))
         serial = (self.servo.adjust if goes_on else self.servo.load)(a if bench.presented == "A" else b)
-        self.bench = bench
+        self.workbench = bench
         self.shadow.expect(serial, bench.presented, a, b, goes_on=goes_on)
         if self._ghost is not None:
             self._ghost.begin(bench.presented, a, b, goes_on=goes_on)
@@ -292,7 +292,7 @@ class Live:
         return scene if same else Scene(**(dict(scene) | {"rate_hz": self.servo.rate_hz}))
 
     def _programme(self, name: str) -> Motion:
-        scene = Scene() if self.bench is None else self.bench.in_hand.scene
+        scene = Scene() if self.workbench is None else self.workbench.in_hand.scene
         return programme(name, scene, self.device.workspace_m)
 
     def _lead(self) -> None:
@@ -312,10 +312,10 @@ class _Ghost:
         self._started_ns = self._next_ns = now_ns
         self._serial = 0
 
-    def begin(self, side: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
+    def begin(self, presented: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
         """Present these settings from the next sample on."""
         self._serial += 1
-        self.shadow.expect(self._serial, side, a, b, goes_on=goes_on)
+        self.shadow.expect(self._serial, presented, a, b, goes_on=goes_on)
 
     def follow(self, now_ns: int) -> None:
         """Compute the ticks that a servo would have run by now; skip those overdue for too long."""

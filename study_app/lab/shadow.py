@@ -132,7 +132,7 @@ class Shadow:
     ) -> None:
         self._alone = alone
         self._sides = {side: _Half(rest, elements, limit_n, dynamics) for side in _SIDES}
-        self._presented: Side = "A"
+        self._side: Side = "A"
         self._serial = 0
         self._expected: dict[int, _Presented] = {}
         self._recent = _Recent()
@@ -143,14 +143,14 @@ class Shadow:
         """Compile all functions that run later, or load them from the cache."""
         for half in self._sides.values():
             half.begin(half.scene)
-            half.answer(records(SAMPLE, 0), presented=True)
+            half.answer(records(SAMPLE, 0), sent=True)
             half.restart()
 
     def expect(self, serial: int, side: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
         """Note what the servo will present as scene ``serial``; ``goes_on`` if it only adjusts."""
         self._expected[serial] = _Presented(side, {"A": a, "B": b}, goes_on)
 
-    def put_other(self, side: Side, scene: Scene) -> None:
+    def set_other(self, side: Side, scene: Scene) -> None:
         """Set the scene of the side not presented, if it differs."""
         for it in self._expected.values():
             it.scenes[side] = scene
@@ -178,7 +178,7 @@ class Shadow:
         return self._sides[side].tail()
 
     def _change_to(self, serial: int) -> None:
-        """Follow the servo to this scene: restart its side, and the other side if it changed."""
+        """Follow the servo to this scene: restart the presented side, and the other side if it changed."""
         if serial == self._serial:
             return
         self._serial = serial
@@ -187,23 +187,23 @@ class Shadow:
         if presented is None:  # rest: a servo that ends, or presents nothing
             return
         self._expected = {number: it for number, it in self._expected.items() if number > serial}
-        side, scenes = presented.side, presented.scenes
-        shown, hidden = self._sides[side], self._sides[other(side)]
-        if self._presented != side:
-            shown.safety, hidden.safety = hidden.safety, shown.safety.copy()  # the servo's own goes with the force
-        (shown.go_on if all(it.goes_on for it in missed) else shown.begin)(scenes[side])
-        if hidden.scene != scenes[other(side)]:
-            hidden.begin(scenes[other(side)])
-        self._presented = side
+        shown, hidden = self._sides[presented.side], self._sides[other(presented.side)]
+        if self._side != presented.side:
+            shown.safety, hidden.safety = (hidden.safety, hidden.safety.copy())  # the servo's own follows
+        goes_on = all(it.goes_on for it in missed)
+        (shown.go_on if goes_on else shown.begin)(presented.scenes[presented.side])
+        if hidden.scene != presented.scenes[other(presented.side)]:
+            hidden.begin(presented.scenes[other(presented.side)])
+        self._side = presented.side
 
     def _follow(self, samples: Any) -> None:
         """Recompute both sides for samples of one scene; show the servo's own forces for the presented side."""
-        out = {side: half.answer(samples, presented=side == self._presented) for side, half in self._sides.items()}
+        out = {side: half.answer(samples, sent=side == self._side) for side, half in self._sides.items()}
         if not self._alone:
-            again, out[self._presented] = out[self._presented], samples
+            again, out[self._side] = out[self._side], samples
             self.followed += len(samples)
             self.differing += int(np.count_nonzero((again.device_force_n != samples.device_force_n).any(axis=1)))
-        self._recent.add(samples.time_ns, out["A"], out["B"], presented_a=self._presented == "A")
+        self._recent.add(samples.time_ns, out["A"], out["B"], presented_a=self._side == "A")
 
 
 class _Half:
@@ -232,10 +232,10 @@ class _Half:
         self.scene = scene
         adjust_into(self._model, scene, dynamics=self._dynamics)
 
-    def answer(self, samples: Any, *, presented: bool) -> Any:
-        """Return the samples with recomputed results; ``presented`` if the device was sent this side's force."""
+    def answer(self, samples: Any, *, sent: bool) -> Any:
+        """Return the samples with recomputed results; ``sent`` if the device was sent this side's force."""
         out = samples.copy()
-        recompute_sample(self._model, self.safety[0], out, self._trail[0], self._places, presented)
+        recompute_sample(self._model, self.safety[0], out, self._trail[0], self._places, sent)
         return out
 
     def tail(self) -> Tail | None:

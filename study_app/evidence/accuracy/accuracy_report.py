@@ -16,8 +16,8 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from study_app import figure_style as style
 from study_app.evidence.accuracy.comparison import Accuracy, Kind, Row, front, worst
-from study_app.evidence.reference_solutions import FELT_N, RELATIVE, ROUNDING
-from study_app.evidence.table import Evidence, Table, plot_files
+from study_app.evidence.reference_solutions import PERCEPTIBLE_N, RELATIVE, ROUNDING
+from study_app.evidence.table import Evidence, Table, duration, plot_files
 
 WIDTH_PT: Final = 85 / 25.4 * 72
 LEFT_PT: Final = 27.0
@@ -162,7 +162,7 @@ class _Panel:
         axes.yaxis.set_minor_formatter(NullFormatter())
         axes.set_title("Error [% of the force]", fontsize=SMALL, pad=4, x=-0.075)
         axes.axhline(target, color=style.TEXT, linewidth=0.9, linestyle=(0, (5, 2)))
-        share = f"{100 * RELATIVE:g} %" if target <= 100 * RELATIVE else f"{FELT_N:g} N"
+        share = f"{100 * RELATIVE:g} %" if target <= 100 * RELATIVE else f"{PERCEPTIBLE_N:g} N"
         offset: dict[str, Any] = {"textcoords": "offset points", "fontsize": SMALL}
         axes.annotate(f"target {share}", (axes.get_xlim()[0], target), (3, 2), va="bottom", **offset)
         axes.annotate("1 ms", (BUDGET_NS, axes.get_ylim()[1]), (2, 0), va="top", **offset)
@@ -260,14 +260,6 @@ def spread(wanted: Sequence[float], gap: float, most: float) -> list[float]:
         places[k] = min(places[k], ceiling)
         ceiling = places[k] - gap
     return places
-
-
-def duration(ns: float) -> str:
-    """Return a time on the axis: 10 ns, 1 µs, 100 s."""
-    for unit, size in (("s", 1e9), ("ms", 1e6), ("µs", 1e3)):
-        if ns >= size:
-            return f"{ns / size:g} {unit}"
-    return f"{ns:g} ns"
 
 
 COLUMNS: Final = (

@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from study_app import figure_style as style
 from study_app.evidence.cfd.solved_cases import RAMP, STOP, Case
 from study_app.evidence.cfd.stored_flows import Table as SolvedTable
-from study_app.evidence.reference_solutions import measured_drag_n
+from study_app.evidence.reference_solutions import PERCEPTIBLE_N, RELATIVE, measured_drag_n
 from study_app.evidence.table import Evidence, Table, plot_files
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.effects.wake import Wake
@@ -32,9 +32,6 @@ from study_app.lab.identify.parameters import find
 
 RATE_HZ: Final = 1000.0
 LAW: Final = "brown-lawler"
-RELATIVE: Final = 0.05
-FELT_N: Final = 0.05
-"""The accuracy target: 5 % of the force or 0.05 N, whichever is more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +132,7 @@ def judge(
         rms_n=_rms(error_n),
         worst_n=float(error_n.max()),
         share=share_of(error_n, solved_n),
-        within=float(np.mean(error_n <= np.maximum(RELATIVE * np.abs(solved_n), FELT_N))),
+        within=float(np.mean(error_n <= np.maximum(RELATIVE * np.abs(solved_n), PERCEPTIBLE_N))),
         push=float(force_n[after].sum() / solved_n[after].sum()),
         carried=max(carried, default=math.nan),
         warnings=warnings,

@@ -220,10 +220,6 @@ def compare(
 
     With outlets, a stream of samples and twenty markers a second go to a listener in another process. Without them its
     thread rests. Each pair of segments begins with the other.
-
-    Parameters
-    ----------
-    ending : is set by whoever wants no more
     """
     grants = granted()
     loop = ServoLoop(grants.best or grants.normal, real_time=True, spin_us=None)

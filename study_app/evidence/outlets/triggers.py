@@ -75,12 +75,9 @@ class VirtualPort:
 def measure(
     port: str, seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> TriggerDelays:
-    """Send twenty events per second to a port, or to a virtual one, and return their delays.
+    """Send twenty events per second to the address of a port, or to a virtual one, and return their delays.
 
-    Parameters
-    ----------
-    port : address of a port; "virtual" for a pair of virtual ones, whose other end another process reads
-    ending : is set by whoever wants no more
+    ``port`` "virtual" is a pair of virtual ports, whose other end another process reads.
 
     Raises
     ------

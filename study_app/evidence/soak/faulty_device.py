@@ -75,13 +75,9 @@ _inner_read, _inner_write = call_at(READ), call_at(WRITE)
 
 
 class FaultyDevice:
-    """A device between the servo and ``inner``, which it breaks; both must live as long as the servo ticks.
+    """A device between the servo and an opened one, ``inner``; both must live as long as the servo ticks.
 
-    Parameters
-    ----------
-    inner : the device that is felt with, opened
-    clock : the servo's clock; one that runs by itself never jumps
-    seed : of what goes wrong and when
+    ``clock`` is the servo's; one that runs by itself never jumps. Kinds and times of faults follow from ``seed``.
     """
 
     def __init__(self, inner: Driver, clock: Clock, seed: int) -> None:

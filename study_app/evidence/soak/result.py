@@ -14,7 +14,7 @@ from study_app.haptics.model.layout import LIMITER_NAMES
 MOST_DRIFT: Final = 1e-9  # of the wake, in units of Σ|e|/S
 MOST_GROWTH_BYTES: Final = 5 * 2**20
 MOST_RESIDUE_N: Final = 1e-12
-FELT_N: Final = 0.05
+PERCEPTIBLE_N: Final = 0.05
 
 _SEEN: Final = {
     NON_FINITE: "not_finite",
@@ -31,7 +31,7 @@ _SEEN: Final = {
 class Rests:
     """What was left of wake [m/s] and force [N] after the hand had kept still, at most.
 
-    ``pushed_s`` is how long a force above ``FELT_N`` was sent to a hand that kept still.
+    ``pushed_s`` is how long a force above ``PERCEPTIBLE_N`` was sent to a hand that kept still.
     """
 
     count: int = 0
@@ -103,7 +103,7 @@ class SoakResult:
             counts.steps > 0,
         )
         yield f"{counts.unstopped} forces other than zero while stopped{first}", counts.unstopped > 0
-        yield f"{counts.believed} implausible readings accepted{first}", counts.believed > 0
+        yield f"{counts.accepted} implausible readings accepted{first}", counts.accepted > 0
         yield f"the clock is off its ticks by up to {counts.drift_ns} ns{first}", counts.drift_ns > 0
         yield f"the last force written is {device.last_n.tolist()} N, not zero", bool(device.last_n.any())
 
@@ -164,7 +164,7 @@ class SoakResult:
             f"  wake and definition   {drift.worst:.1e} of Σ|e|/S at most in {drift.comparisons:,} comparisons; "
             f"a wake ran for {drift.longest_s:,.0f} s",
             f"  left after {rests.count:,} rests   wake {rests.wake_mps:g} m/s, force {rests.force_n:.1e} N; "
-            f"more than {FELT_N} N for {rests.pushed_s:.2f} s at most",
+            f"more than {PERCEPTIBLE_N} N for {rests.pushed_s:.2f} s at most",
         )
 
     def _force_text(self) -> tuple[str, ...]:
@@ -174,8 +174,8 @@ class SoakResult:
             "forces",
             f"  largest written       {device.most_n:.6f} N of {counts.limit_n:g} N, {device.writes:,} writes",
             f"  largest step          {counts.steepest_n:.6f} N",
-            f"    let go              {counts.let_go_n:.6f} N at a stop or a fault",
-            f"    paid back           {counts.paid_n:.6f} N by the passivity controller",
+            f"    let go              {counts.release_step_n:.6f} N at a stop or a fault",
+            f"    paid back           {counts.energy_step_n:.6f} N by the passivity controller",
             f"  non-finite forces     {counts.no_number + device.not_finite}",
         )
 
@@ -219,8 +219,8 @@ class SoakResult:
             "pushed_at_rest_s": self.rests.pushed_s,
             "largest_force_n": float(self.device.most_n),
             "largest_step_n": float(self.counts.steepest_n),
-            "largest_let_go_n": float(self.counts.let_go_n),
-            "largest_energy_step_n": float(self.counts.paid_n),
+            "largest_let_go_n": float(self.counts.release_step_n),
+            "largest_energy_step_n": float(self.counts.energy_step_n),
             "latest_s": float(self.counts.latest_s),
             "overruns": self.overruns,
             "dropped": self.dropped,

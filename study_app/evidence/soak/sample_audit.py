@@ -55,11 +55,11 @@ COUNTS = np.dtype(
         ("long_ticks", np.int64),  # ticks that took a period or more
         ("most_n", np.float64),
         ("steepest_n", np.float64),  # greatest change between two forces, where a limit is promised
-        ("let_go_n", np.float64),  # where a stop or a fault let go
-        ("paid_n", np.float64),  # where the passivity controller took what was owed
+        ("release_step_n", np.float64),  # where a stop or a fault let go
+        ("energy_step_n", np.float64),  # where the passivity controller took what was owed
         ("latest_s", np.float64),  # how late a tick began at most
         # broken promises: how often, and the tick of the first
-        ("believed", np.int64),
+        ("accepted", np.int64),
         ("excess", np.int64),
         ("no_number", np.int64),
         ("steps", np.int64),
@@ -74,12 +74,8 @@ COUNTS = np.dtype(
 class Audit:
     """The counts over all samples so far.
 
-    Parameters
-    ----------
-    limit_n : the greatest force that may be sent [N]
-    slew_n : the most that it may change from tick to tick [N]; of scenes with several estimators the greatest
-    period_ns : of the servo
-    reach_m : how far the device's handle gets from the middle at most [m]
+    ``limit_n`` is the greatest force that may be sent [N], ``slew_n`` its greatest change from tick to tick [N], and
+    ``reach_m`` how far the device's handle gets from the middle at most [m].
     """
 
     def __init__(self, limit_n: float, slew_n: float, period_ns: int, reach_m: float) -> None:
@@ -141,7 +137,7 @@ def _look_at_reading(counts: Any, sample: Any, displaced_m: float) -> None:
     if not a_place:
         counts.not_finite += 1
         if not refused:
-            counts.believed += 1
+            counts.accepted += 1
             _break_promise(counts, sample)
     elif farthest_m > displaced_m:
         counts.displaced += 1
@@ -176,10 +172,10 @@ def _look_at_force(counts: Any, sample: Any) -> None:
     if counts.follows == 0:
         return
     if stopped or sample.status != STATUS_OK:
-        counts.let_go_n = max(counts.let_go_n, change_n)
+        counts.release_step_n = max(counts.release_step_n, change_n)
         return
     if sample.limiters & LIMITER_ENERGY != 0:
-        counts.paid_n = max(counts.paid_n, change_n)
+        counts.energy_step_n = max(counts.energy_step_n, change_n)
         return
     counts.steepest_n = max(counts.steepest_n, change_n)
     if change_n > counts.slew_n + TOLERANCE_N:

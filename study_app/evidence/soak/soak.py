@@ -36,7 +36,7 @@ from study_app.evidence.soak.faulty_device import (
     FaultyDevice,
 )
 from study_app.evidence.soak.ledger import Drift, wake_of
-from study_app.evidence.soak.result import FELT_N, Rests, SoakResult
+from study_app.evidence.soak.result import PERCEPTIBLE_N, Rests, SoakResult
 from study_app.evidence.soak.sample_audit import Audit
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.layout import SAMPLE, records
@@ -164,12 +164,8 @@ class _Due:
 class Soak:
     """One soak: step it until it is over, then ask for its report; leaving it as a context stops the servo.
 
-    Parameters
-    ----------
-    scenes : what is felt, by name; all of one rate
-    hours : how long, on the servo's clock
-    virtual : on a virtual clock, as fast as it computes
-    seed : of motions, scenes and faults
+    The scenes have one rate; ``hours`` are those of the servo's clock. ``virtual``: on a virtual clock, as fast as it
+    computes. Motions, scenes and faults follow from ``seed``.
     """
 
     def __init__(self, scenes: Mapping[str, Scene], hours: float, *, virtual: bool, seed: int = 1) -> None:
@@ -368,7 +364,7 @@ class Soak:
         samples = self.reader.read()
         self.audit.take(samples)
         self.drift.take(samples)
-        pushed = samples.tick[np.linalg.norm(samples.device_force_n, axis=1) > FELT_N]
+        pushed = samples.tick[np.linalg.norm(samples.device_force_n, axis=1) > PERCEPTIBLE_N]
         if self._is_left_alone and pushed.size:
             self._rests.pushed_s = max(self._rests.pushed_s, (int(pushed[-1]) - self._still_from) / self._rate_hz)
         if len(self._memory) <= min(10 * self.done // self.ticks, 9) and self.done > 0:

@@ -2,9 +2,9 @@
 
 Each case is one of the stability sweep that presents a liquid with the constant law of drag, longer in time. It runs
 with the safety layer four times: with the setting as it is and with the greatest drag coefficient that may be applied,
-both fixed; with estimates from a sensor in a planted liquid, applied continuously; and with the drag coefficient moved
+both fixed; with estimates from a sensor in a second liquid, applied continuously; and with the drag coefficient moved
 to and fro between half of its value and the greatest, as fast as application permits: faster than any estimate. The
-sensor measures the planted liquid's force at the handle's true motion, with 0.03 N of noise.
+sensor measures the second liquid's force at the handle's true motion, with 0.03 N of noise.
 
 A loop counts as unstable by the criteria of `stability.verdict`: not finite, limit, energy, oscillation, and a force
 above 40 Hz that exceeds that of the loop with either fixed setting by more than 0.05 N.
@@ -46,7 +46,7 @@ MOVING_S: Final = 4.0
 LASTS_S: Final = 5.0
 FRAME_S: Final = 0.033
 TURNS_S: Final = 0.6
-PLANTED: Final = (0.3, 3.0)
+FACTORS: Final = (0.3, 3.0)
 """Of the drag coefficient, in multiples of the setting's."""
 _MEMORY_S: Final = 2.0
 
@@ -56,10 +56,10 @@ WAYS: Final[tuple[Way, ...]] = ("estimated", "to and fro")
 
 @dataclass(frozen=True, slots=True)
 class AppliedCase:
-    """A case of the sweep and the drag coefficient of the planted liquid, in multiples of the setting's."""
+    """A case of the sweep and the drag coefficient of the measured liquid, in multiples of the setting's."""
 
     case: Case
-    planted: float
+    factor: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,7 @@ def applied_cases(count: int, seed: str = "estimation") -> tuple[AppliedCase, ..
     draw = Random(seed)  # noqa: S311 - of cases
     found = [case for case in sweep() if case.liquid in LIQUIDS]
     draw.shuffle(found)
-    low, high = map(math.log, PLANTED)
+    low, high = map(math.log, FACTORS)
     return tuple(AppliedCase(case, math.exp(draw.uniform(low, high))) for case in found[:count])
 
 
@@ -128,9 +128,7 @@ def evidence(verdicts: Sequence[AppliedVerdict]) -> Evidence:
         steps = sum(it.steps[way] for it in stable)
         lines.append(f"  {way:<12} unstable {bad} of {len(stable)}; {steps} changes of the drag coefficient")
     lines.append(f"  the motion identified the drag coefficient in {identified} of {len(stable)}")
-    lines += [
-        f"unstable: planted={it.applied.planted:.4g} {it.applied.case} {it.reasons}" for it in stable if it.harmed
-    ]
+    lines += [f"unstable: factor={it.applied.factor:.4g} {it.applied.case} {it.reasons}" for it in stable if it.harmed]
     text = "\n".join(lines) + "\n"
     return Evidence(text, {"estimation.txt": text}, missed=any(it.harmed for it in verdicts))
 
@@ -162,7 +160,7 @@ class _Follower:
     def __init__(self, applied: AppliedCase, scene: Scene, way: Way) -> None:
         self._way, self._scene, self._start = way, scene, scene
         self._sensor = ModelAlong(
-            as_measured(_with_drag(scene, min(applied.planted * scene.body.drag_coefficient, 10.0))), given=True
+            as_measured(_with_drag(scene, min(applied.factor * scene.body.drag_coefficient, 10.0))), given=True
         )
         self._noise = np.random.default_rng(1)
         self._estimator = OnlineEstimator(as_measured(scene), memory_s=_MEMORY_S)

@@ -42,20 +42,9 @@ DIRECTION: Final = np.array([0.8, 0.0, 0.6])
 
 
 class Bench:
-    """The records of one closed loop.
+    """The records of one closed loop, with the safety layer (``safe``) or without.
 
-    Parameters
-    ----------
-    case : Case
-        What is presented, and in which loop.
-    safe : bool
-        Whether the safety layer acts.
-    limits : DampingLimits, optional
-        Tried in place of the table's.
-    scene : Scene, optional
-        Presented in place of the case's.
-    dynamics : Dynamics, optional
-        Stated by the device in place of the case's.
+    ``limits`` are tried in place of the table's, ``scene`` and ``dynamics`` in place of the case's.
     """
 
     def __init__(

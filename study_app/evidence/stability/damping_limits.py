@@ -23,13 +23,13 @@ DELAYS: Final = (0, 1, 2, 3, 4)
 FREE_HANDLE_KG: Final = 0.1
 FRICTION_NSPM: Final = 0.5
 
-FELT_NSPM: Final = 53.0
+UNALTERED_NSPM: Final = 53.0
 """What is felt as it is at 1 kHz, up to one tick of delay, with "ewma" and "kalman": light oil has a secant of 55 N·s/m
 where it reaches 8 N at scale 10; this takes 4 % of that one force, and with "ewma" is 75 % of what a free handle of
 0.1 kg is stable with."""
-FELT_SHARE: Final = 0.75
+UNALTERED_SHARE: Final = 0.75
 """Of the boundary that a limit takes there at most, if the filter is another."""
-FELT_INERTIA_SHARE: Final = 0.85
+UNALTERED_INERTIA_SHARE: Final = 0.85
 """Of this limit, for added mass and history: those of honey are felt as they are, too."""
 SHARE: Final = 0.5
 """Of the boundary that a limit takes elsewhere: a quadratic law has twice the slope of its secant."""
@@ -110,23 +110,23 @@ def measure_limits(
 
 
 def _entry(velocity: Velocity, period_s: float, delay: int) -> Entry:
-    felt = velocity.kind in {"ewma", "kalman"} and period_s == NOMINAL_S and delay <= 1
-    drag = _limit_nspm(velocity, period_s, delay, felt=felt)
-    inertia = (FELT_INERTIA_SHARE if felt else INERTIA_SHARE) * drag
+    unaltered = velocity.kind in {"ewma", "kalman"} and period_s == NOMINAL_S and delay <= 1
+    drag = _limit_nspm(velocity, period_s, delay, unaltered=unaltered)
+    inertia = (UNALTERED_INERTIA_SHARE if unaltered else INERTIA_SHARE) * drag
     limits = DampingLimits(_rounded_down(drag), _rounded_down(inertia))
     return Entry(velocity.kind, velocity.alpha if isinstance(velocity, Ewma) else None, period_s, delay, limits)
 
 
-def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) -> float:
+def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, unaltered: bool) -> float:
     """Return the limit of drag: a share of the boundary, less where that is noisy or the filter may be mistaken.
 
     The raw difference passes a count of the encoder on whole, EWMA as `_weight` says.
     """
     fast = period_s < NOMINAL_S
-    share = FELT_SHARE if felt else FAST_SHARE if fast else SHARE
+    share = UNALTERED_SHARE if unaltered else FAST_SHARE if fast else SHARE
     limits = [share * boundary_nspm(velocity, period_s, delay)]
-    if felt:
-        limits.append(FELT_NSPM)
+    if unaltered:
+        limits.append(UNALTERED_NSPM)
     if fast:
         limits.append(FAST_KALMAN_NSPM if isinstance(velocity, Kalman) else FAST_NSPM)
     if not isinstance(velocity, Kalman):
@@ -135,8 +135,8 @@ def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, felt: bool) 
     else:
         wrong = (it for it in (delay - 1, delay + 1) if it <= MOST_DELAY)
         limits += [boundary_nspm(velocity, period_s, it, believed=delay) for it in wrong]
-        limits.append(FELT_SHARE * boundary_nspm(Ewma(), period_s, delay))
-        if not felt and not fast:
+        limits.append(UNALTERED_SHARE * boundary_nspm(Ewma(), period_s, delay))
+        if not unaltered and not fast:
             return KALMAN_SHARE * min(limits)
     return min(limits)
 

@@ -65,12 +65,7 @@ def time_devices(
     ending: threading.Event,
     progress: Callable[[str], object] = lambda _line: None,
 ) -> tuple[DeviceLateness, ...]:
-    """Return how late ticks begin with each device.
-
-    Parameters
-    ----------
-    names : of the devices, the scripted hand first
-    ending : is set by whoever wants no more
+    """Return how late ticks begin with each of the devices ``names``, the scripted hand first.
 
     Raises
     ------

@@ -120,13 +120,8 @@ class Ticks(NamedTuple):
     overruns: int
 
 
-class Timer(Protocol):
-    """A timer of the windows' thread: calls ``fire`` every ``period_ms`` until it has done so ``count`` times.
-
-    Returns the time at which it was started, by ``time.monotonic_ns``.
-    """
-
-    def __call__(self, period_ms: int, count: int, fire: Callable[[], object]) -> int: ...  # noqa: D102
+Timer: TypeAlias = Callable[[int, int, Callable[[], object]], int]
+"""Calls a function every so many milliseconds and so many times, and returns its start by ``time.monotonic_ns``."""
 
 
 class Loop(Protocol):
@@ -250,7 +245,7 @@ class ThreadLoop:
                 deadline_ns += PERIOD_NS * max(1, (ended_ns - deadline_ns) // PERIOD_NS)
 
         _in_a_thread(take)
-        return taken(start_ns, times)
+        return ticks_at(start_ns, times)
 
 
 class QtLoop:
@@ -272,10 +267,10 @@ class QtLoop:
             self.tick()
             times.append((began_ns, time.monotonic_ns()))
 
-        return taken(self._timer(PERIOD_NS // 1_000_000, ticks + LEAD_IN, fire), times)
+        return ticks_at(self._timer(PERIOD_NS // 1_000_000, ticks + LEAD_IN, fire), times)
 
 
-def taken(start_ns: int, times: Sequence[tuple[int, int]]) -> Ticks:
+def ticks_at(start_ns: int, times: Sequence[tuple[int, int]]) -> Ticks:
     """Return the lateness of ticks that began and ended at ``times`` [ns], a deadline every millisecond from a start.
 
     After each tick the deadlines that it ran past are passed over, but for the last; one that comes early is not late.
@@ -464,12 +459,8 @@ def timing(
 ) -> Timed:
     """Time all loops for ``seconds`` each, in turn, and return what was found.
 
-    Parameters
-    ----------
-    load : what else is to go on; "gui" and "gui+cpu" need ``windows``
-    windows : the windows' thread; None: no Qt here, so no timer of its either
-    spin_us : how long before a deadline servo and bare loop look at the clock; default: the system's own
-    ending : is set by whoever wants no more; what is under way is finished
+    ``windows`` is the windows' thread, None where there is no Qt. Servo and bare loop poll the clock for ``spin_us``
+    before a deadline; default: the system's own. ``ending`` set by another thread ends the measurement.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from study_app import figure_style as style
-from study_app.evidence.table import Evidence, Table, plot_files
+from study_app.evidence.table import Evidence, Table, duration, plot_files
 from study_app.evidence.timing.measurement import LATE_NS, NAMES, PERCENTILES, Kind, LoopTiming, Timed
 from study_app.haptics.runtime.clocks.grants import Level
 
@@ -116,7 +116,7 @@ def _panel(axes: Axes, found: Timed, level: Level, highest_us: float, *, first: 
     axes.axvline(LATE_NS * 1e-3, color=style.ZERO, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
     axes.annotate("1 ms", (LATE_NS * 1e-3, 1.3), (2, -1), textcoords="offset points", va="top", fontsize=6.6)
     axes.xaxis.set_major_locator(FixedLocator([10.0**power for power in range(0, 8)]))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda us, _: _duration(us)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda us, _: duration(1e3 * us)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g} %"))
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.minorticks_off()
@@ -141,14 +141,6 @@ def _tails(axes: Axes, loops: list[LoopTiming], least: float) -> None:
             clip_on=False,
             zorder=8 + look["zorder"],
         )
-
-
-def _duration(us: float) -> str:
-    """Return a time on the axis: 10 µs, 1 ms, 1 s."""
-    for unit, size in (("s", 1e6), ("ms", 1e3)):
-        if us >= size:
-            return f"{us / size:g} {unit}"
-    return f"{us:g} µs"
 
 
 BEGIN: Final = "<!-- timing: printed by liquid-study timing --to DIR -->"

@@ -15,7 +15,7 @@ from study_app.store.output_files import write_files
 from study_app.store.tables.csv_files import csv_text_of
 
 COLUMNS: Final = ("t_s", *(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz"))
-CURVE_COLUMNS: Final = (*FLOW_CURVE, "fitted_pa", "residual_pa")
+CURVE_COLUMNS: Final[tuple[str, ...]] = (*FLOW_CURVE, "fitted_pa", "residual_pa")
 
 
 def text(found: Estimates) -> str:

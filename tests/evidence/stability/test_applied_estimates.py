@@ -17,13 +17,13 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="many th
 HELD = parse("liquid=dense scale=3 hand=middle speed_mps=0.3 motion=sine")
 
 
-@pytest.mark.parametrize("planted", [0.4, 2.5])
-def test_an_estimate_is_applied_in_a_stable_loop_which_stays_so(planted: float) -> None:
-    found = judge_applied(AppliedCase(HELD, planted))
+@pytest.mark.parametrize("factor", [0.4, 2.5])
+def test_an_estimate_is_applied_in_a_stable_loop_which_stays_so(factor: float) -> None:
+    found = judge_applied(AppliedCase(HELD, factor))
     assert found.stable_before
     assert found.reasons == {"estimated": (), "to and fro": ()}
     assert found.identified
-    assert found.last["estimated"] == pytest.approx(0.47 * planted, rel=0.02)
+    assert found.last["estimated"] == pytest.approx(0.47 * factor, rel=0.02)
     assert found.steps["to and fro"] > 20
     assert not found.harmed
 
@@ -34,7 +34,7 @@ def test_a_value_that_jumps_is_found_out(monkeypatch: Any) -> None:
     found = judge_applied(AppliedCase(HELD, 1.0))
     assert found.harmed
     assert "force" in found.reasons["estimated"]
-    assert f"unstable: planted=1 {HELD}" in evidence([found]).text
+    assert f"unstable: factor=1 {HELD}" in evidence([found]).text
 
 
 @pytest.mark.nightly

@@ -21,7 +21,7 @@ from study_app.evidence.timing.measurement import (
     PlayedHand,
     Timed,
     granted,
-    taken,
+    ticks_at,
     timing,
 )
 from study_app.evidence.timing.report import BEGIN, END, evidence
@@ -69,7 +69,7 @@ def after(*milliseconds):
 
 
 def test_a_tick_that_comes_late_is_late_by_all_of_it_and_passes_deadlines_over():
-    late = taken(0, after(1, 5.4, 6))
+    late = ticks_at(0, after(1, 5.4, 6))
     assert late.lateness_ns.tolist() == [0, 3_400_000, 1_000_000]
     assert late.overruns == 2
     assert late.busy_ns.tolist() == [10_000] * 3
