@@ -169,15 +169,11 @@ def steady(scene: Scene) -> Truth | None:
         motion = along_x(t_s, t_s * speed_mps, np.full(2, speed_mps))
         cases.append(Case(motion, vectors_x(np.full(2, -force_n)), np.array([False, True])))
     between = f"Re {known[0] * per_mps:.2g} to {known[-1] * per_mps:.2g}"
-    scatter = f", which lie up to {100 * _above_oseen():.0f} % above Oseen's law of slow flow"
+    slow = [(reynolds, drag) for reynolds, drag in DRAG_POINTS if reynolds < OSEEN_REYNOLDS]
+    above = max(drag * reynolds / 24 / (1 + 3 / 16 * reynolds) - 1 for reynolds, drag in slow)  # C_d of Oseen 1910
+    scatter = f", which lie up to {100 * above:.0f} % above Oseen's law of slow flow"
     low = scatter if known[0] * per_mps < OSEEN_REYNOLDS else ""
     return Truth("steady drag", f"experiments with spheres, {between}{low}", tuple(cases))
-
-
-def _above_oseen() -> float:
-    """Return by what share the slow points exceed C_d = 24/Re (1 + 3/16 Re) at most (Oseen 1910)."""
-    slow = [(reynolds, drag) for reynolds, drag in DRAG_POINTS if reynolds < OSEEN_REYNOLDS]
-    return max(drag * reynolds / 24 / (1 + 3 / 16 * reynolds) - 1 for reynolds, drag in slow)
 
 
 def oscillation(scene: Scene) -> Truth:

@@ -26,7 +26,7 @@ from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws import Law
 from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.motion import Floats, Motion
-from study_app.haptics.model.scene import Effect, Estimator, Ewma, Given, Raw, Scene
+from study_app.haptics.model.scene import Effect, Ewma, Given, Raw, Scene
 from study_app.haptics.model.slope_limits import DampingLimits
 from study_app.haptics.runtime.pack import Model, pack
 
@@ -362,7 +362,9 @@ def numerical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
             slower = exact.model_copy(update={"rate_hz": scene.rate_hz / every})
             hertz = f"{slower.rate_hz:g} Hz"
             candidates.append(Candidate(f"{program.name}, {hertz}", hertz, "rate", slower, every=every))
-    for estimator in _estimators(scene):
+    own = scene.velocity
+    for kind in (Ewma(), Raw()):
+        estimator = own if not isinstance(own, Given) and own.kind == kind.kind else kind
         name = f"{program.name}, velocity by {estimator.kind} from encoder counts"
         noisy = scene.model_copy(update={"velocity": estimator})
         candidates.append(Candidate(name, f"velocity: {estimator.kind}", "estimator", noisy, counted=True))
@@ -386,13 +388,6 @@ def _lists(exact: Scene) -> list[Candidate]:
         candidates.append(Candidate(f"O(1) wake, resolution {step}", f"resolution {step}", "tick", coarse))
     candidates.append(Candidate("drag alone", "drag alone", "tick", with_effects(exact, "drag")))
     return candidates
-
-
-def _estimators(scene: Scene) -> tuple[Estimator, ...]:
-    """Return one of each kind, the scene's own unchanged."""
-    own = scene.velocity
-    kinds: tuple[Estimator, ...] = (Ewma(), Raw())
-    return tuple(own if not isinstance(own, Given) and own.kind == it.kind else it for it in kinds)
 
 
 def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:

@@ -130,8 +130,11 @@ def accuracy(
         found += real
     progress("timing")
     times = race(tuple(dict.fromkeys(row.candidate for row in measured)), motion, repeats, batches, allowance_s)
-    rows = tuple(replace(row, time=times[row.candidate]) for row in measured)
-    return Accuracy(_with_fronts(rows), tuple(found), tuple(said), machine(), named)
+    measured = [replace(row, time=times[row.candidate]) for row in measured]
+    by_kind = [[row for row in measured if row.kind == kind] for kind in ("numerical", "physical")]
+    fronts = {candidate for rows in by_kind for candidate in front(worst(rows))}
+    rows = tuple(replace(row, on_front=row.candidate in fronts) for row in measured)
+    return Accuracy(rows, tuple(found), tuple(said), machine(), named)
 
 
 def _physical_truths(scene: Scene, notes: list[str]) -> tuple[Truth, ...]:
@@ -255,9 +258,3 @@ def front(points: dict[Candidate, Row]) -> tuple[Candidate, ...]:
 
     best = [row for row in points.values() if not any(beats(other, row) for other in points.values())]
     return tuple(row.candidate for row in sorted(best, key=lambda row: row.ns_per_ms))
-
-
-def _with_fronts(rows: tuple[Row, ...]) -> tuple[Row, ...]:
-    kinds = {kind: [row for row in rows if row.kind == kind] for kind in ("numerical", "physical")}
-    on_it = {candidate for of in kinds.values() for candidate in front(worst(of))}
-    return tuple(replace(row, on_front=row.candidate in on_it) for row in rows)

@@ -252,17 +252,8 @@ def cases() -> tuple[Case, ...]:
     return tuple(found)
 
 
-def training_cases() -> tuple[Case, ...]:
-    """Return the motions of `TRAINING`."""
-    return _by_reynolds(TRAINING)
-
-
-def held_out_cases() -> tuple[Case, ...]:
-    """Return the motions of `HELD_OUT`."""
-    return _by_reynolds(HELD_OUT)
-
-
-def _by_reynolds(motions: Sequence[tuple[VelocityProfile, str, float]]) -> tuple[Case, ...]:
+def cases_of(motions: Sequence[tuple[VelocityProfile, str, float]]) -> tuple[Case, ...]:
+    """Return the cases of motions by profile, liquid and Reynolds number."""
     found = []
     for profile, liquid_id, reynolds in motions:
         one = _case(liquid_id, 1e-3)

@@ -16,7 +16,7 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.evidence.cfd.flow import ORDER, Flow, Grid, library
-from study_app.evidence.cfd.solved_cases import Case, cases, held_out_cases, training_cases
+from study_app.evidence.cfd.solved_cases import HELD_OUT, TRAINING, Case, cases, cases_of
 from study_app.evidence.cfd.stored_flows import (
     HELD_OUT_FOLDER,
     MOTION,
@@ -62,8 +62,8 @@ def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tupl
         folder / f"{case.name}.csv": executor.submit(_solved, case, *grids)
         for some, folder, grids in (
             (cases(), to, (GRID, COARSE)),
-            (training_cases(), to / TRAINING_FOLDER, (BOTH_WAYS, BOTH_WAYS_COARSE)),
-            (held_out_cases(), to / HELD_OUT_FOLDER, (BOTH_WAYS, BOTH_WAYS_COARSE)),
+            (cases_of(TRAINING), to / TRAINING_FOLDER, (BOTH_WAYS, BOTH_WAYS_COARSE)),
+            (cases_of(HELD_OUT), to / HELD_OUT_FOLDER, (BOTH_WAYS, BOTH_WAYS_COARSE)),
         )
         for case in some
     }

@@ -137,16 +137,14 @@ def stored_materials(folder: Traversable | None = None) -> dict[str, Floats]:
     return read((folder or package()) / FILE, COLUMNS).columns
 
 
-def law_drag(flow_index: float, bingham: float) -> float:
-    """Return the drag by the law of the servo, in the units of the table."""
-    liquid = HerschelBulkley(yield_stress_pa=bingham, consistency_pa_sn=1.0, flow_index=flow_index)
-    return sum(creeping_n(liquid, 1.0, 1.0)) / (3 * math.pi)
-
-
 def errors(columns: dict[str, Floats]) -> Floats:
     """Return the law's error (n,) as a share of the solver's drag."""
-    pairs = zip(columns["flow_index"].tolist(), columns["bingham"].tolist(), strict=True)
-    found: Floats = np.array([law_drag(*pair) for pair in pairs]) / columns["drag"] - 1
+    liquids = [
+        HerschelBulkley(yield_stress_pa=bingham, consistency_pa_sn=1.0, flow_index=index)
+        for index, bingham in zip(columns["flow_index"].tolist(), columns["bingham"].tolist(), strict=True)
+    ]
+    drags = np.array([sum(creeping_n(liquid, 1.0, 1.0)) / (3 * math.pi) for liquid in liquids])
+    found: Floats = drags / columns["drag"] - 1
     return found
 
 

@@ -85,11 +85,11 @@ class SoakResult:
     @property
     def findings(self) -> tuple[str, ...]:
         """What is wrong, a sentence each; empty where nothing is."""
-        checks = (*self._promises(), *self._residues(), *self._sums())
+        checks = (*self._limits(), *self._sums())
         return tuple(sentence for sentence, wrong in checks if wrong)
 
-    def _promises(self) -> Iterator[tuple[str, bool]]:
-        """Yield what no sample and no written force may break."""
+    def _limits(self) -> Iterator[tuple[str, bool]]:
+        """Yield the limits of samples, written forces and drift, each with whether it is broken."""
         counts, device = self.counts, self.device
         first = f", first at tick {counts.first_tick}"
         yield f"{counts.excess} forces above the limit of {counts.limit_n:g} N{first}", counts.excess > 0
@@ -106,10 +106,7 @@ class SoakResult:
         yield f"{counts.accepted} implausible readings accepted{first}", counts.accepted > 0
         yield f"the clock is off its ticks by up to {counts.drift_ns} ns{first}", counts.drift_ns > 0
         yield f"the last force written is {device.last_n.tolist()} N, not zero", bool(device.last_n.any())
-
-    def _residues(self) -> Iterator[tuple[str, bool]]:
-        """Yield what must not build up; a number that is none counts as too much."""
-        drift, rests = self.drift.worst, self.rests
+        drift, rests = self.drift.worst, self.rests  # what must not build up; NaN counts as too much
         yield f"the wake is off its definition by {drift:.2g} of Σ|e|/S", not drift <= MOST_DRIFT
         yield f"a wake of {rests.wake_mps:.2g} m/s is left after a rest", rests.wake_mps != 0.0
         yield f"a force of {rests.force_n:.2g} N is left after a rest", not rests.force_n <= MOST_RESIDUE_N

@@ -174,7 +174,10 @@ class Soak:
         self._lasting = [name for name in self._names if wake_of(self._scenes[name])] or self._names
         self._rate_hz = next(iter(self._scenes.values())).rate_hz
         self.hours, self.virtual, self.seed = hours, virtual, seed
-        self.ticks = ticks_of(hours, self._rate_hz)
+        fewest = FEWEST_TICKS / self._rate_hz / 3600
+        if not fewest <= hours <= MOST_HOURS:
+            raise StudyError(f"a soak lasts {fewest:.2g} to {MOST_HOURS:g} hours, not {hours:g}")
+        self.ticks = round(hours * 3600 * self._rate_hz)
         self._draw = Random(seed).random  # noqa: S311 - faults keep no secrets
         clock = VirtualClock() if virtual else SystemClock()
         hand = RestlessHand(Random(seed + 1))  # noqa: S311
@@ -374,14 +377,6 @@ class Soak:
 def _size(vector: Floats) -> float:
     """Return the length of (3,), infinite where it is not finite."""
     return float(np.nan_to_num(np.linalg.norm(vector), nan=np.inf))
-
-
-def ticks_of(hours: float, rate_hz: float) -> int:
-    """Return how many ticks a soak takes."""
-    fewest = FEWEST_TICKS / rate_hz / 3600
-    if not fewest <= hours <= MOST_HOURS:
-        raise StudyError(f"a soak lasts {fewest:.2g} to {MOST_HOURS:g} hours, not {hours:g}")
-    return round(hours * 3600 * rate_hz)
 
 
 def soak(

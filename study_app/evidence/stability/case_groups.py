@@ -168,7 +168,12 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     devices = min(DEVICE_CASES, count or DEVICE_CASES)
     by_device = _half_damper("velocity measured by the device", devices, seed, {**light, **MEASURED})
     fewer = min(KALMAN_CASES, count or KALMAN_CASES)
-    return (*found, by_device, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
+    again = (Group("first plant", sweep(seed)), *found)
+    by_kalman = [
+        Group(f"kalman: {name}", tuple(dataclasses.replace(case, estimator="kalman") for case in some(cases, fewer)))
+        for name, cases in again
+    ]
+    return (*found, by_device, *by_kalman)
 
 
 def _of_liquids(
@@ -191,12 +196,6 @@ def _half_damper(name: str, count: int, seed: str, choices: Mapping[str, tuple[A
     return Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
 
 
-def _with_kalman(group: Group, count: int) -> Group:
-    """Return some cases of a group with the Kalman filter in place of their estimators."""
-    cases = (dataclasses.replace(case, estimator="kalman") for case in some(group.cases, count))
-    return Group(f"kalman: {group.name}", tuple(cases))
-
-
 def some(cases: Sequence[Case], count: int | None) -> tuple[Case, ...]:
     """Return ``count`` of the cases, spread over all of them: the same in every run."""
     if count is None or count >= len(cases):
@@ -214,10 +213,6 @@ def _believing(less: int) -> Callable[[Case], Case | None]:
     return change
 
 
-def _slowing(case: Case) -> Case | None:
-    return dataclasses.replace(case, slows_to=case.delay + 1) if case.delay < 4 else None
-
-
 def _measuring(less: int) -> Callable[[Case], Case | None]:
     """Return what makes a loop begin with such a belief, and the device measure its delay."""
 
@@ -231,7 +226,9 @@ def _measuring(less: int) -> Callable[[Case], Case | None]:
 CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
     "delay believed one tick too short": _believing(1),
     "delay believed one tick too long": _believing(-1),
-    "device slower by a tick from 0.5 s on": _slowing,
+    "device slower by a tick from 0.5 s on": lambda case: (
+        dataclasses.replace(case, slows_to=case.delay + 1) if case.delay < 4 else None
+    ),
     "delay two ticks too short, measured": _measuring(2),
     "delay three ticks too short, measured": _measuring(3),
     "10 % of samples lost": lambda case: dataclasses.replace(case, lost=0.1),

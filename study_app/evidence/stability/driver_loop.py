@@ -92,7 +92,8 @@ def judge_driven(case: Case) -> Verdict:
     falcon = opened_falcon()
     falcon.renew()
     dynamics = falcon.dynamics
-    trace = falcon_trace(case, falcon)
+    trace = _trace(case, falcon, falcon.hand, dynamics)
+    trace.acting_n[:-1] = trace.acting_n[1:]  # of the handle, which keeps what acted up to the present
     if not (np.isfinite(trace.sent_n).all() and np.isfinite(trace.position_m).all()):
         return not_finite(case, trace, safe=True)
     others = scripted_traces(case, dynamics)
@@ -116,13 +117,6 @@ def judge_driven(case: Case) -> Verdict:
         fast_n - scripted_n > RESTLESS_N,
     )
     return Verdict(case, True, reasons, balance_j, permitted_j, swing_mps, fast_n, scripted_n, acted(trace))
-
-
-def falcon_trace(case: Case, falcon: _Falcon) -> Any:
-    """Return the trace of a case on the Falcon."""
-    trace = _trace(case, falcon, falcon.hand, falcon.dynamics)
-    trace.acting_n[:-1] = trace.acting_n[1:]  # of the handle, which keeps what acted up to the present
-    return trace
 
 
 def scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:

@@ -20,7 +20,6 @@ from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.evidence.table import Evidence, Table
 from study_app.evidence.thresholds.known_values import KnownThreshold, known_value
 from study_app.protocol.load import load
-from study_app.protocol.model import Protocol
 from study_app.protocol.simulated import NO_FEATURES, Observer, Rater, normal, rate, rater
 from study_app.protocol.streams import Draw, stream
 from study_app.protocol.trials.stimuli import LINEAR_OBSERVER
@@ -106,19 +105,15 @@ def rated(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: 
 
     People keep their distances from the mean criterion [s]; the noise is the same for every criterion.
     """
-    delays_ms = delays_of(load(LIKERT))
+    protocol = load(LIKERT)
+    (block,) = (one for one in protocol.main_blocks if protocol.compared_in(one.id) == "delays")
+    delays_ms = sorted(protocol.conditions[name].delay_ms for name in block.conditions)
     answers = []
     for number, person in enumerate(people, start=1):
         draw = stream(seed, f"noticed/ratings/{number}").random
         own = replace(person.rater, threshold_s=person.rater.threshold_s - MEAN_CRITERION_S + criterion_s)
         answers.append([_rating(replace(person, rater=own), ms / 1000 - adapted_s, draw) for ms in delays_ms])
     return Rated(criterion_s, adapted_s, noticed(np.array(answers, float), delays_ms))
-
-
-def delays_of(protocol: Protocol) -> tuple[float, ...]:
-    """Return the delays of the block whose statements ask for them, ascending [ms]."""
-    (block,) = (one for one in protocol.main_blocks if protocol.compared_in(one.id) == "delays")
-    return tuple(sorted(protocol.conditions[name].delay_ms for name in block.conditions))
 
 
 def _rating(person: Person, delay_s: float, draw: Draw) -> int:

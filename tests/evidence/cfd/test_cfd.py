@@ -26,7 +26,7 @@ from tests.haptics.scenes import COMPILED as IS_COMPILED
 COMPILED = pytest.mark.skipif(not IS_COMPILED, reason="fits need the compiled tick")
 PACKAGE = resources.files("study_app.evidence.cfd")
 NAMES = tuple(it.name for it in solved_cases.cases())
-CASES = (*solved_cases.cases(), *solved_cases.training_cases(), *solved_cases.held_out_cases())
+CASES = (*solved_cases.cases(), *solved_cases.cases_of((*solved_cases.TRAINING, *solved_cases.HELD_OUT)))
 COARSE = flow.Grid(ahead=15, behind=30, aside=15, ball=0.2, near=0.8, far=6)
 
 
