@@ -21,8 +21,16 @@ from study_app.evidence.reference_model import (
     respond,
     unsteady_n,
 )
-from study_app.evidence.reference_solutions import COUNT_M, CYCLES, ROUNDING, Case, Truth, error_of, stroke
-from study_app.evidence.scene_variants import with_effects
+from study_app.evidence.reference_solutions import (
+    COUNT_M,
+    CYCLES,
+    ROUNDING,
+    Case,
+    Truth,
+    error_of,
+    stroke,
+    with_effects,
+)
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, Dynamics
 from study_app.haptics.model.effect import GRAVITY_MPS2
 from study_app.haptics.model.effects.local_wake import LocalWake

@@ -8,16 +8,32 @@ known forces on a real sphere: measured steady drag and the exact forces of cree
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from study_app.evidence.reference_model import Constants, respond
+from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.laws import Law
 from study_app.haptics.model.motion import Floats, Motion
-from study_app.haptics.model.scene import Liquid, Scene
+from study_app.haptics.model.scene import Effect, Liquid, Scene
 from study_app.lab.identify.measured_force import vectors_x
+
+
+def with_effects(scene: Scene, *effects: Effect, law: Law | None = None) -> Scene:
+    """Return the scene with other effects, and perhaps another law of drag."""
+    changes: dict[str, Any] = {"effects": effects} | ({} if law is None else {"drag": Drag(law=law)})
+    return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update=changes),)})
+
+
+def without_buoyancy(scene: Scene) -> Scene:
+    """Return the scene with its liquid's other effects, named."""
+    scene = resolve(scene)
+    return with_effects(scene, *(name for name in scene.liquids[0].effects if name != "buoyancy"))
+
 
 RADIUS_M: Final = 0.03
 TURNS: Final = 1.5

@@ -149,13 +149,7 @@ def take_turns(
 def paced(
     seconds: float, every_s: float, *, ending: threading.Event, progress: Callable[[str], object]
 ) -> Iterator[int]:
-    """Yield 0, 1, 2 … for so many seconds, with a pause after each, and report each per cent once.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        ``ending`` was set.
-    """
+    """Yield 0, 1, 2 … for so many seconds, with a pause after each, and report each per cent once."""
     began_s, shown, number = time.monotonic(), -1, 0
     while (share := (time.monotonic() - began_s) / seconds) < 1:
         if ending.is_set():

@@ -12,8 +12,7 @@ from typing import Any, ClassVar, Final, Literal, TypeAlias
 import numpy as np
 
 from study_app.evidence.reference_model import unsteady_n
-from study_app.evidence.reference_solutions import COUNT_M, Truth
-from study_app.evidence.scene_variants import _only, with_effects, with_wake
+from study_app.evidence.reference_solutions import COUNT_M, Truth, with_effects
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.effects.drag import resistance
 from study_app.haptics.kernels.effects.wake import REST_MPS, response
@@ -26,7 +25,7 @@ from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws import Law
 from study_app.haptics.model.layout import SAMPLE, Record, records
 from study_app.haptics.model.motion import Floats, Motion
-from study_app.haptics.model.scene import Effect, Ewma, Given, Raw, Scene
+from study_app.haptics.model.scene import Effect, Everywhere, Ewma, Given, Raw, Scene
 from study_app.haptics.model.slope_limits import DampingLimits
 from study_app.haptics.runtime.pack import Model, pack
 
@@ -337,6 +336,18 @@ _INITIALS: dict[Law, str] = {
     "haider-levenspiel": "HL",
     "brown-lawler": "BL",
 }
+
+
+def with_wake(scene: Scene, **changes: Any) -> Scene:
+    """Return the scene with other parameters of its wake."""
+    wake = scene.liquids[0].wake.model_copy(update=changes)
+    return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update={"wake": wake}),)})
+
+
+def _only(scene: Scene, liquid: Any) -> Scene:
+    """Return the scene with one liquid, that is everywhere and does not flow by itself."""
+    alone = liquid.model_copy(update={"region": Everywhere(), "current": None})
+    return scene.model_copy(update={"liquids": (alone,)})
 
 
 def drag_and_wake(scene: Scene) -> Scene:

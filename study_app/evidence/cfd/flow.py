@@ -51,11 +51,6 @@ def library() -> Any:
     """Import NGSolve.
 
     Its algebra is kept to one thread: on matrices as small as these more make it ten times slower on busy cores.
-
-    Raises
-    ------
-    StudyError
-        It is not installed.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
@@ -84,13 +79,7 @@ class Flow:
         self._stream = self._one_on("ahead|aside")
 
     def steady(self, reynolds: Sequence[float]) -> list[float]:
-        """Return C_d at rising Reynolds numbers, each found by Newton's method from the one before.
-
-        Raises
-        ------
-        StudyError
-            No steady flow was found.
-        """
+        """Return C_d at rising Reynolds numbers, each found by Newton's method from the one before."""
         ng = self._ng
         flow, residual, step = ng.GridFunction(self._space), self._zeros(), self._zeros()
         flow.vec.data = self._stream
@@ -117,11 +106,6 @@ class Flow:
         """Return the force along the stream at ``times`` (n,) [ρU²D²], for a stream at rest until the first of them.
 
         Without ``convection`` the flow creeps.
-
-        Raises
-        ------
-        StudyError
-            The steps are too long for the grid: the flow blew up.
         """
         ng = self._ng
         stokes, mass = (ng.BilinearForm(self._space) for _ in range(2))

@@ -92,13 +92,7 @@ held_out: Final = partial(stored, of=HELD_OUT_FOLDER)
 
 
 def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
-    """Return the constants of unsteady drag fitted without a motion, by the name of its case; often none.
-
-    Raises
-    ------
-    StudyError
-        The file cannot be understood.
-    """
+    """Return the constants of unsteady drag fitted without a motion, by the name of its case; often none."""
     file = (folder or package()) / LEFT_OUT_FILE
     if not file.is_file():
         return {}

@@ -41,25 +41,13 @@ class Listener:
         )
 
     def ready(self) -> None:
-        """Wait until it receives.
-
-        Raises
-        ------
-        WorkerError
-            It does not.
-        """
+        """Wait until it receives."""
         assert self._process.stdout is not None  # noqa: S101 - asked for above
         if self._process.stdout.readline() != "ready\n":
             raise WorkerError(f"the listener receives nothing: {self._process.communicate()[1].strip()}")
 
     def end(self) -> Any:
-        """End the listener and return what it received.
-
-        Raises
-        ------
-        WorkerError
-            It ended before.
-        """
+        """End the listener and return what it received."""
         said, error = self._process.communicate(timeout=PATIENCE_S)
         if self._process.returncode != 0:
             raise WorkerError(f"the listener ended: {error.strip()}")

@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from study_app.evidence.scene_variants import without_buoyancy
+from study_app.evidence.reference_solutions import without_buoyancy
 from study_app.evidence.stability.bench import Bench, law_along, sine_path
 from study_app.evidence.stability.case_groups import peak_mps
 from study_app.evidence.stability.stability_cases import DAMPER, FIRST, LETS_GO, SECOND, SINE, Case, scene_of, scenes

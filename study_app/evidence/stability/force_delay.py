@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.evidence.scene_variants import without_buoyancy
+from study_app.evidence.reference_solutions import without_buoyancy
 from study_app.evidence.stability.bench import Bench, sine_path
 from study_app.evidence.stability.stability_cases import Case, scene_of, scenes
 from study_app.evidence.table import Evidence, Table, run

@@ -23,8 +23,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 
 from study_app.evidence.cost import TickTimer
-from study_app.evidence.reference_solutions import along_x
-from study_app.evidence.scene_variants import without_buoyancy
+from study_app.evidence.reference_solutions import along_x, without_buoyancy
 from study_app.evidence.stability.bench import Bench, fast_part, law_along, sine_path
 from study_app.evidence.stability.damping_limits import boundary_nspm
 from study_app.evidence.stability.stability_cases import Case, scenes

@@ -254,13 +254,7 @@ def value_words(estimate: Estimate, name: str) -> tuple[str, str]:
 
 
 def rate_of(rows: Rows) -> float:
-    """Return the rate of rows [Hz].
-
-    Raises
-    ------
-    StudyError
-        The rate is too low.
-    """
+    """Return the rate of rows [Hz]."""
     rate_hz = 1 / float(np.median(np.diff(rows.t_s)))
     if rate_hz < _SLOWEST_HZ:
         raise StudyError(f"the force comes at {rate_hz:.3g} rows per second: measure at least {_SLOWEST_HZ:g}")

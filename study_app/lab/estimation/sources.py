@@ -187,13 +187,7 @@ class GrowingCsv:
 
 
 def numbers_in(path: Path, number: int, line: str, places: list[int]) -> list[float]:
-    """Return the numbers at these places of a line of a CSV file.
-
-    Raises
-    ------
-    StudyError
-        The line has too few fields, or one is not a finite number.
-    """
+    """Return the numbers at these places of a line of a CSV file."""
     fields = next(csv.reader([line]))
     if len(fields) <= max(places):
         raise StudyError(f"{path}, line {number}: has {len(fields)} fields, fewer than the header names")

@@ -73,13 +73,7 @@ def _narrowed(it: Parameter, table: BaseModel, fitted: Sequence[Parameter]) -> P
 
 
 def replace(scene: Scene, liquid_id: str, parameters: Sequence[Parameter], values: Sequence[float]) -> Scene:
-    """Return the scene with new values; those of whole numbers are rounded.
-
-    Raises
-    ------
-    StudyError
-        Values that the scene does not permit.
-    """
+    """Return the scene with new values; those of whole numbers are rounded."""
     tree = scene.model_dump()
     for parameter, value in zip(parameters, values, strict=True):
         rows = [tree["body"]] if parameter.table == "body" else [it for it in tree["liquids"] if it["id"] == liquid_id]

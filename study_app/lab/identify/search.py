@@ -179,11 +179,6 @@ class ForceProblem(Problem):
     """The force along a measured motion.
 
     ``axes`` are the axes of the force in use: measured or predicted to be nonzero.
-
-    Raises
-    ------
-    StudyError
-        Too little was measured.
     """
 
     alike = 0.95

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study_app.evidence.scene_variants import without_buoyancy
+from study_app.evidence.reference_solutions import without_buoyancy
 from study_app.evidence.stability import velocity as bounds
 from study_app.evidence.stability.stability_cases import scenes
 from study_app.evidence.stability.velocity import wiener_bound
