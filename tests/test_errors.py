@@ -5,7 +5,7 @@ import pickle
 import pytest
 
 from study_app import errors
-from study_app.designer.document.edited_study import Refused
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.participant.playable import NotPlayableError
 from study_app.devices.doctor import DeviceFailure, DeviceFailureNotFound
 from study_app.devices.falcon.boot import BootFailure

@@ -58,7 +58,7 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
     else:
         import time
 
-        from study_app.designer.document.edited_study import read
+        from study_app.designer.document.study import read
         from study_app.designer.measures.participant_texts import to_translate
         from study_app.protocol.source.files import find
         from study_app.store import workstation

@@ -9,7 +9,7 @@ from collections import Counter
 from random import Random
 from typing import Any
 
-from study_app.designer.document.writer.edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, meaning, same
+from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, meaning, same
 from study_app.protocol.source.document import Node, Path, scan
 
 _TOKENS = re.compile(

@@ -3,9 +3,9 @@
 import pytest
 
 from study_app.designer.document.additions import added
-from study_app.designer.document.conversions import left_by, switched
-from study_app.designer.document.edited_study import Study, read
-from study_app.designer.document.initial_values import initial
+from study_app.designer.document.changes import left_by, switched
+from study_app.designer.document.fields import initial
+from study_app.designer.document.study import Study, read
 from study_app.designer.new_study.new_study import template
 from tests.authoring.grown import PROTOCOLS
 

@@ -4,11 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from study_app.designer.document.edited_study import read
 from study_app.designer.document.fields import rows
-from study_app.designer.document.undo_stack import History
-from study_app.designer.document.writer.edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.study import History, read
+from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset
+from study_app.designer.document.toml_text import Refused
 from study_app.errors import ProtocolError
 from study_app.protocol.load import load, parse, shipped
 from tests.authoring.grown import PROTOCOLS

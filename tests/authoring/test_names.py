@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.edited_study import Study, read
 from study_app.designer.document.names import (
     check_id,
     choices_at,
@@ -16,7 +15,8 @@ from study_app.designer.document.names import (
     renamed,
     with_references,
 )
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.study import Study, read
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.new_study.templates import FOLDER
 from study_app.ids import MAX_ID
 from study_app.protocol.orders.schedule import build_schedule

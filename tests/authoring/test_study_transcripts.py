@@ -7,13 +7,12 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.additions import number_rows
 from study_app.designer.document.fields import Row, row_at, rows
 from study_app.designer.document.fragments import copied
-from study_app.designer.document.series import number_rows
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.study import Study, read
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.outline.addable import addable
-from study_app.designer.place.edit_steps import Steps
 from study_app.designer.place.requests import (
     AddElement,
     AddEntry,
@@ -34,6 +33,7 @@ from study_app.designer.place.requests import (
     SwitchKey,
     SwitchKind,
 )
+from study_app.designer.place.steps import Steps
 from study_app.protocol.source.document import Path, entries
 from tests.authoring.grown import PROTOCOLS
 from tests.golden import compare

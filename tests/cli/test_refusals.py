@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from study_app import app
 from study_app.cli import commands, main
 from study_app.cli.devices import _ask_operator
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.toml_text import Refused
 from study_app.errors import OutletError, ProtocolError, StudyError
 from study_app.evidence.accuracy import survey
 from study_app.evidence.table import Evidence

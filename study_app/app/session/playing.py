@@ -21,7 +21,7 @@ from study_app.designer.participant.play import PlayDevices, PlayState
 from study_app.designer.participant.playable import NotPlayableError, Playable, playable
 from study_app.designer.participant.shown_step import StepPosition
 from study_app.designer.place.controller import DesignerController
-from study_app.designer.problems.problem_rows import problem_rows
+from study_app.designer.problems.problems import problem_rows
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError, StudyError
 from study_app.gui.kit.workstation import settings_here

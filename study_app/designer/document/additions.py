@@ -1,20 +1,202 @@
-"""New elements with the keys that check requires and valid initial values; only their texts remain to be written."""
+"""New elements with all that ``check`` requires, copies and series of them, and repairs of faults."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from study_app.designer.document.edited_study import Study
-from study_app.designer.document.fields import label_of, row_at, rows
-from study_app.designer.document.initial_values import LETTER, initial, singular
-from study_app.designer.document.names import check_id, sections_at
-from study_app.designer.document.writer.edits import Duplicate, Edit, Insert, Set
-from study_app.designer.document.writer.refused import Refused
-from study_app.designer.problems.repairs import Repair, is_unknown_name, removes, repairs
-from study_app.ids import free_id
+from study_app.designer.document.changes import filled_in
+from study_app.designer.document.fields import (
+    LETTER,
+    Row,
+    initial,
+    label_of,
+    refused_at,
+    row_at,
+    rows,
+    singular,
+    why_not,
+)
+from study_app.designer.document.names import check_id, references_to, sections_at
+from study_app.designer.document.study import Study
+from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Rename, Set, Unset
+from study_app.designer.document.toml_text import Refused
+from study_app.ids import MAX_ID, free_id
+from study_app.number_text import MINUS, exact_text, number_of
+from study_app.protocol.checks.force_limits import paced
 from study_app.protocol.source.document import Path, entries, names, value_at
-from study_app.protocol.source.problems import Fault, rule_of
+from study_app.protocol.source.problems import Fault, rule_of, shown
+from study_app.protocol.wording.languages import language_name
+
+_HALVINGS: Final = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """What a button says, and the edits that it makes as one step."""
+
+    words: str
+    edits: tuple[Edit, ...]
+
+
+def repairs(study: Study, fault: Fault) -> tuple[Repair, ...]:
+    """Return the repairs of a fault: after each of them it is gone."""
+    offered = (repair for kind in _KINDS for repair in kind(study, fault))
+    return (*(repair for repair in offered if removes(study, fault, repair)), *_every_text(study, fault))
+
+
+def removes(study: Study, fault: Fault, repair: Repair) -> bool:
+    """Return whether a fault is gone after a repair, and there are not more than before."""
+    try:
+        after, _ = study.edited(*repair.edits)
+    except Refused:
+        return False
+    known = {(one.path, one.message) for one in study.faults}
+    found = {(one.path, one.message) for one in after.faults}
+    return (fault.path, fault.message) not in found and len(found) <= len(known)
+
+
+def _stated(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the value that the fault states, or the key that was meant; of a wrong sign the number without it."""
+    if fault.use is None:
+        return
+    path, value = fault.use
+    now = value_at(study.document, path)
+    if fault.message == "unknown key":
+        yield Repair(f'Use "{value}"', (Rename(path, value),))
+    elif path != fault.path:
+        words = f"Move to {value:g} mm" if isinstance(path[-1], int) else f"Use {path[-1]} = {shown(value)}"
+        yield Repair(words, (Set(path, value),))
+    elif isinstance(now, int | float) and isinstance(value, int | float) and now < 0 < value:
+        yield Repair(f"Use {shown(-now)}", (Set(path, -now),))
+    else:
+        yield Repair(f"Use {shown(value)}", (Set(path, value),))
+
+
+def is_unknown_name(fault: Fault) -> bool:
+    """Return whether a text names something that is not in the study."""
+    return fault.message.startswith("there is no ")
+
+
+def _missing(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield an initial value for a key that is missing."""
+    if fault.message == "is missing" and fault.path:
+        with suppress(Refused):
+            yield Repair("Add it", (Set(fault.path, initial(study.document, fault.path)),))
+
+
+def _surplus(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the removal of what does not belong there."""
+    message = fault.message
+    if message == "unknown key" or message.endswith("is listed twice") or "belong" in message:
+        yield Repair("Remove", (Unset(fault.path),))
+    if message == "is not a language of the study":
+        yield Repair("Remove this text", (Unset(fault.path),))
+
+
+def _quoted_numbers(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the number that a text holds where a number must be."""
+    text = value_at(study.document, fault.path)
+    number = number_of(text) if isinstance(text, str) and "number" in fault.message else None
+    if number is not None:
+        yield Repair(f"Use {shown(number)} as a number", (Set(fault.path, number),))
+
+
+def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield a copy of the text in the first language, for languages that lack it."""
+    languages = value_at(study.document, ("study", "languages"))
+    text = value_at(study.document, fault.path)
+    if (lacking := fault.missing_language) and isinstance(text, Mapping) and text:
+        first = next(iter(text))
+        words = f"Copy {language_name(first)} to {language_name(lacking)}"
+        yield Repair(words, (Set((*fault.path, lacking), text[first]),))
+    elif fault.in_one_language and isinstance(text, str) and languages:
+        copies = dict.fromkeys(languages, text)
+        yield Repair("Use this text in every language", (Set(fault.path, copies),))
+
+
+def _every_text(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield copies of all texts in the first language that another one lacks; they are too many to be tried out."""
+    lacking = fault.missing_language
+    edits = filled_in(study, lacking) if lacking else ()
+    if lacking and len(edits) > 1 and any(edit.path[: len(fault.path)] == fault.path for edit in edits):
+        yield Repair(f"Copy all {len(edits)} to {language_name(lacking)}", edits)
+
+
+def _steps(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the place in the session that a page or block lacks."""
+    sequence = value_at(study.document, ("sequence",))
+    if fault.message == "comes nowhere in sequence" and isinstance(sequence, tuple):
+        at = max(len(sequence) - 1, 0)
+        yield Repair("Add to the session", (Insert(("sequence", at), fault.path[-1]),))
+
+
+def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield the highest level that is not beyond a limit."""
+    levels = value_at(study.document, fault.path)
+    if fault.path[:1] != ("stimuli",) or fault.path[-1:] != ("levels",) or not isinstance(levels, tuple):
+        return
+    if len(levels) == 2 and all(isinstance(level, int | float) for level in levels):
+        highest = highest_level(study, fault, *levels)
+        if highest is not None:
+            lowered = _lowered(study, str(fault.path[1]), highest)
+            edits = (Set(("methods", name, "levels"), list(own)) for name, own in lowered.items())
+            yield Repair(f"Highest level {shown(highest)}", (Set((*fault.path, 1), highest), *edits))
+
+
+def _lowered(study: Study, stimulus: str, highest: float) -> dict[str, tuple[float, ...]]:
+    """Return the levels that methods of a stimulus list, none above the highest, of those that have one above it.
+
+    A method of another stimulus, too, keeps its levels.
+    """
+    blocks = () if study.formed is None else study.formed.blocks.values()
+    found: dict[str, tuple[float, ...]] = {}
+    for name in {str(block.method) for block in blocks if block.stimulus == stimulus}:
+        own = value_at(study.document, ("methods", name, "levels"))
+        shared = any(block.method == name and block.stimulus != stimulus for block in blocks)
+        if isinstance(own, tuple) and not shared and any(level > highest for level in own):
+            found[name] = tuple(dict.fromkeys(min(level, highest) for level in own))
+    return found
+
+
+def highest_level(study: Study, fault: Fault, low: float, high: float) -> float | None:
+    """Return the highest level, in three digits, without this kind of fault; None where not even ``low`` is."""
+    formed = study.formed
+    if formed is None:
+        return None
+    name = str(fault.path[1])
+
+    def passes(level: float) -> bool:
+        stimulus = formed.stimuli[name].model_copy(update={"levels": (low, level)})
+        lowered = _lowered(study, name, level).items()
+        methods = {one: formed.methods[one].model_copy(update={"levels": own}) for one, own in lowered}
+        changed = formed.model_copy(
+            update={"stimuli": {**formed.stimuli, name: stimulus}, "methods": {**formed.methods, **methods}}
+        )
+        return not any(one.path == fault.path for one in paced(changed))
+
+    least, most = low, high
+    for _ in range(_HALVINGS):
+        middle = (least + most) / 2
+        least, most = (middle, most) if passes(middle) else (least, middle)
+    for digits in (3, 4):
+        step = 10.0 ** _exponent(least, digits)
+        rounded = round(step * int(least / step + 1e-9), 12)
+        if low < rounded and passes(rounded):
+            return int(rounded) if rounded.is_integer() else rounded
+    return None
+
+
+def _exponent(value: float, digits: int) -> int:
+    """Return the power of ten of the last of so many digits."""
+    return int(f"{value:e}".split("e")[1]) - digits + 1
+
+
+_KINDS: Final[tuple[Callable[[Study, Fault], Iterator[Repair]], ...]] = (
+    _stated, _quoted_numbers, _levels, _texts, _steps, _missing, _surplus,
+)  # fmt: skip
+
 
 _ROUNDS: Final = 12
 _KNOWN: Final = re.compile(r"known: (.+)")
@@ -165,3 +347,101 @@ def _put(value: dict[str, Any], path: Path, inner: Any) -> None:
     for step in path[:-1]:
         value = value.setdefault(str(step), {})
     value[str(path[-1])] = inner
+
+
+MOST: Final = 24
+"""Greatest number of values of a series; code letters end at Z."""
+NUMBERS: Final = frozenset({"number", "whole number"})
+"""Kinds of rows with one number."""
+_DEEPEST: Final = 2
+
+
+def number_rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
+    """Return the numbers of an element of which there can be a series, in the order of its form.
+
+    Pages differ only in their texts, so there is no series of them.
+    """
+    section = row_at(document, path[:1])
+    if len(path) != 2 or path[0] == "pages" or section is None or section.kind != "tables":
+        return ()
+    return tuple(_numbers(document, path, _DEEPEST)) if isinstance(value_at(document, path), Mapping) else ()
+
+
+def _numbers(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[Row]:
+    refused = refused_at(document, path)
+    below: list[Path] = []
+    for row in rows(document, path):
+        if row.kind == "table" and isinstance(row.value, Mapping) and deepest > 1:
+            below.append(row.path)
+        elif row.kind in NUMBERS and (row.value is not None or row.path[-1] not in refused):
+            known = isinstance(row.value, int | float) and not isinstance(row.value, bool)
+            yield row if known else replace(row, value=None)
+    for inner in below:
+        yield from _numbers(document, inner, deepest - 1)
+
+
+def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
+    """Return the number of an element that differs in a series.
+
+    Raises
+    ------
+    Refused
+        It is not a number of the element.
+    """
+    found = next((row for row in number_rows(document, path) if row.path == field), None)
+    if found is None:
+        raise Refused("choose a number of this element")
+    return found
+
+
+def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float]) -> None:
+    """Refuse values that copies of an element cannot have.
+
+    Raises
+    ------
+    Refused
+        A value is not permitted, is there twice or is the element's own, or there are none or more than `MOST`.
+    """
+    known = [row.value]
+    for value in values:
+        if why := why_not(document, row, value):
+            raise Refused(f"{exact_text(value)} is not permitted: {row.label} is {why}")
+        if value in known:
+            raise Refused(f"{exact_text(value)} is there twice, or is the value of the original")
+        known.append(value)
+    if not 0 < len(values) <= MOST:
+        raise Refused(f"a series has 1 to {MOST} copies")
+
+
+def copy_with(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[Edit, ...], Path]:
+    """Return the edits that copy an element with another number in its id and titles, and the path of the copy."""
+    word = _word(value)
+    stem = str(path[1]).removesuffix("" if row.value is None else f"_{_word(row.value)}")
+    name = f"{stem[: MAX_ID - len(word) - 1]}_{word}"
+    edits, copy = duplicated(study, path, free_id(names(study.document, str(path[0])), name))
+    titles = (Set((*copy, *place), text) for place, text in titles_with(study.document, path, row, value))
+    return (*edits, Set((*copy, *row.path[2:]), value), *titles), copy
+
+
+def listings(study: Study, path: Path, copy: Path) -> Iterator[Edit]:
+    """Yield the edits that list a copy after its original, in each block that lists the original."""
+    for place in references_to(study.document, path):
+        if place[0] == "blocks" and isinstance(place[-1], int):
+            yield Insert((*place[:-1], place[-1] + 1), copy[1])
+
+
+def titles_with(document: Mapping[str, Any], path: Path, row: Row, value: float) -> Iterator[tuple[Path, str]]:
+    """Yield the titles of a copy below it: the element's number at their end is replaced, else the new one added."""
+    number = re.compile(rf"(?:(?<!\w)[-{MINUS}])?\d+(?:[.,]\d+)?(?=\s*(?:{re.escape(row.unit)})?\s*$)")
+    title = value_at(document, (*path, "title"))
+    for language, text in title.items() if isinstance(title, Mapping) else (("", title),):
+        if isinstance(text, str) and text.strip():
+            last = number.search(text)
+            replaces = last is not None and number_of(last[0]) == row.value
+            new = number.sub(exact_text(value), text) if replaces else f"{text}, {exact_text(value)} {row.unit}"
+            yield ("title", *filter(None, [language])), new.rstrip()
+
+
+def _word(value: float) -> str:
+    """Return a number as a part of an id: "0_5", "minus_60"."""
+    return exact_text(value).replace("-", "minus_").replace(".", "_")[: MAX_ID // 2]

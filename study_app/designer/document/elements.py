@@ -1,17 +1,23 @@
-"""The outline of a study: its session in order, the parts it is made of, and the study itself."""
+"""Elements of a study: the outline, titles, uses, order, and fields found by words."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Final
 
-from study_app.designer.document.edited_study import Study
-from study_app.designer.document.fields import label_of, rows
-from study_app.designer.document.names import named_at
+from study_app.designer.document.fields import Row, counted_elements, label_of, refused_at, row_at, rows, singular
+from study_app.designer.document.names import ITEMS, named_at, uses
+from study_app.designer.document.study import Study
+from study_app.number_text import counted
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, entries, has, value_at
+from study_app.viewmodels.number_words import exact_duration
 
 TITLES: Final = ("title", "short", "text")
 """Keys of texts that an element is called by, the first that it has."""
+FIRST: Final = ("study",)
+"""What is selected where nothing else is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,3 +140,203 @@ def _texts(value: Any) -> Iterator[str]:
     elif isinstance(value, tuple):
         for inner in value:
             yield from _texts(inner)
+
+
+def step_of(document: Mapping[str, Any], path: Path) -> Path | None:
+    """Return the place of an element in the list that orders it: its own entry, or the step that names it."""
+    if path and isinstance(path[-1], int):
+        return path
+    for place, steps in sequences_in(document):
+        for index in range(len(steps)):
+            if named_at(document, (*place, index)) == path:
+                return (*place, index)
+    return None
+
+
+def position_of(document: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
+    """Return the place of an element among its neighbours, from 1, and how many there are; None without an order."""
+    step = step_of(document, path) if len(path) > 1 else None
+    if step is None or not isinstance(step[-1], int):
+        return None
+    return step[-1] + 1, len(value_at(document, step[:-1]))
+
+
+def first_element(document: Mapping[str, Any]) -> Path:
+    """Return what is selected first: the first step of the session, else the study's own table."""
+    steps = ((*place, 0) for place, listed in sequences_in(document) if listed)
+    return next((named for step in steps if (named := named_at(document, step)) is not None), FIRST)
+
+
+USED: Final = frozenset({"liquids", "conditions", "tasks", "questionnaires", "scales", "stimuli", "designs", "methods"})
+"""Sections whose elements other elements use; pages and blocks are steps of the session."""
+
+
+def kind_of(path: Path) -> str:
+    """Return what an element is: "Block"; "" of a table that is the only one of its kind."""
+    if isinstance(path[-1], int):
+        return label_of(singular(path[-2]))
+    return label_of(singular(path[0])) if len(path) > 1 else ""
+
+
+def kind_and_title(document: Mapping[str, Any], path: Path) -> str:
+    """Return "Condition Water"; the title alone where it says what the element is."""
+    kind, title = kind_of(path), title_of(document, path)
+    return title if title.casefold().startswith(kind.casefold()) else f"{kind} {title}"
+
+
+def place_words(path: Path, line: int | None) -> str:
+    """Return a place in the file with its line, if that is known: "blocks.liquids.order · line 385"."""
+    place = ".".join(str(step + 1) if isinstance(step, int) else step for step in path)
+    return " · ".join(filter(None, (place, "" if line is None else f"line {line}")))
+
+
+def brief(document: Mapping[str, Any], path: Path) -> str:
+    """Return how long a task takes, or how many questions a questionnaire has; "" of other elements.
+
+    Parameters
+    ----------
+    document : mapping
+        The study, sound or not.
+    path : tuple of str or int
+        The element.
+    """
+    value = value_at(document, path)
+    if not isinstance(value, Mapping) or len(path) != 2:
+        return ""
+    if path[0] == "questionnaires" and isinstance(items := value.get("items"), tuple | list):
+        return counted(len(items), "question")
+    if path[0] != "tasks":
+        return ""
+    numbers = {key: one for key, one in value.items() if isinstance(one, int | float)}
+    for least, most in (("min_s", "max_s"), ("duration_s", "duration_s")):
+        if least in numbers and most in numbers:
+            return exact_duration(numbers[least], numbers[most])
+    return f"{numbers['count']:g} targets" if "count" in numbers else ""
+
+
+def used_by(document: Mapping[str, Any], path: Path) -> str:
+    """Return how many elements use an element, by its name or as the only one: "used by 3 conditions", "not used".
+
+    It is "" of steps and settings.
+    """
+    if len(path) != 2 or path[0] not in USED:
+        return ""
+    users = {_user(place) for place, used in uses(document) if used == path} - {path}
+    counts = Counter(user[-2] for user in users)
+    words = (
+        counted(count, "step") if section == "sequence" else counted_elements(count, section)
+        for section, count in sorted(counts.items())
+    )
+    return f"used by {', '.join(words)}" if counts else "not used"
+
+
+def _user(place: Path) -> Path:
+    """Return the element that a place belongs to: a question, a table of a section or a step."""
+    return place[:4] if place[2:3] == (ITEMS,) else place[:2]
+
+
+SHORTEST: Final = 3
+"""So many letters are typed before fields are looked for."""
+LABEL, CHOSEN, OTHER, SENTENCE = range(4)
+_DEEPEST: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class FoundField:
+    """A field that was found.
+
+    Attributes
+    ----------
+    element, field : tuple of str or int
+        The element, and the field in it.
+    label, choice, help : str
+        Its label, what is chosen in it where that was looked for, and what it is for.
+    rank : int
+        What was found: 0 its label, 1 what is chosen in it, 2 another choice, 3 only the sentence of a choice.
+    """
+
+    element: Path
+    field: Path
+    label: str
+    choice: str = ""
+    help: str = ""
+    rank: int = LABEL
+
+
+def words_sought(words: str) -> list[str]:
+    """Return the words that are looked for, each without the "s" of a plural."""
+    return [part.removesuffix("s") if len(part) > SHORTEST else part for part in words.casefold().split()]
+
+
+def found_fields(study: Study, words: str) -> tuple[FoundField, ...]:
+    """Return the fields whose labels or choices have words that begin so, labels first.
+
+    Choices that are not chosen count where no label and nothing that is chosen has the words; sentences count last.
+    """
+    parts = words_sought(words)
+    if not parts or len(words.strip()) < SHORTEST:
+        return ()
+    found = [one for field in _fields(study) for one in _found_in(field, parts)]
+    best = min((one.rank for one in found), default=0)
+    return tuple(sorted((one for one in found if one.rank <= max(best, CHOSEN)), key=lambda one: one.rank))
+
+
+def found_in_elements(study: Study, words: str) -> Mapping[Path, FoundField]:
+    """Return for each element the first field that was found in it."""
+    first: dict[Path, FoundField] = {}
+    for one in found_fields(study, words):
+        first.setdefault(one.element, one)
+    return first
+
+
+@lru_cache(maxsize=2)
+def _fields(study: Study) -> tuple[tuple[Path, Row, str], ...]:
+    """Return every field of every element, with its label."""
+    shown = outline(study)
+    parts = [one.path for one in (*shown.session, *shown.parts) if len(one.path) > 1]
+    elements = dict.fromkeys((*parts, *(one.path for one in shown.study)))
+    return tuple((element, row, label) for element in elements for row, label in _of_table(study, element, ""))
+
+
+def _of_table(study: Study, path: Path, above: str, depth: int = 0) -> Iterator[tuple[Row, str]]:
+    refused = refused_at(study.document, path)
+    for row in rows(study.document, path):
+        if row.value is None and row.path[-1] in refused:
+            continue
+        label = f"{above}{row.label}"
+        yield row, label
+        if row.kind == "table" and isinstance(row.value, Mapping) and depth < _DEEPEST:
+            yield from _of_table(study, row.path, f"{label}, ", depth + 1)
+
+
+def _found_in(field: tuple[Path, Row, str], parts: list[str]) -> Iterator[FoundField]:
+    """Yield the field where its label has the words; else once for each of its choices that has them."""
+    element, row, label = field
+    if _has(label, parts):
+        yield FoundField(element, row.path, label, help=row.help)
+        return
+    for choice in row.choices if row.kind in {"choice", "choices", "kind"} else ():
+        named = label_of(choice.value or "")
+        whole = f"{label} {named} {choice.sentence}"
+        if choice.value and _has(whole, parts):
+            there = row.default if row.value is None else row.value
+            of_name = CHOSEN if choice.value == there else OTHER
+            rank = of_name if any(_has(named, [part]) for part in parts) else SENTENCE
+            yield FoundField(element, row.path, label, named, choice.sentence or row.help, rank)
+
+
+def _has(text: str, parts: list[str]) -> bool:
+    """Return whether a word of a text begins with each of some parts."""
+    spaced = " " + " ".join(text.casefold().replace("-", " ").replace(",", " ").replace("(", " ").split())
+    return all(f" {part}" in spaced for part in parts)
+
+
+def there(document: Mapping[str, Any], path: Path) -> Path:
+    """Return a path, or as much of it as is in the document; a section may be left out; else the study's own table."""
+    found: Any = document
+    known = path[:1] if path and row_at(document, path[:1]) is not None else FIRST
+    for length, step in enumerate(path):
+        if not has(found, step):
+            return path[:length] if length > 1 else known
+        found = found[step]
+    return path or FIRST

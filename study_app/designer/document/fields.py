@@ -1,19 +1,114 @@
-"""Forms: the rows of a table of the study, generated from the models of the file format."""
+"""Rows of the tables of a study, from the JSON Schema of the file format, and initial values."""
 
 from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Mapping
+import string
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias
 
 from study_app.designer.document.names import choices_at, sections_at
-from study_app.designer.document.schema_nodes import OWN, Node, alternatives, node_at, table_of, tags
+from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.ranges import REASON
-from study_app.protocol.source.document import Path, value_at
+from study_app.ids import free_id
+from study_app.number_text import counted
+from study_app.protocol.questions import POINTS
+from study_app.protocol.source.document import Path, entries, has, value_at
+from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.problems import rule_of, shown
 from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
+
+Node: TypeAlias = Mapping[str, Any]
+OWN = "own description"
+"""Where a node keeps what its own model says of it, if the place it is at has a description, too."""
+
+
+def node_at(document: Any, path: Path) -> tuple[Node, ...]:
+    """Return the schema's alternatives for the value at ``path``, there or not; none where no value is permitted."""
+    nodes: list[Node] = [schema()]
+    for step in path:
+        nodes = [child for node in (table_of(tuple(nodes), document),) if node for child in _children(node, step)]
+        nodes = [found for node in nodes for found in alternatives(node)]
+        document = document[step] if has(document, step) else None
+    return tuple(nodes)
+
+
+def table_of(nodes: tuple[Node, ...], value: Any) -> Node | None:
+    """Return the alternative that a table or array is of: the one whose fixed key, such as ``kind``, is the value's."""
+    if isinstance(value, Mapping):
+        tables = [node for node in nodes if node.get("type") == "object"]
+        return next((node for node in tables if _is_of(node, tables, value)), tables[0] if tables else None)
+    several = [node for node in nodes if node.get("type") in {"object", "array"}]
+    arrays = [node for node in several if node["type"] == "array"]
+    return next(iter(arrays if isinstance(value, tuple) and arrays else several), None)
+
+
+def tags(nodes: tuple[Node, ...]) -> tuple[str, dict[str | None, Node]]:
+    """Return the key that distinguishes the tables, and the table for each of its values; None: the key is left out."""
+    tables = [node for node in nodes if node.get("type") == "object" and "properties" in node]
+    if len(tables) < 2:
+        return "", {}
+    keys = {**tables[0]["properties"], **tables[1]["properties"]}
+    key = next((key for key in keys if _tells_apart(key, tables)), "")
+    return key, {value: node for node in tables for value in _values(node, key) or (None,)} if key else {}
+
+
+def alternatives(node: Node) -> Iterator[Node]:
+    """Yield the alternatives of a node except null, with references resolved and the node's common keys added."""
+    around = {key: value for key, value in node.items() if key not in {"$ref", "anyOf", "oneOf", "discriminator"}}
+    if "$ref" in node:
+        found = schema()["$defs"][node["$ref"].rsplit("/", 1)[-1]]
+        yield from (_joined(around, one) for one in alternatives(found))
+    elif branches := node.get("anyOf") or node.get("oneOf"):
+        for branch in branches:
+            yield from (_joined(around, one) for one in alternatives(branch))
+    elif node.get("type") != "null":
+        yield node
+
+
+def _joined(around: Node, found: Node) -> Node:
+    """Return a node with the words around the union that it is of; its own description is `OWN` then."""
+    own = {OWN: found["description"]} if "description" in found and OWN not in found else {}
+    return {**found, **own, **around}
+
+
+def _is_of(node: Node, tables: list[Node], value: Mapping[str, Any]) -> bool:
+    key, named = tags(tuple(tables))
+    if not key:
+        return True
+    default = next((name for name, one in named.items() if one["properties"].get(key, {}).get("default") == name), None)
+    chosen = value.get(key, None if None in named else default)
+    return (chosen is None or isinstance(chosen, str)) and named.get(chosen) is node
+
+
+def _tells_apart(key: str, tables: list[Node]) -> bool:
+    """Return whether the key has different fixed values in each table; one table may lack the key."""
+    values = [_values(node, key) for node in tables]
+    every = [value for some in values for value in some]
+    return sum(map(bool, values)) >= len(tables) - 1 and len(every) == len(set(every))
+
+
+def _values(node: Node, key: str) -> tuple[str, ...]:
+    part = node["properties"].get(key, {})
+    return (part["const"],) if "const" in part else tuple(part.get("enum", ()))
+
+
+def _children(node: Node, step: str | int) -> Iterator[Node]:
+    if isinstance(step, int):
+        fixed = node.get("prefixItems", ())
+        if step < len(fixed):
+            yield fixed[step]
+        elif isinstance(node.get("items"), Mapping):
+            yield node["items"]
+    elif step in node.get("properties", {}):
+        yield node["properties"][step]
+    else:
+        yield from node.get("patternProperties", {}).values()
+        if isinstance(node.get("additionalProperties"), Mapping):
+            yield node["additionalProperties"]
+
 
 Kind: TypeAlias = Literal[
     "number", "whole number", "text", "paragraphs", "localised", "switch", "choice", "kind", "reference",
@@ -288,3 +383,117 @@ def _first_sentence(node: Node) -> str:
 def _sentences(description: str) -> dict[str, str]:
     """Return the sentence of each value in a description such as "fixed: as written; shuffled: anew in every trial"."""
     return {value: match[2].strip() for match in _SENTENCES.finditer(description) for value in match[1].split(", ")}
+
+
+SINGULAR: Final = {"items": "question", "stimuli": "stimulus", "analysis": "analysis"}
+"""Singular names of sections' elements that are not the section's name without its last letter."""
+_PLURAL: Final = {"items": "questions"}
+"""Plural names of sections' elements that are not the section's name."""
+LETTER: Final = "^[A-Z]$"
+
+
+def singular(section: str | int) -> str:
+    """Return the name of an element of a section: "liquid" of ``liquids``."""
+    return SINGULAR.get(str(section), str(section).removesuffix("s"))
+
+
+def counted_elements(number: int, section: str | int) -> str:
+    """Return "1 stimulus", "2 stimuli" of ``stimuli``."""
+    return counted(number, singular(section), _PLURAL.get(str(section), str(section)))
+
+
+def new_text(section: str | int) -> str:
+    """Return the initial text of an element of a list: "New question" of ``items``."""
+    return f"New {singular(section)}"
+
+
+def initial(document: Mapping[str, Any], path: Path) -> Any:
+    """Return a valid value for a key that is not in the study.
+
+    Raises
+    ------
+    Refused
+        The key is not known.
+    """
+    row = row_at(document, path)
+    if row is None or row.kind == "unknown":
+        raise Refused(f"{label_of(path[-1])} is not a key of this table")
+    if row.default not in (None, [], {}):
+        return row.default
+    nodes = node_at(document, path)
+    node = table_of(nodes, None) or nodes[0]
+    return _initial(document, row.either[0] if row.kind == "either" else row, node)
+
+
+def _initial(document: Mapping[str, Any], row: Row, node: Node) -> Any:
+    path, kind = row.path, row.kind
+    if kind in {"localised", "paragraphs", "text"}:
+        return _text(document, path, node, localised=kind != "text")
+    if kind in {"choice", "kind", "reference"}:
+        return next((choice.value for choice in row.choices if choice.value is not None), "")
+    if kind in {"references", "choices"}:
+        used = [choice.value for choice in row.choices]
+        return used[: max(1, node.get("minItems", 1))]
+    if kind == "switch":
+        return False
+    if kind in {"number", "whole number"}:
+        return _number(node, 1)
+    if kind in {"vector", "numbers"}:
+        parts = node.get("prefixItems") or [node["items"]] * node.get("minItems", 1)
+        return [_number(part, place) for place, part in enumerate(parts, start=1)]
+    if kind == "points":
+        size = len(node["items"]["prefixItems"])
+        return [[x] + [0] * (size - 1) for x in (-20, 20)][: max(2, node.get("minItems", 2))]
+    if kind == "texts":
+        return [label_of(f"text_{number}") for number in range(1, node.get("minItems", 1) + 1)]
+    entry = node.get("additionalProperties")
+    if kind == "tables" and isinstance(entry, Mapping) and entry.get("type") == "array":
+        points = [f"Point {number}" for number in range(1, POINTS + 1)]
+        return dict.fromkeys(_languages(document) or ["en"], points)
+    return _tables(document, path, node) if kind == "list" else {}
+
+
+def _tables(document: Mapping[str, Any], path: Path, node: Node) -> list[Any]:
+    """Return the least number of tables of a list, each with its required keys; or of lists, as of sequences."""
+    found: list[Any] = []
+    for number in range(max(1, node.get("minItems", 1))):
+        place = (*path, number)
+        if node["items"].get("type") == "array":
+            found.append(initial(document, place))
+            continue
+        table = table_of(node_at(document, place), {})
+        required = () if table is None else table.get("required", ())
+        name = f"{singular(path[-1])}_{number + 1}"
+        text = _in_languages(document, label_of(name))
+        found.append({key: name if key == "id" else text if key == "text" else initial(document, (*place, key))
+                      for key in required})  # fmt: skip
+    return found
+
+
+def _text(document: Mapping[str, Any], path: Path, node: Node, *, localised: bool) -> Any:
+    around = value_at(document, path[:-1])
+    if path[-1] == "id":
+        taken = (str(name) for _, name in entries(document, ".".join((*map(str, path[:2]), "*", "*", "id"))))
+        return free_id(taken, singular(path[-3]))
+    if node.get("pattern") == LETTER:
+        used = {letter for _, letter in entries(document, f"{path[0]}.*.{path[-1]}")}
+        return next((letter for letter in string.ascii_uppercase if letter not in used), "Z")
+    name = around.get("id", path[-2]) if isinstance(around, Mapping) else path[-2]
+    words = new_text(path[-3]) if isinstance(name, int) else f"New {label_of(str(name)).lower()}"
+    return _in_languages(document, words) if localised else words
+
+
+def _in_languages(document: Mapping[str, Any], words: str) -> Any:
+    languages = _languages(document)
+    return dict.fromkeys(languages, words) if len(languages) > 1 else words
+
+
+def _languages(document: Mapping[str, Any]) -> list[str]:
+    return [str(name) for _, name in entries(document, "study.languages.*")]
+
+
+def _number(node: Node, otherwise: float) -> float:
+    wanted = next(iter(node.get("examples", ())), otherwise)
+    least, most = node.get("minimum", node.get("exclusiveMinimum", wanted)), node.get("maximum", wanted)
+    number = min(max(wanted, least), most)
+    return int(number) if float(number).is_integer() else number

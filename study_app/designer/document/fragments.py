@@ -7,16 +7,12 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from study_app.designer.document.additions import added
-from study_app.designer.document.edited_study import Study
+from study_app.designer.document.changes import short_of
 from study_app.designer.document.fields import label_of, row_at
 from study_app.designer.document.names import references_to, renamed
-from study_app.designer.document.short_texts import short_of
-from study_app.designer.document.writer.edits import Edit, Rename, Set, WriterError, apply, same
-from study_app.designer.document.writer.keys import insert_block
-from study_app.designer.document.writer.refused import Refused
-from study_app.designer.document.writer.spans import spans_of
-from study_app.designer.document.writer.splices import Editor, applied
-from study_app.designer.document.writer.values import tables
+from study_app.designer.document.study import Study
+from study_app.designer.document.toml_edits import Edit, Rename, Set, WriterError, apply, insert_block, same
+from study_app.designer.document.toml_text import Editor, Refused, applied, spans_of, tables
 from study_app.ids import MAX_FROM_TEXT, free_id, id_of
 from study_app.protocol.source.document import Path, entries, frozen, names, value_at
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from study_app.designer.document.writer.edits import Edit, Rename, Set, Unset
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.toml_edits import Edit, Rename, Set, Unset
+from study_app.designer.document.toml_text import Refused
 from study_app.ids import MAX_FROM_TEXT, MAX_ID, free_id, id_of
 from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
 from study_app.protocol.source.document import Path, entries, has, names, value_at

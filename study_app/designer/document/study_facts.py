@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Final
 
-from study_app.designer.document.edited_study import Study
+from study_app.designer.document.study import Study
 from study_app.designer.measures.participant_texts import missing_texts, to_translate
 from study_app.designer.measures.valid_part import valid_part
 from study_app.haptics.model.slope_limits import HAND_MPS, steady

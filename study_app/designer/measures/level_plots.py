@@ -24,7 +24,7 @@ from study_app.designer.measures.number_cards import (
 )
 from study_app.designer.measures.observers import Observed
 from study_app.designer.measures.planned import ENOUGH, Simulated
-from study_app.designer.problems.problem_rows import ProblemRow
+from study_app.designer.problems.problems import ProblemRow
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.number_text import counted, duration_figure
 from study_app.protocol.blocks import Block

@@ -7,7 +7,7 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from study_app.designer.document.edited_study import Study
+from study_app.designer.document.study import Study
 from study_app.designer.document.study_facts import facts
 from study_app.designer.measures.level_plots import Controls
 from study_app.designer.measures.level_words import LevelWords
@@ -30,8 +30,7 @@ from study_app.designer.measures.simulation import (
 from study_app.designer.measures.valid_part import valid_part
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.view import DesignerPlace
-from study_app.designer.problems.problem_rows import ProblemRow, problem_rows
-from study_app.designer.problems.repair_search import RepairSearch
+from study_app.designer.problems.problems import ProblemRow, RepairSearch, problem_rows
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
 from study_app.store.study_settings import keep_setting, kept_participants

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from study_app.designer.document.edited_study import Study
+from study_app.designer.document.study import Study
 from study_app.designer.document.study_facts import Facts
 from study_app.designer.measures import session_cards as cards
 from study_app.designer.measures.level_plots import (
@@ -19,7 +19,7 @@ from study_app.designer.measures.level_words import LevelWords, rounded
 from study_app.designer.measures.number_cards import Card, ControlValues, LinesCard, MeasuresView, people
 from study_app.designer.measures.planned import Simulated
 from study_app.designer.measures.valid_part import valid_part
-from study_app.designer.problems.problem_rows import ProblemRow
+from study_app.designer.problems.problems import ProblemRow
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
 from study_app.protocol.model import Protocol

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
-from study_app.designer.document.edited_study import Study
+from study_app.designer.document.changes import is_copied, languages_of, texts_of
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import is_localised, label_of
-from study_app.designer.document.languages import is_copied, languages_of, texts_of
-from study_app.designer.document.schema_nodes import alternatives
+from study_app.designer.document.fields import alternatives, is_localised, label_of
+from study_app.designer.document.study import Study
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path

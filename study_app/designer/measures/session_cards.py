@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from study_app.designer.document.edited_study import Study
+from study_app.designer.document.changes import languages_of
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import label_of
-from study_app.designer.document.languages import languages_of
 from study_app.designer.document.names import blocks_using
+from study_app.designer.document.study import Study
 from study_app.designer.document.study_facts import Facts
 from study_app.designer.measures.balance import balance_of
 from study_app.designer.measures.number_cards import (

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from study_app.designer.document.edited_study import Study
+from study_app.designer.document.study import Study
 from study_app.designer.measures.level_plots import Controls
 from study_app.designer.measures.measures_view import Focus, focus_of
 from study_app.designer.measures.observers import Check, measurable, observe

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
-from study_app.designer.document.document_values import with_value, without_value
-from study_app.designer.document.edited_study import Study
-from study_app.designer.document.initial_values import initial
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.fields import initial
+from study_app.designer.document.study import Study, with_value, without_value
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.measures.participant_texts import text_keys
 from study_app.protocol.load import examined
 from study_app.protocol.model import Protocol

@@ -2,12 +2,9 @@
 
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
 
-from study_app.designer.document.edited_study import read
 from study_app.designer.document.elements import study_title
-from study_app.designer.document.fields import row_at
-from study_app.designer.document.names import Document
+from study_app.designer.document.study import read
 from study_app.designer.new_study.new_study import taken_names, template
 from study_app.designer.new_study.template_choices import (
     SHIPPED,
@@ -18,15 +15,12 @@ from study_app.designer.new_study.template_choices import (
     template_choice,
 )
 from study_app.designer.new_study.templates import templates
-from study_app.designer.outline.outline_rows import FIRST
 from study_app.designer.place.designer_view import HeaderState, StudyChoice, problems_chip
-from study_app.designer.place.open_study import OpenStudy
+from study_app.designer.place.editing import OpenStudy
 from study_app.designer.versions.version_rows import VersionChip
 from study_app.errors import StudyError
 from study_app.gui.home.study_facts import holds_liquids_alone, is_shipped, sources
 from study_app.protocol.load import read_document
-from study_app.protocol.source.document import Path as Place
-from study_app.protocol.source.document import has
 from study_app.protocol.source.files import find, shipped, shipped_file
 from study_app.store.drafts import draft_of, drafted_files, unsaved_files
 from study_app.store.study_settings import kept_original
@@ -127,17 +121,6 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
 @cache
 def _template_choice(name: str) -> TemplateChoice:
     return template_choice(name, template(name))
-
-
-def there(document: Document, path: Place) -> Place:
-    """Return a path, or as much of it as is in the document; a section may be left out; else the study's own table."""
-    found: Any = document
-    known = path[:1] if path and row_at(document, path[:1]) is not None else FIRST
-    for length, step in enumerate(path):
-        if not has(found, step):
-            return path[:length] if length > 1 else known
-        found = found[step]
-    return path or FIRST
 
 
 def _resolved(source: str) -> Path | None:

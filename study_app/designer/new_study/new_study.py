@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.designer.document.edited_study import Study, read
-from study_app.designer.document.languages import filled_in, languages_of, with_language, without_language
-from study_app.designer.document.writer.edits import Set
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.changes import filled_in, languages_of, with_language, without_language
+from study_app.designer.document.study import Study, read
+from study_app.designer.document.toml_edits import Set
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.new_study.templates import FOLDER, templates
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.protocol.source.document import Path as Place

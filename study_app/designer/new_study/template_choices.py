@@ -5,10 +5,10 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from study_app.designer.document.edited_study import Study
 from study_app.designer.document.elements import study_title, title_of
 from study_app.designer.document.fields import row_at, unit_of
 from study_app.designer.document.names import Document
+from study_app.designer.document.study import Study
 from study_app.designer.new_study.known_answers import KnownAnswer, known_answers
 from study_app.designer.new_study.new_study import Answers
 from study_app.designer.new_study.templates import QUESTIONS

@@ -4,8 +4,8 @@ from PySide6.QtCore import QEvent, QObject, QPoint, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, QWidget
 
+from study_app.designer.document.elements import words_sought
 from study_app.designer.outline.addable import Addable
-from study_app.designer.problems.finding import words_sought
 from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed

@@ -5,17 +5,14 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Final
 
-from study_app.designer.document.edited_study import Study
-from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import Row, label_of, row_at, rows
-from study_app.designer.document.initial_values import singular
-from study_app.designer.document.languages import languages_of
+from study_app.designer.document.additions import number_rows
+from study_app.designer.document.changes import languages_of
+from study_app.designer.document.elements import found_fields, title_of
+from study_app.designer.document.fields import Row, label_of, node_at, row_at, rows, singular, tags
 from study_app.designer.document.names import named_at
-from study_app.designer.document.schema_nodes import node_at, tags
-from study_app.designer.document.series import number_rows
+from study_app.designer.document.study import Study
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.designer.place.requests import AddElement, AddInstrument, AskSeries, ChangeLanguage, GoTo
-from study_app.designer.problems.finding import found_fields
 from study_app.protocol.formats import TABLES, is_second
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.source.document import Path, names, value_at

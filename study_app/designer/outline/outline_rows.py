@@ -10,6 +10,10 @@ from study_app.designer.document.initial_values import singular
 from study_app.designer.form.element_facts import brief
 from study_app.designer.problems.finding import LABEL, FoundField, found_in_elements
 from study_app.number_text import counted, duration
+from study_app.designer.document.elements import FIRST, LABEL, Element, FoundField, brief, found, found_in_elements, outline, title_of
+from study_app.designer.document.fields import singular
+from study_app.designer.document.study import Study
+from study_app.number_text import counted
 from study_app.protocol.source.document import Path, entries, names, value_at
 
 ICONS: Final = {
@@ -23,10 +27,6 @@ PAGES: Final[Mapping[Any, str]] = {"consent": "pen", "break": "pause", "debrief"
 SECTIONS: Final = ("Session, in order", "Parts it is made of", "Settings")
 """The headings; above them is the study itself, with its title, description and languages."""
 SESSION, PARTS, SETTINGS = SECTIONS
-FIRST: Final = ("study",)
-"""What is selected where nothing else is."""
-
-
 FORCE_LIMIT: Final = ("device", "force_limit_n")
 
 ElementPath: TypeAlias = Path

@@ -8,8 +8,8 @@ from typing import Any, Final
 from PySide6.QtCore import QObject, Signal
 
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.writer.edits import Edit, Set, Unset
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.toml_edits import Edit, Set, Unset
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.participant.playable import NotPlayableError, playable
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.view import DesignerPlace

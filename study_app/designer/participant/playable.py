@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path as Folder
 from typing import Any, Final
 
-from study_app.designer.document.edited_study import Study
 from study_app.designer.document.names import named_at
-from study_app.designer.document.writer.edits import Edit, Set, Unset
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.study import Study
+from study_app.designer.document.toml_edits import Edit, Set, Unset
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.participant.first_step import first_step, graph_of, reached
 from study_app.designer.participant.participant_page import step_words
 from study_app.designer.participant.shown_step import StepPosition, step_name

@@ -6,8 +6,8 @@ from typing import Final
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
-from study_app.designer.document.edited_study import Study
 from study_app.designer.document.elements import title_of
+from study_app.designer.document.study import Study
 from study_app.designer.measures.valid_part import valid_part
 from study_app.designer.participant.participant_page import SIZES, ParticipantView, ScreenSize, moment_words, step_words
 from study_app.designer.participant.participant_tab import ParticipantTab
@@ -21,8 +21,8 @@ from study_app.designer.participant.shown_step import (
     step_name,
 )
 from study_app.designer.participant.sound_part import last_valid, sound_part
+from study_app.designer.place.arrangement import PanePage
 from study_app.designer.place.editing import Editing
-from study_app.designer.place.right_pane import PanePage
 from study_app.designer.place.view import DesignerPlace
 from study_app.gui.display.screens import choose_screens
 from study_app.gui.kit.commands import add_commands, tip

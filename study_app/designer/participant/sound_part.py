@@ -4,13 +4,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from study_app.designer.document.document_values import with_value, without_value
-from study_app.designer.document.edited_study import Study, read
-from study_app.designer.document.initial_values import initial
+from study_app.designer.document.additions import is_unknown_name
+from study_app.designer.document.fields import initial
 from study_app.designer.document.names import named_at
-from study_app.designer.document.writer.refused import Refused
-from study_app.designer.place.open_study import OpenStudy
-from study_app.designer.problems.repairs import is_unknown_name
+from study_app.designer.document.study import Study, read, with_value, without_value
+from study_app.designer.document.toml_text import Refused
+from study_app.designer.place.editing import OpenStudy
 from study_app.errors import ProtocolError
 from study_app.protocol.load import examined, read_document
 from study_app.protocol.model import Protocol

@@ -8,11 +8,11 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer
 
-from study_app.designer.document.edited_study import read
 from study_app.designer.document.names import renamed
+from study_app.designer.document.study import read
 from study_app.designer.document.study_facts import facts
-from study_app.designer.document.writer.refused import Refused, free_in
-from study_app.designer.form.form_rows import form
+from study_app.designer.document.toml_text import Refused, free_in
+from study_app.designer.form.form import form
 from study_app.designer.measures.measures_controller import MeasuresController
 from study_app.designer.new_study.known_studies import header_state, new_choices, source_of, studies
 from study_app.designer.new_study.new_study import NO_ANSWERS, Answers, answered, template
@@ -22,17 +22,14 @@ from study_app.designer.participant.feeling import Feeling
 from study_app.designer.participant.preview import ParticipantPreview
 from study_app.designer.place.clipboard import Clipboard
 from study_app.designer.place.designer_view import DesignerView, HeaderState, StudyChoice
-from study_app.designer.place.editing import Editing
-from study_app.designer.place.element_steps import Step, delete_prompt
-from study_app.designer.place.file_text import file_text
-from study_app.designer.place.open_study import OpenStudy, open_file, open_new, open_unsaved
-from study_app.designer.place.prompt_facts import series_prompt, series_titles
+from study_app.designer.place.editing import Editing, OpenStudy, open_file, open_new, open_unsaved
+from study_app.designer.place.file import file_text
 from study_app.designer.place.prompts import SeriesCard
 from study_app.designer.place.requests import AskSeries, DeleteElement, RenameElement, Request
 from study_app.designer.place.saving import Saving
+from study_app.designer.place.steps import Step, delete_prompt, series_prompt, series_titles
 from study_app.designer.place.view import DesignerPlace
-from study_app.designer.problems.problem_rows import ProblemRow, problem_rows, warning_rows
-from study_app.designer.problems.repair_search import RepairSearch
+from study_app.designer.problems.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
 from study_app.designer.versions.changes_controller import ChangesController
 from study_app.designer.versions.known_runs import KnownRuns
 from study_app.designer.versions.renaming import Renaming

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
-from study_app.designer.form.form_rows import Form
-from study_app.designer.place.file_text import FileText
-from study_app.designer.problems.problem_rows import ProblemRow
+from study_app.designer.form.rows import Form
+from study_app.designer.place.file import FileText
+from study_app.designer.problems.problems import ProblemRow
 from study_app.designer.versions.version_rows import VersionChip
 from study_app.gui.theme.theme import Tone
 from study_app.number_text import counted

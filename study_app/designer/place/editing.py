@@ -1,25 +1,316 @@
-"""The study that is open in the designer, and the steps that are made in it."""
+"""The study that is open in the designer: its file, its draft, and the steps that are made in it."""
 
+from __future__ import annotations
+
+import os
+import shutil
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 
-from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import FIRST, first_element, study_title, there
 from study_app.designer.document.names import id_at, renamed, suggested_id
-from study_app.designer.document.undo_stack import History
-from study_app.designer.document.writer.edits import Edit
-from study_app.designer.document.writer.refused import Refused
-from study_app.designer.new_study.known_studies import there
-from study_app.designer.place.edit_steps import Recorded, Steps, no_answers
-from study_app.designer.place.element_steps import Step
-from study_app.designer.place.file_text import retyped
-from study_app.designer.place.open_study import OpenStudy
+from study_app.designer.document.study import History, Study, read
+from study_app.designer.document.toml_edits import Edit, Set
+from study_app.designer.document.toml_text import Refused
+from study_app.designer.new_study.new_study import check_free, copy_of
+from study_app.designer.place.file import retyped
 from study_app.designer.place.requests import AddElement, AddNamed, LeaveText, Request, RetypeFile, with_path
+from study_app.designer.place.steps import Recorded, Step, Steps, no_answers
+from study_app.designer.versions.standing import Standing, check_saving, standing
+from study_app.errors import StoreError
 from study_app.protocol.source.document import Path as Place
+from study_app.protocol.source.document import value_at
+from study_app.protocol.source.files import file_hash, hashes_in, shipped, shipped_file, unbundled, with_liquid_files
+from study_app.store.atomic import cannot_write
+from study_app.store.drafts import Draft, Keeper, draft_of
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.folder_lock import is_open
+from study_app.store.study_runs import Run
+from study_app.store.study_versions import content_hash, keep_content, save, write_whole
+
+RESTORE: Final = "Restore the draft"
+DEFAULT_VERSION: Final = "1"
+
+
+@dataclass
+class OpenStudy:
+    """A study that is open in the designer.
+
+    Attributes
+    ----------
+    file : Path
+        Where it is saved; the file need not exist yet.
+    history : History
+        The study with its steps.
+    base : str
+        Hash of the file's content that is edited; "" for a new file.
+    saved : str
+        The text of the file, "" for a new one.
+    read_only : str
+        Why it cannot be changed, "" where it can.
+    draft : Draft or None
+        The draft that was found when it was opened.
+    """
+
+    file: Path
+    history: History
+    base: str = ""
+    saved: str = ""
+    read_only: str = ""
+    draft: Draft | None = None
+    kept: datetime | None = None
+    keeper: Keeper = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.keeper = Keeper(self.file, self.base)
+
+    @property
+    def study(self) -> Study:
+        """The study as it is now."""
+        return self.history.study
+
+    @property
+    def title(self) -> str:
+        """Its title in its first language; "" where it has none."""
+        return study_title(self.study.document)
+
+    @property
+    def edited(self) -> bool:
+        """Whether it differs from the file."""
+        return self.study.text != self.saved
+
+    def note_edit(self, now_s: float) -> None:
+        """Let the draft follow an edit; a text that is the file's again needs none."""
+        if self.edited or not self.base:
+            self.keeper.edited(self.study.text, self.history.selected, now_s)
+        else:
+            self.keeper.saved(self.base)
+            self.kept = None
+
+    def write_draft(self, now_s: float | None = None) -> bool:
+        """Write the draft if it is due, without a time at once; return whether it was written.
+
+        Raises
+        ------
+        StoreError
+            It cannot be written, or one that is obsolete cannot be deleted.
+        """
+        written = self.keeper.write() if now_s is None else self.keeper.write_if_due(now_s)
+        if written:
+            self.kept = datetime.now().astimezone()
+        return written
+
+    def discard_draft(self) -> None:
+        """Go back to the file as one step, and forget the draft."""
+        self.history = self.history.typed("Discard the draft", self.saved)
+        self.keeper.saved(self.base)
+        self.draft = self.kept = None
+
+    def give_up(self) -> None:
+        """Delete the draft of a study that was never saved; nothing of it is left.
+
+        Raises
+        ------
+        StoreError
+            It cannot be deleted.
+        """
+        self.keeper.saved("")
+        self.keeper.write()
+
+    def changed_outside(self) -> bool:
+        """Return whether the file has another content than the one that is edited."""
+        return content_hash(_content(self.file)) != self.base if self.file.exists() else bool(self.base)
+
+    def take_outside(self) -> None:
+        """Take the file's content as one step.
+
+        Raises
+        ------
+        Refused
+            It is not UTF-8 text.
+        """
+        content = _content(self.file)
+        self.saved = read(content, self.file.parent).text
+        self.rebase(content_hash(content))
+        self.history = self.history.typed("Take the file's content", self.saved)
+        self.keeper.saved(self.base)
+        self.kept = None
+
+    def keep_mine(self, now_s: float) -> None:
+        """Let the next saving replace what another program wrote."""
+        content = _content(self.file) if self.file.exists() else b""
+        self.saved = content.decode("utf-8", "replace")
+        self.rebase(content_hash(content) if self.file.exists() else "")
+        self.note_edit(now_s)
+
+    @property
+    def name(self) -> str:
+        """The name of the study, which its results folder has, too."""
+        return str(value_at(self.study.document, ("study", "name")) or "")
+
+    @property
+    def version(self) -> str:
+        """The version that the study states, or the one that counts where it states none."""
+        stated = value_at(self.study.document, ("study", "version"))
+        return str(stated) if stated is not None else DEFAULT_VERSION
+
+    def source(self) -> bytes:
+        """Return what a session would be run with: the text, and the liquid files that it names."""
+        return with_liquid_files(self.study.text.encode(), self.study.folder)
+
+    def standing(self, known: tuple[Run, ...]) -> Standing:
+        """Return how the study stands to what was run."""
+        if not any(run.sessions for run in known):
+            return standing("", "", self.version, known)
+        file = with_liquid_files(self.saved.encode(), self.study.folder)
+        base = content_hash(file) if self.base else ""
+        return standing(content_hash(self.source()), base, self.version, known)
+
+    def save(self, known: tuple[Run, ...]) -> None:
+        """Write the file, and keep what sessions will be run with.
+
+        Raises
+        ------
+        Refused
+            Sessions were run with this version and another content.
+        StoreError
+            It cannot be written, or was changed outside.
+        """
+        source = self.source()
+        check_saving(content_hash(source), self.version, known)
+        self._bring_files(source)
+        keep_content(source)
+        self.base = save(self.file, self.study.text, self.base)
+        self.saved = self.study.text
+        self.keeper.saved(self.base)
+        self.kept = self.draft = None
+
+    def _bring_files(self, source: bytes) -> None:
+        """Write the files that the study names into its own folder, where it was copied from another one."""
+        folder = self.file.resolve().parent
+        if self.study.folder.resolve() == folder:
+            return
+        for name, text in unbundled(source)[1].items():
+            path = folder / name
+            if path.exists() and _content(path) != text.encode():
+                raise Refused(f"{path} exists and holds another liquid: rename one of the two files")
+            write_whole(path, text.encode())
+        for name, digest in hashes_in(source).items():
+            if (there := file_hash(folder / name)) is None:
+                _copy(self.study.folder / name, folder / name)
+            elif there != digest:
+                raise Refused(f"{folder / name} exists and holds another video: rename one of the two files")
+        self.history = replace(self.history, study=replace(self.study, folder=folder))
+
+    def saved_as(self, name: str) -> OpenStudy:
+        """Return the study with its edits under another name, as one step; this one goes back to its file.
+
+        Raises
+        ------
+        Refused
+            The name is not permitted, or taken.
+        StoreError
+            The draft of the other cannot be written.
+        """
+        file = check_free(name)
+        made = OpenStudy(file, self.history.typed(f"Save as {name}", copy_of(self.study, name).text))
+        made.note_edit(0.0)
+        made.write_draft()
+        self.discard_draft()
+        return made
+
+    def set_version(self, version: str) -> None:
+        """Give the study another version, as one step."""
+        self.history = self.history.edited(f"Set version {version}", Set(("study", "version"), version))
+
+    def rebase(self, base: str) -> None:
+        """Take edits as made from the content of another hash."""
+        self.base = self.keeper.base = base
+
+
+def open_file(file: Path, results: Path) -> OpenStudy:
+    """Open a study's file, with the draft of it that was not saved.
+
+    Raises
+    ------
+    Refused
+        It is not UTF-8 text.
+    StoreError
+        It cannot be read.
+    """
+    content = _content(file)
+    study = read(content, file.parent)
+    opened = OpenStudy(file, History(study, first_element(study.document)), content_hash(content), study.text)
+    opened.read_only = why_read_only(opened, results)
+    return opened if opened.read_only else _with_draft(opened)
+
+
+def open_new(study: Study, name: str) -> OpenStudy:
+    """Open a copy of a study under another name; nothing is written before it is saved.
+
+    Raises
+    ------
+    Refused
+        The name is not permitted, or taken.
+    """
+    file = check_free(name)
+    made = copy_of(study, name)
+    return OpenStudy(file, History(made, first_element(made.document)))
+
+
+def open_unsaved(file: Path, draft: Draft) -> OpenStudy:
+    """Open a study that was never saved, from its draft."""
+    opened = OpenStudy(file, History(Study(draft.text, file.parent), draft.selected or FIRST), draft=draft)
+    opened.keeper.take(draft)
+    return opened
+
+
+def _with_draft(opened: OpenStudy) -> OpenStudy:
+    draft = draft_of(opened.file)
+    if draft is None:
+        return opened
+    opened.keeper.take(draft)
+    if draft.text != opened.saved:
+        opened.draft = draft
+        opened.history = opened.history.typed(RESTORE, draft.text)
+        if draft.selected and value_at(opened.study.document, draft.selected) is not None:
+            opened.history = replace(opened.history, selected=draft.selected)
+        opened.rebase(draft.base)
+    return opened
+
+
+def why_read_only(opened: OpenStudy, results: Path) -> str:
+    """Return why a study cannot be changed at this moment, "" where it can."""
+    file = opened.file.resolve()
+    if any(file == shipped_file(name).resolve() for name in shipped()):
+        return "This study ships with the program. Make a copy to change it."
+    if opened.file.exists() and not os.access(opened.file, os.W_OK):
+        return "You may not write this file. Make a copy to change it."
+    if any(is_open(session.path) for session in StudyFolder(results / opened.name).sessions()):
+        return "A session of this study is under way. Make a copy, or wait until it has ended."
+    return ""
+
+
+def _copy(file: Path, to: Path) -> None:
+    try:
+        to.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, to)
+    except OSError as error:
+        raise cannot_write(to, error) from error
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise StoreError(f"{file} cannot be read: {error.strerror}") from error
+
 
 JOIN_S: Final = 1.0  # typing in one field is one step until the keyboard rests for so long
 

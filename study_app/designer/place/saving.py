@@ -6,11 +6,10 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from study_app.designer.document.writer.refused import Refused, free_in
+from study_app.designer.document.toml_text import Refused, free_in
 from study_app.designer.new_study.known_studies import source_of
 from study_app.designer.place.designer_view import Banner, BannerAction
-from study_app.designer.place.editing import Editing
-from study_app.designer.place.open_study import OpenStudy, why_read_only
+from study_app.designer.place.editing import Editing, OpenStudy, why_read_only
 from study_app.designer.place.prompts import DiscardCard
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.versions.changes_controller import compare, newest, version_of

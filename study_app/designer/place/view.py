@@ -1,13 +1,15 @@
-"""The study designer's place: header, outline, form, file and problems."""
+"""The study designer: its parts, their keys, the way from problem to problem, and what is asked for."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from PySide6.QtCore import Qt, Signal, SignalInstance
+from PySide6.QtCore import QObject, Qt, Signal, SignalInstance
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
-from study_app.designer.form.element_form import FormCard
+from study_app.designer.form.card import FormCard
+from study_app.designer.form.typed_fields import TypedLine, TypedText
 from study_app.designer.measures.measures_page import MeasuresPage
 from study_app.designer.new_study.new_study_page import NewStudyPage, NoStudyCard
 from study_app.designer.new_study.template_choices import TemplateChoice
@@ -15,36 +17,304 @@ from study_app.designer.outline.add_list import AddList
 from study_app.designer.outline.addable import Addable
 from study_app.designer.outline.card import OutlineCard
 from study_app.designer.outline.outline_rows import ElementPath, OutlineRow
-from study_app.designer.place.arrangement import Arrangement
-from study_app.designer.place.banner import BannerCard
-from study_app.designer.place.designer_header import DesignerHeader
+from study_app.designer.place.arrangement import Arrangement, PanePage, RightPane
 from study_app.designer.place.designer_view import DesignerView, HeaderState
-from study_app.designer.place.file_editor import FileCard
-from study_app.designer.place.focus_areas import FocusAreas
-from study_app.designer.place.keys_card import KeysCard
-from study_app.designer.place.prompt_facts import DeletePrompt
-from study_app.designer.place.prompts import DeleteCard, Prompt
+from study_app.designer.place.file import FileCard
+from study_app.designer.place.header import BannerCard, DesignerHeader
+from study_app.designer.place.prompts import DeleteCard, KeysCard, Prompt
 from study_app.designer.place.requests import (
     AskSeries,
+    DuplicateElement,
     GoTo,
     LeaveText,
+    MoveElement,
     MoveTo,
     RetypeFile,
     SetText,
     SetValue,
     with_path,
 )
-from study_app.designer.place.right_pane import PanePage, RightPane
-from study_app.designer.place.selected_elements import SelectedElements
-from study_app.designer.place.tab_order import go_on
-from study_app.designer.problems.problem_rows import ProblemRow
-from study_app.designer.problems.problem_steps import ProblemSteps
-from study_app.designer.problems.problems_card import ProblemsCard
+from study_app.designer.place.steps import DeletePrompt
+from study_app.designer.place.tab_order import go_on, lead_by_tab
+from study_app.designer.problems.card import ProblemsCard, RepairButton
+from study_app.designer.problems.problems import ProblemRow
 from study_app.gui.kit.commands import add_commands, press, tip
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import vbox
-from study_app.gui.widgets.main_view import Place
+from study_app.gui.widgets.main_view import Place, last_focused
+
+SHORTCUT = Qt.FocusReason.ShortcutFocusReason
+
+
+class FocusAreas:
+    """Gives the keyboard to a part of the designer, and shows the part where it is hidden."""
+
+    def __init__(self, header: DesignerHeader, parts: Arrangement, file: FileCard, problems: ProblemsCard) -> None:
+        self._header, self._parts, self._file, self._problems = header, parts, file, problems
+        header.keyboard_left.connect(self.return_keyboard)
+
+    def focus_header(self) -> None:
+        """Go to the list of studies."""
+        self._header.study.setFocus(SHORTCUT)
+
+    def focus_form(self) -> None:
+        """Go to the first row of the form."""
+        self._parts.show_side("form")
+        self._parts.form.focus_first()
+
+    def focus_field(self, path: ElementPath) -> None:
+        """Go to a field of the form, with its value selected; where it has no row, to the first row."""
+        if not self.focus_row(path):
+            self._parts.form.focus_first()
+        elif isinstance(field := self._parts.form.focusWidget(), TypedLine | TypedText):
+            field.selectAll()
+
+    def focus_row(self, path: ElementPath) -> bool:
+        """Go to a field of the form; return whether it has a row."""
+        self._parts.show_side("form")
+        return self._parts.form.focus(path)
+
+    def leave_drawer(self) -> None:
+        """Go to the form where the outline is a drawer."""
+        if self._parts.drawer:
+            self.focus_form()
+
+    def focus_element(self) -> None:
+        """Go to the selected element: to its row, or to its form where the outline is a drawer."""
+        if self._parts.drawer:
+            self.focus_form()
+        else:
+            self._parts.focus_outline()
+
+    def return_keyboard(self) -> None:
+        """Go back to where the keyboard was last in outline, form or pane; from *Find* to the selected element."""
+        last = last_focused(self._parts.used)
+        if last is None or last is self._parts.outline.words:
+            self.focus_element()
+        else:
+            last.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def focus_pane(self) -> None:
+        """Go to the page of the right pane, and from within the pane to its tabs."""
+        pane = self._parts.pane
+        if pane.isAncestorOf(pane.window().focusWidget() or self._header):
+            pane.tabs.setFocus(SHORTCUT)
+        else:
+            self._focus_page()
+
+    def _focus_tabs(self) -> None:
+        """Go to the tabs of the right pane; from there Tab goes to what is beside them, then to the page."""
+        self._parts.show_side("pane")
+        self._parts.pane.tabs.setFocus(SHORTCUT)
+
+    def _focus_page(self) -> None:
+        self._parts.show_side("pane")
+        pane = self._parts.pane
+        page = next(one for one in pane.pages if one.name == pane.tab)
+        (page.body.focusProxy() or pane.tabs).setFocus(SHORTCUT)
+
+    def show_tab(self, name: str) -> None:
+        """Show a page of the right pane, and go to it."""
+        self._parts.pane.show_tab(name)
+        self._focus_page()
+
+    def focus_problems(self) -> None:
+        """Go to the list of problems."""
+        self._problems.show()
+        self._problems.next.setFocus(SHORTCUT)
+
+    def switch_to_file(self) -> None:
+        """Go to the file, and from there back to where the keyboard was in the form."""
+        if not self._file.editor.hasFocus():
+            self.show_tab("file")
+            return
+        last = self._parts.form.focusWidget()  # where the file was over the form, the form gets its keyboard from Qt
+        self._parts.show_side("form")
+        if last is not None and last.isVisible() and last.isEnabled():
+            last.setFocus(SHORTCUT)
+        else:
+            self._parts.form.focus_first()
+
+    def cycle(self, by: int) -> None:
+        """Go to the next part, or to the one before."""
+        stops: list[tuple[QWidget, Callable[[], None]]] = [
+            (self._header, self.focus_header),
+            (self._parts.outline, self._parts.focus_outline),
+            (self._parts.form, self.focus_form),
+            (self._parts.pane, self._focus_tabs),
+        ]
+        if self._problems.isVisible():
+            stops.append((self._problems, self.focus_problems))
+        focused = self._parts.window().focusWidget()
+        here = next((at for at, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -by)
+        stops[(here + by) % len(stops)][1]()
+
+
+class SelectedElements(QObject):
+    """The element of the form, and those that the outline selects with it.
+
+    ``asked`` carries a request of `viewmodels.designer.requests`, ``delete_asked`` the element and the others; before
+    each request, ``typed`` asks to hand on what is being typed. ``selected`` carries another element.
+    """
+
+    typed = Signal()
+    asked = Signal(object)
+    delete_asked = Signal(object, object)
+    series_asked = Signal(object)
+    selected = Signal(object)
+
+    def __init__(self, outline: OutlineCard, form: FormCard, view: Callable[[], DesignerView]) -> None:
+        super().__init__()
+        self._outline, self._form, self._view = outline, form, view
+
+    def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
+        form = self._view().form
+        path = () if form is None else form.path
+        return path, tuple(one for one in self._outline.selected if one != path)
+
+    def join(self, path: ElementPath, all_between: bool) -> None:
+        """Select a question with the one of the form, or no longer; where none is edited, open it."""
+        form = self._view().form
+        if form is None or form.path[:-1] != path[:-1]:
+            self.selected.emit(path)
+        elif all_between:
+            first, last = sorted((int(form.path[-1]), int(path[-1])))
+            self._outline.select_several(tuple((*path[:-1], at) for at in range(first, last + 1)))
+        else:
+            self._outline.select_several((path,), selects=path not in self._outline.selected)
+
+    def duplicate(self) -> None:
+        """Ask for a copy of each."""
+        path, also = self._several()
+        if self._form.head.copy.isEnabled():
+            self.typed.emit()
+            self.asked.emit(DuplicateElement(path, also))
+
+    def make_series(self) -> None:
+        """Ask for copies of the form's element that differ in one number."""
+        form = self._view().form
+        if form is not None:
+            self.typed.emit()
+            self.series_asked.emit(AskSeries(form.path))
+
+    def delete(self) -> None:
+        """Ask to delete them."""
+        path, also = self._several()
+        if self._form.head.delete.isEnabled():
+            self.typed.emit()
+            self.delete_asked.emit(path, also)
+
+    def move_by(self, by: int) -> None:
+        """Ask to move them up (-1) or down (1)."""
+        path, also = self._several()
+        if path and not self._view().header.read_only:
+            self.typed.emit()
+            self.asked.emit(MoveElement(path, by, also))
+
+
+class ProblemSteps(QObject):
+    """Opens problems at their fields and offers their repairs, at the field and in the list.
+
+    Signals: ``selected`` (path of an element), ``repair_asked`` (row, words), ``repairs_wanted`` (a row whose repairs
+    are to be shown at once).
+    """
+
+    selected = Signal(object)
+    repair_asked = Signal(object, str)
+    repairs_wanted = Signal(object)
+
+    def __init__(self, card: ProblemsCard, form: FormCard, file: FileCard, areas: FocusAreas) -> None:
+        super().__init__(card)
+        self._card, self._form, self._file, self._areas = card, form, file, areas
+        self._problems: tuple[ProblemRow, ...] = ()
+        self._of_other_study: tuple[ProblemRow, ...] = ()
+        self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
+        self._opened_at: QWidget | None = None
+        card.opened.connect(self._open)
+        card.next.clicked.connect(self.open_next)
+        for part in (card, form):
+            part.repair_asked.connect(self._repair)
+
+    def begin(self) -> None:
+        """Begin with another study, whose problems and then warnings are shown next: without any the list closes."""
+        self._of_other_study, self._problems = self._card.rows, ()
+        self._card.begin()
+
+    def show_problems(self, problems: tuple[ProblemRow, ...], element: object) -> None:
+        """Show problems; ``element`` is the selected one. The list closes when the last problem is solved."""
+        before, self._problems = self._problems, problems
+        self._repairs = {row: words for row, words in self._repairs.items() if row in problems}
+        self._form.show_repairs(self._repairs)
+        self._card.show_problems(problems, element, self._repairs)
+        if before and not self._card.rows and not self._card.under_pointer:
+            self._card.hide()
+
+    def show_warnings(self, warnings: tuple[ProblemRow, ...]) -> None:
+        """Show other warnings; the list closes when the last one is solved."""
+        before, self._of_other_study = self._of_other_study or self._card.rows, ()
+        self._card.show_warnings(warnings)
+        if before and not self._card.rows and not self._card.under_pointer:
+            self._card.hide()
+
+    def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
+        """Offer the repairs of a problem."""
+        self._repairs[row] = words
+        self._form.show_repairs(self._repairs)
+        self._card.show_repairs(row, words)
+        self._lead_to_repairs()
+
+    def open_next(self) -> None:
+        """Go to the next problem."""
+        if coming := self._card.coming:
+            self._open_repair(coming[0])
+
+    def _open_repair(self, row: ProblemRow) -> None:
+        """Go to the repair of a problem; where there is none, to its field."""
+        self._card.open(row)
+        self.repairs_wanted.emit(row)
+        for button in (self._form.repairs_of(row) or self._card.repairs_of(row))[:1]:
+            button.setFocus(Qt.FocusReason.ShortcutFocusReason)
+            for area in (self._form.area, self._card.area):
+                if area.isAncestorOf(button):
+                    area.ensureWidgetVisible(button, 0, 8)  # its field stays in sight
+
+    def _can_be_repaired(self, row: ProblemRow) -> bool:
+        self.repairs_wanted.emit(row)
+        return bool(self._repairs.get(row))
+
+    def _open(self, row: ProblemRow) -> None:
+        """Go to the field of a problem; where there is none, to its line in the file."""
+        self._card.show()
+        if row.element:
+            self.selected.emit(row.element)
+        in_form = bool(row.element) and self._areas.focus_row(row.fault.path)
+        if row.line is not None and not in_form and not row.warning:
+            self._areas.show_tab("file")
+        if row.line is not None:
+            self._file.editor.go_to(row.line - 1)
+        self._opened_at = self._card.window().focusWidget()
+        self._lead_to_repairs()
+
+    def _lead_to_repairs(self) -> None:
+        """Let Tab go to the repairs of a problem from where it was opened."""
+        here, row = self._card.window().focusWidget(), self._card.at
+        if here is not None and here is self._opened_at and row is not None:
+            lead_by_tab(here, self._form.repairs_of(row) or self._card.repairs_of(row))
+
+    def _repair(self, row: ProblemRow, words: str) -> None:
+        """Make a repair; a key leads to the next one, or from the last one to its field, where a click leads."""
+        here = self._card.window().focusWidget()
+        by_keys = isinstance(here, RepairButton) and here.by_keys and here.problem == row
+        self._card.set_current(row)
+        self.repair_asked.emit(row, words)
+        if row in self._problems:
+            return
+        coming = [one for one in self._card.coming if not one.warning]
+        if by_keys and coming:
+            self._open_repair(next(filter(self._can_be_repaired, coming), coming[0]))
+        else:
+            self._areas.focus_field(row.fault.path)
 
 
 class DesignerPlace(Place):

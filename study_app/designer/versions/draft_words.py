@@ -4,10 +4,10 @@ import tomllib
 from pathlib import Path
 from typing import Final
 
-from study_app.designer.document.edited_study import Study
 from study_app.designer.document.elements import study_title, title_of
 from study_app.designer.document.fields import label_of
-from study_app.designer.problems.problem_rows import element_of
+from study_app.designer.document.study import Study
+from study_app.designer.problems.problems import element_of
 from study_app.protocol.differences import document_differences
 
 NAMED_AT_MOST: Final = 3

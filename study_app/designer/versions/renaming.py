@@ -5,7 +5,7 @@ from typing import Final
 from PySide6.QtCore import QObject
 
 from study_app.designer.document.names import references_to
-from study_app.designer.document.writer.comments import Comment, comments_naming
+from study_app.designer.document.toml_text import Comment, comments_naming
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.requests import RenameElement, Request
 from study_app.designer.place.view import DesignerPlace

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.toml_text import Refused
 from study_app.number_text import counted
 from study_app.store.study_runs import Run
 

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QFontDatabase, QSyntaxHighlighter, QTextCharFo
 from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QScrollArea, QWidget
 
 from study_app.designer.place.prompts import Prompt
-from study_app.designer.problems.repair_button import NameRefusal
+from study_app.designer.problems.card import NameRefusal
 from study_app.designer.versions.version_rows import ChangesView, SavePrompt
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed

@@ -9,7 +9,7 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.main_controller import MainController
-from study_app.designer.document.writer.edits import Set
+from study_app.designer.document.toml_edits import Set
 from study_app.protocol.source.files import shipped_file
 from tests.compiled import needs_servo
 

@@ -145,7 +145,7 @@ def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: An
 
 def test_what_changes_by_itself_is_said_once(designer: Any, monkeypatch: Any) -> None:
     said: list[str] = []
-    monkeypatch.setattr("study_app.designer.place.designer_header.say", lambda _widget, words: said.append(words))
+    monkeypatch.setattr("study_app.designer.place.header.say", lambda _widget, words: said.append(words))
     monkeypatch.setattr("study_app.designer.place.view.say", lambda _widget, words: said.append(words))
     designer.open()
     assert said == []

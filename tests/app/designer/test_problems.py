@@ -8,7 +8,7 @@ from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.designer.document.study_facts import facts
-from study_app.designer.document.writer.edits import Set
+from study_app.designer.document.toml_edits import Set
 from study_app.designer.place.requests import SetValue
 
 pytestmark = pytest.mark.slow

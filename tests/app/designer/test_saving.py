@@ -45,7 +45,7 @@ def stuck(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What the banner has a screen reader say."""
     found: list[str] = []
-    monkeypatch.setattr("study_app.designer.place.banner.say", lambda _banner, words: found.append(words))
+    monkeypatch.setattr("study_app.designer.place.header.say", lambda _banner, words: found.append(words))
     return found
 
 
@@ -76,7 +76,7 @@ def test_nothing_is_written_where_the_content_cannot_be_kept(drafted: Any, monke
 
     before = drafted.file.read_bytes()
     with monkeypatch.context() as broken:
-        broken.setattr("study_app.designer.place.open_study.keep_content", full)
+        broken.setattr("study_app.designer.place.editing.keep_content", full)
         drafted.saving.save()
     assert ("The study was not saved", "the disk is full.") in drafted.messages
     assert drafted.file.read_bytes() == before
@@ -126,7 +126,7 @@ def test_a_file_that_cannot_be_read_is_said_at_once_until_it_can_be(
     designer.open()
     for _ in range(2):
         with monkeypatch.context() as broken:
-            broken.setattr("study_app.designer.place.open_study.OpenStudy.changed_outside", unreadable)
+            broken.setattr("study_app.designer.place.editing.OpenStudy.changed_outside", unreadable)
             designer.saving.look_again()
             designer.saving.look_again()
             assert designer.place.banner_words.text() == "Kitchen.toml cannot be read: Input/output error"

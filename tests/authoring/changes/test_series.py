@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.edited_study import Study, read
-from study_app.designer.document.series import check_values, number_row, titles_with
-from study_app.designer.document.writer.refused import Refused
-from study_app.designer.place.element_steps import make_series
+from study_app.designer.document.additions import check_values, number_row, titles_with
+from study_app.designer.document.study import Study, read
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.place.requests import MakeSeries
+from study_app.designer.place.steps import make_series
 from study_app.protocol.source.document import value_at
 from tests.authoring.grown import PROTOCOLS
 

@@ -4,15 +4,12 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.changes import filled_in, followed, moved, texts_of, with_language
 from study_app.designer.document.fragments import copied, pasted
-from study_app.designer.document.languages import filled_in, texts_of, with_language
-from study_app.designer.document.moves import moved
-from study_app.designer.document.short_texts import followed
+from study_app.designer.document.study import History, Study, read
 from study_app.designer.document.study_facts import facts
-from study_app.designer.document.undo_stack import History
-from study_app.designer.document.writer.edits import Set, Unset
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.toml_edits import Set, Unset
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.measures.participant_texts import copied_texts, missing_texts
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import entries

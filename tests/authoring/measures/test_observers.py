@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from study_app.analysis.planning.threshold_studies import Case, study_batch
-from study_app.designer.document.edited_study import read
-from study_app.designer.document.writer.edits import Set
+from study_app.designer.document.study import read
+from study_app.designer.document.toml_edits import Set
 from study_app.designer.measures import observers
 from study_app.designer.measures.measures_view import focus_of
 from study_app.designer.measures.observers import measurable, observe

@@ -8,9 +8,8 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
-from study_app.designer.document.edited_study import Study
-from study_app.designer.document.undo_stack import History
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.study import History, Study
+from study_app.designer.document.toml_text import Refused
 from tests.authoring.grown import texts
 from tests.authoring.random_edits import check_edit, edit_of, holds_nothing
 

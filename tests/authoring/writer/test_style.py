@@ -7,20 +7,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from study_app.designer.document.writer.comments import comments_naming
-from study_app.designer.document.writer.edits import (
-    Duplicate,
-    Edit,
-    Insert,
-    Move,
-    Rename,
-    Set,
-    Unset,
-    WriterError,
-    apply,
-)
-from study_app.designer.document.writer.refused import Refused
-from study_app.designer.document.writer.values import tables, wrapped, written
+from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, WriterError, apply
+from study_app.designer.document.toml_text import Refused, comments_naming, tables, wrapped, written
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]))
 VALUES = st.recursive(
@@ -134,7 +122,7 @@ def test_apply_refuses_what_makes_no_sense(edit: Edit, sentence: str) -> None:
 
 
 def test_apply_refuses_its_own_mistakes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("study_app.designer.document.writer.keys.written", lambda *_: "7")
+    monkeypatch.setattr("study_app.designer.document.toml_edits.written", lambda *_: "7")
     with pytest.raises(WriterError, match="another document than the one meant"):
         apply("a = 1\n", Set(("a",), 2))
 

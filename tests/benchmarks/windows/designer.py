@@ -13,8 +13,8 @@ from random import Random
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from study_app.designer.document.writer.edits import apply
-from study_app.designer.document.writer.refused import Refused
+from study_app.designer.document.toml_edits import apply
+from study_app.designer.document.toml_text import Refused
 from tests.authoring.grown import texts
 from tests.authoring.random_edits import check_edit, edit_of
 

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.designer.document.edited_study import Study, read
-from study_app.designer.place.file_text import file_text, retyped, shown
-from study_app.designer.problems.problem_rows import element_of
+from study_app.designer.document.study import Study, read
+from study_app.designer.place.file import file_text, retyped, shown
+from study_app.designer.problems.problems import element_of
 from study_app.protocol.source.files import shipped_file
 
 

@@ -6,24 +6,21 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.additions import additions_for
-from study_app.designer.document.edited_study import Study, read
-from study_app.designer.document.elements import outline
+from study_app.designer.document.additions import additions_for, repairs
+from study_app.designer.document.elements import brief, found_fields, outline, position_of, used_by
+from study_app.designer.document.study import Study, read
 from study_app.designer.document.study_facts import facts
-from study_app.designer.form.element_facts import brief, used_by
-from study_app.designer.form.form_rows import form, position_of
+from study_app.designer.form.form import form
 from study_app.designer.measures.level_plots import Controls
 from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.observers import Asked, Measurable, Observed, Planted
 from study_app.designer.measures.planned import Detectable, Finding, GroupPrecision, Simulated
 from study_app.designer.outline.addable import addable, fields_to_go_to
 from study_app.designer.outline.outline_rows import outline_rows
-from study_app.designer.place.file_text import file_text
-from study_app.designer.place.prompt_facts import series_prompt, series_titles
+from study_app.designer.place.file import file_text
 from study_app.designer.place.requests import MakeSeries
-from study_app.designer.problems.finding import found_fields
-from study_app.designer.problems.problem_rows import problem_rows
-from study_app.designer.problems.repairs import repairs
+from study_app.designer.place.steps import series_prompt, series_titles
+from study_app.designer.problems.problems import problem_rows
 from study_app.protocol.source.document import Path
 from tests.authoring.test_study_transcripts import elements, generic, studies
 from tests.golden import compare

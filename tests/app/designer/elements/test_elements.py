@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 
-from study_app.designer.document.edited_study import read
-from study_app.designer.place.edit_steps import Steps
+from study_app.designer.document.study import read
 from study_app.designer.place.requests import ChangeLanguage, RenameElement, SetText
+from study_app.designer.place.steps import Steps
 from study_app.protocol.source.document import value_at
 from tests.authoring.grown import PROTOCOLS
 

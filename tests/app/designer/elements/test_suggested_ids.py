@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
-from study_app.designer.document.writer.edits import Set
+from study_app.designer.document.toml_edits import Set
 from study_app.designer.place.requests import AddElement, AddNamed, RenameElement, SetText
 from study_app.protocol.source.document import value_at
 

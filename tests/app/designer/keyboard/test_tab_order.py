@@ -75,7 +75,7 @@ def test_tab_goes_to_each_stop_of_a_form_once(dutch: Any, editors: None, path: t
 def test_tab_goes_through_problems_questions_and_the_banner_which_are_made_later(
     qtbot: Any, designer: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("study_app.designer.problems.repair_search.REST_MS", 0)
+    monkeypatch.setattr("study_app.designer.problems.problems.REST_MS", 0)
     designer.open()
     designer.editing.ask(ChangeLanguage("add", "nl"))
     designer.saving.save()

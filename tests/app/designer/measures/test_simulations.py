@@ -9,8 +9,8 @@ import pytest
 from PySide6.QtCore import QSize, Qt
 
 from study_app.analysis.planning.threshold_studies import plans, sweep
-from study_app.designer.document.edited_study import read
-from study_app.designer.document.writer.edits import Set, Unset
+from study_app.designer.document.study import read
+from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.level_plots import Controls
 from study_app.designer.measures.measures_view import Focus, focus_of
 from study_app.designer.measures.number_cards import ANEW, FAILED, UNKNOWN

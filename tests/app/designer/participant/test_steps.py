@@ -2,8 +2,8 @@
 
 import pytest
 
-from study_app.designer.document.edited_study import Study
-from study_app.designer.document.writer.edits import Edit, Set, Unset
+from study_app.designer.document.study import Study
+from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.participant.first_step import first_step
 from study_app.designer.participant.playable import NotPlayableError, playable
 from study_app.designer.participant.shown_step import STANDALONE, StepPosition, same_step, showing, step_name

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from study_app.designer.document.edited_study import Study, read
+from study_app.designer.document.study import Study, read
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import EndPage, FeedbackPage, Page, TaskPage
 from tests.app.designer.support.inputs import wait_until

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.designer.form.element_form import FormCard
+from study_app.designer.form.card import FormCard
 from study_app.designer.outline.card import OutlineCard
 from study_app.designer.outline.rows import ROW_ROLE
 from study_app.designer.place.segments import Segments

@@ -104,7 +104,7 @@ def test_another_study_that_cannot_be_saved_keeps_its_edits_as_a_draft(
     def full(*_args: object) -> str:
         raise StoreError("the disk is full")
 
-    monkeypatch.setattr("study_app.designer.place.open_study.save", full)
+    monkeypatch.setattr("study_app.designer.place.editing.save", full)
     keep_setting(ran.file.with_name("pantry.toml"), "participants", 7)  # of a study that was deleted
     ran.editing.ask(SetValue(REPETITIONS, 3))
     ran.saving.save_as_another("pantry")

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.edited_study import Study, read
 from study_app.designer.document.elements import outline
-from study_app.designer.form.form_rows import form
+from study_app.designer.document.study import Study, read
+from study_app.designer.form.form import form
 from study_app.designer.new_study.templates import FOLDER, templates
 from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import shipped, shipped_file

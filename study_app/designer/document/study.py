@@ -1,0 +1,314 @@
+"""A study that is edited: its text, from which all else is computed, and its steps of undo and redo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path as File
+from typing import Any, Final
+
+from study_app.designer.document.toml_edits import Edit, Unset, apply, check_encodable, meaning
+from study_app.designer.document.toml_text import Refused, Splice, Splices, applied, reverted
+from study_app.errors import Problem, ProtocolError
+from study_app.protocol.load import examined, located, read_document
+from study_app.protocol.model import Protocol
+from study_app.protocol.source.document import Path, Places, frozen, has
+from study_app.protocol.source.files import TABLE, with_liquid_files
+from study_app.protocol.source.problems import Fault
+
+_NOT_TOML: Final = "the file cannot be read: correct its text first"
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study's text, from which all else is computed.
+
+    Attributes
+    ----------
+    text : str
+        The file's text, with its own line breaks.
+    folder : Path
+        Where the liquid files are that it names.
+    before : mapping
+        The document of the last text that was valid TOML, used while this one is not.
+    """
+
+    text: str
+    folder: File = File()
+    before: Mapping[str, Any] = field(default_factory=dict, compare=False)
+
+    @cached_property
+    def _source(self) -> bytes:
+        return with_liquid_files(self.text.encode(), self.folder)
+
+    @cached_property
+    def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
+        """The document with the files that it names and its line numbers; None and the reason if it is not TOML."""
+        try:
+            return *read_document(self._source, ""), ()
+        except ProtocolError as error:
+            return None, Places(""), error.problems
+
+    @cached_property
+    def _examined(self) -> tuple[Protocol | None, tuple[Fault, ...]]:
+        document, _, broken = self._read
+        if document is None:
+            return None, tuple(Fault((), problem.message, problem.hint) for problem in broken)
+        protocol, found = examined(document)
+        return protocol, tuple(found)
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        """The tables of the text, arrays as tuples; those of the last valid text if this one is not TOML."""
+        document = self._read[0]
+        if document is None:
+            return self.before
+        bundled = self._source != self.text.encode()
+        return {key: value for key, value in document.items() if key != TABLE} if bundled else document
+
+    @property
+    def protocol(self) -> Protocol | None:
+        """The protocol, None if there are faults."""
+        return None if self.faults else self.formed
+
+    @property
+    def formed(self) -> Protocol | None:
+        """The protocol, even if it has forces beyond a limit; None if there are other faults."""
+        return self._examined[0]
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The faults, by path."""
+        return self._examined[1]
+
+    @cached_property
+    def problems(self) -> tuple[Problem, ...]:
+        """The faults, as ``check`` prints them."""
+        _, places, broken = self._read
+        return broken or located(self.faults, places)
+
+    @property
+    def is_toml(self) -> bool:
+        """Whether the text is valid TOML; otherwise only the text can be edited."""
+        return self._read[0] is not None
+
+    @property
+    def unreadable(self) -> bool:
+        """Whether there is only a text: it cannot be read, and no text before it could be."""
+        return not self.is_toml and not self.before
+
+    def needs(self, place: Path) -> bool:
+        """Return whether a table of a section would be incomplete without one of its keys."""
+        after, _ = self.edited(Unset(place))
+        table = place[:2]
+        without = {fault for fault in after.faults if fault.path[: len(table)] == table}
+        return not without <= set(self.faults)
+
+    @property
+    def trial(self) -> Trial:
+        """The same study for trial edits.
+
+        Raises
+        ------
+        Refused
+            The text is not TOML.
+        """
+        if (document := self._read[0]) is None:
+            raise Refused(_NOT_TOML)
+        found = Trial("", self.folder, source=document)
+        if "_examined" in self.__dict__:
+            found.__dict__["_examined"] = self._examined
+        return found
+
+    def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
+        """Return the study after some edits, one after the other, and their splices.
+
+        Raises
+        ------
+        Refused
+            The text is not TOML, or an edit makes no sense.
+        """
+        if not self.is_toml:
+            raise Refused(_NOT_TOML)
+        text, steps = self.text, list[Splices]()
+        for edit in edits:
+            text, found = apply(text, edit)
+            steps += found
+        return self._with(text), tuple(steps)
+
+    def typed(self, text: str) -> tuple[Study, tuple[Splices, ...]]:
+        """Return the study with another text, and the one splice that makes it.
+
+        Raises
+        ------
+        Refused
+            The text cannot be written as UTF-8.
+        """
+        check_encodable(text)
+        old, shortest, first, last = self.text, min(len(self.text), len(text)), 0, 0
+        while first < shortest and old[first] == text[first]:
+            first += 1
+        while last < shortest - first and old[-1 - last] == text[-1 - last]:
+            last += 1
+        splice = Splice(first, old[first : len(old) - last], text[first : len(text) - last])
+        return (self, ()) if old == text else (self._with(text), ((splice,),))
+
+    def spliced(self, steps: tuple[Splices, ...]) -> Study:
+        """Return the study with splices applied in sequence."""
+        text = self.text
+        for step in steps:
+            text = applied(text, step)
+        return self._with(text)
+
+    def _with(self, text: str) -> Study:
+        return Study(text, self.folder, self.document)
+
+
+@dataclass(frozen=True)
+class Trial(Study):
+    """A study for trial edits: applies them to the document without the text, which takes far longer to write.
+
+    Files that only edits name are not read.
+    """
+
+    source: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
+        return dict(self.source), Places(""), ()
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        """The tables, arrays as tuples."""
+        return {key: value for key, value in self.source.items() if key != TABLE}
+
+    def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
+        """Return the study after some edits, one after the other, with no splices.
+
+        Raises
+        ------
+        Refused
+            An edit makes no sense.
+        """
+        document = dict(self.source)
+        for edit in edits:
+            document = meaning(document, edit)
+        return (replace(self, source=frozen(document)) if edits else self), ()
+
+
+def read(source: bytes, folder: File = File()) -> Study:
+    """Return the study from a file's bytes.
+
+    Raises
+    ------
+    Refused
+        They are not UTF-8 text.
+    """
+    try:
+        return Study(source.decode("utf-8"), folder)
+    except UnicodeDecodeError as error:
+        line = source.count(b"\n", 0, error.start) + 1
+        raise Refused(f"line {line} is not UTF-8 text: save the file as UTF-8") from error
+
+
+MOST_STEPS: Final = 500
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step: its words ("Move Honey up"), its splices, and what was selected before and after it."""
+
+    words: str
+    splices: tuple[Splices, ...]
+    before: Path = ()
+    after: Path = ()
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """A study with the steps that led to it, newest last, and those that were undone, next to be redone last."""
+
+    study: Study
+    selected: Path = ()
+    done: tuple[Step, ...] = ()
+    undone: tuple[Step, ...] = ()
+
+    def edited(self, words: str, *edits: Edit, select: Path | None = None, joins: bool = False) -> History:
+        """Return the history after a step of some edits.
+
+        Parameters
+        ----------
+        words : str
+            What the step does.
+        *edits : Edit
+            Made one after the other.
+        select : tuple of str or int or None
+            What is selected after it; None leaves the selection.
+        joins : bool
+            Whether it continues the last step, as letters of one text do.
+
+        Raises
+        ------
+        Refused
+            An edit makes no sense; nothing is changed.
+        """
+        return self._after(*self.study.edited(*edits), words, select, joins=joins)
+
+    def typed(self, words: str, text: str, *, joins: bool = False) -> History:
+        """Return the history after a step that gives the file another text: typed, reverted or read again."""
+        return self._after(*self.study.typed(text), words, None, joins=joins)
+
+    def _after(
+        self, study: Study, splices: tuple[Splices, ...], words: str, select: Path | None, *, joins: bool
+    ) -> History:
+        selected = self.selected if select is None else select
+        if not splices:
+            return replace(self, selected=selected)
+        step = Step(words, splices, self.selected, selected)
+        done = self.done
+        if joins and done and not self.undone:
+            last, done = done[-1], done[:-1]
+            step = Step(words, (*last.splices, *splices), last.before, selected)
+        return History(study, selected, (*done, step)[-MOST_STEPS:])
+
+    def undo(self) -> History:
+        """Return the history before its last step; the same where there is none."""
+        if not self.done:
+            return self
+        *done, step = self.done
+        study = self.study.spliced(tuple(reverted(splices) for splices in reversed(step.splices)))
+        return History(study, step.before, tuple(done), (*self.undone, step))
+
+    def redo(self) -> History:
+        """Return the history after the step that was undone last; the same where there is none."""
+        if not self.undone:
+            return self
+        *undone, step = self.undone
+        return History(self.study.spliced(step.splices), step.after, (*self.done, step), tuple(undone))
+
+
+def with_value(node: Any, path: Path, value: Any) -> Any:
+    """Return a document with a value at a path; unchanged if its parent is missing."""
+    if not path:
+        return value
+    step, rest = path[0], path[1:]
+    if isinstance(node, Mapping):
+        return {**node, step: with_value(node.get(step, {}), rest, value)}
+    if isinstance(step, int) and isinstance(node, tuple) and step < len(node):
+        return (*node[:step], with_value(node[step], rest, value), *node[step + 1 :])
+    return node
+
+
+def without_value(node: Any, path: Path) -> Any:
+    """Return a document without the value at a path; unchanged if there is none."""
+    step, rest = path[0], path[1:]
+    if not has(node, step):
+        return node
+    if isinstance(node, Mapping):
+        if not rest:
+            return {key: value for key, value in node.items() if key != step}
+        return {**node, step: without_value(node[step], rest)}
+    assert isinstance(step, int)  # noqa: S101 - of an array
+    inner = () if not rest else (without_value(node[step], rest),)
+    return (*node[:step], *inner, *node[step + 1 :])

@@ -1,0 +1,727 @@
+"""Edits of a TOML text, as splices: of keys and tables, of entries of arrays, and of values."""
+
+import copy
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final, TypeAlias
+
+from study_app.designer.document.toml_text import (
+    INDENT,
+    WIDTH,
+    Editor,
+    Piece,
+    Refused,
+    Slot,
+    Spans,
+    Splices,
+    applied,
+    inline,
+    key_text,
+    spans_of,
+    tables,
+    written,
+)
+from study_app.protocol.source.document import Node, Path
+
+_PADDING: Final = re.compile(r"([ \t]+)#")
+_COMMA: Final = re.compile(r"[ \t]*,[ \t]*")
+_BLANK_LINE: Final = re.compile(r"[ \t]*(?:\r?\n|\Z)")
+
+
+def replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
+    """Replace the value that is written at ``path``; a comment behind it stays in its column where possible."""
+    node = spans.node(path)
+    if node is None or node.kind in {"table", "array table"}:
+        raise Refused("a table with headers cannot become a value in place")
+    text, like = spans.text, spans.text[node.value : node.end]
+    line = text.rfind("\n", 0, node.start) + 1
+    indent = re.match(r"[ \t]*", text[line:]).group()  # type: ignore[union-attr]
+    column = node.value - line
+    lines = node.kind == "key"
+    if lines and isinstance(value, Mapping) and value and column + len(inline(value)) > WIDTH:
+        key = text[node.parts[0][0] : node.parts[-1][1]]
+        rows = (f"{key}.{key_text(name)} = {written(part, newline=spans.newline)}" for name, part in value.items())
+        edit.replace(node.start, node.end, f"{spans.newline}{indent}".join(rows))
+        return
+    after = inline(value) if node.kind == "pair" else written(value, like, spans.newline, indent, column)
+    edit.replace(node.value, node.end, after)
+    padding = _PADDING.match(text, node.end)
+    if padding and "\n" not in like + after:
+        wide = len(padding.group(1))
+        kept = max(wide + len(like) - len(after), min(wide, 2))
+        edit.replace(*padding.span(1), padding.group(1) if kept == wide else " " * kept)
+
+
+def add_key(spans: Spans, edit: Editor, path: Path, value: Any, after: str | None = None) -> None:
+    """Add a key that is not there to a table that is; ``after`` names the key or table that it comes after."""
+    parent, pieces = path[:-1], spans.pieces(path[:-1])
+    owner = spans.node(parent)
+    if parent and not pieces:
+        add_key(spans, edit, parent, {path[-1]: value})
+    elif owner is not None and owner.kind in {"key", "pair", "entry"}:
+        _add_pair(spans, edit, owner, path, value)
+    elif parent and owner is None and (dotted := [piece for piece in pieces if piece.node.kind in {"key", "pair"}]):
+        _add_dotted(spans, edit, dotted[-1], path, value)
+    elif _with_header(spans, path, value):
+        _add_table(spans, edit, path, value, after)
+    elif parent and owner is None:
+        body = tables(parent, {path[-1]: value}, spans.newline)  # type: ignore[dict-item]
+        edit.insert(pieces[0].start, body + spans.newline)
+    else:
+        _add_line(spans, edit, owner, path, value, after)
+
+
+def _with_header(spans: Spans, path: Path, value: Any) -> bool:
+    """Return whether a new table gets a header: as its neighbours have, at the root, or where it fills more lines."""
+    if isinstance(value, list | tuple):
+        if not value or not all(isinstance(entry, Mapping) and entry for entry in value):
+            return False
+    elif not isinstance(value, Mapping):
+        return False
+    fits = len(key_text(str(path[-1]))) + 3 + len(inline(value)) <= WIDTH
+    within = len(path) - 1
+    neighbours = any(len(node.path) > within and node.path[:within] == path[:-1] for node in spans.headers())
+    return not fits or len(path) == 1 or (neighbours and isinstance(value, Mapping))
+
+
+def _add_table(spans: Spans, edit: Editor, path: Path, value: Any, after: str | None) -> None:
+    entry = isinstance(value, list | tuple)
+    rows = value if entry else [value]
+    body = spans.newline.join(tables(path, row, spans.newline, entry=entry) for row in rows)
+    pieces = _headed(spans, (*path[:-1], after)) if after is not None else []
+    pieces = pieces or (_headed(spans, path[:-1]) if len(path) > 1 else [])
+    insert_block(spans, edit, pieces[-1].end if pieces else len(spans.text), body)
+
+
+def _headed(spans: Spans, path: Path) -> list[Piece]:
+    return [piece for piece in spans.pieces(path) if piece.node.kind in {"table", "array table"}]
+
+
+def insert_block(spans: Spans, edit: Editor, at: int, body: str) -> None:
+    """Insert whole lines after the piece that ends at ``at``, with a blank line before them, and after where needed."""
+    text, newline = spans.text, spans.newline
+    before = text[:at]
+    opening = "" if not before.strip() else newline if before.endswith("\n") else newline * 2
+    if before.endswith(newline * 2):
+        opening = ""
+    closing = "" if _BLANK_LINE.match(text, at) else newline
+    if at == len(text) and before and not before.endswith("\n"):
+        body = body.removesuffix(newline)
+    edit.insert(at, opening + body + closing)
+
+
+def insert_lines(spans: Spans, edit: Editor, at: int, lines: str) -> None:
+    """Insert whole lines; at the end of a text without a last line break, the text stays without."""
+    if at and not spans.text[:at].endswith("\n"):
+        lines = spans.newline + lines.removesuffix(spans.newline)
+    edit.insert(at, lines)
+
+
+def _add_line(spans: Spans, edit: Editor, owner: Node | None, path: Path, value: Any, after: str | None) -> None:
+    section = list(spans.section(owner))
+    depth = len(path)
+    named = [node for node in section if after is not None and node.path[:depth] == (*path[:-1], after)]
+    last = named[-1] if named else section[-1] if section else owner
+    key = f"{key_text(str(path[-1]))} = "
+    if last is None:
+        first = next(spans.headers(), None)
+        at = len(spans.text) if first is None else spans.owned_start(first)
+        line = f"{key}{written(value, newline=spans.newline, column=len(key))}{spans.newline}"
+        insert_lines(spans, edit, at, line if first is None else line + spans.newline)
+        return
+    line_start = spans.text.rfind("\n", 0, last.start) + 1
+    indent = spans.text[line_start : last.start]
+    line = f"{indent}{key}{written(value, '', spans.newline, indent, len(indent + key))}{spans.newline}"
+    insert_lines(spans, edit, spans.line_end(last), line)
+
+
+def _add_pair(spans: Spans, edit: Editor, owner: Node, path: Path, value: Any) -> None:
+    """Add a pair to an inline table, after its last one."""
+    inner = [piece for piece in spans.pieces(path[:-1])[:1] if piece.node is owner]
+    if not inner or spans.text[owner.value] != "{":
+        raise Refused("a value that is not a table has no keys")
+    pair = f"{key_text(str(path[-1]))} = {inline(value)}"
+    pairs = [node for node in spans.nodes if node.kind == "pair" and owner.value < node.start < owner.end]
+    top = [node for node in pairs if len(node.path) - len(node.parts) == len(path) - 1]
+    if top:
+        edit.insert(top[-1].end, f", {pair}")
+    else:
+        edit.replace(owner.value, owner.end, f"{{ {pair} }}")
+
+
+def _add_dotted(spans: Spans, edit: Editor, piece: Piece, path: Path, value: Any) -> None:
+    """Add a key to a table that is written with dotted keys: after the last one, with the same beginning."""
+    node, text = piece.node, spans.text
+    parts = node.parts[: len(path) - 1 - (len(node.path) - len(node.parts))]
+    key = f"{text[parts[0][0] : parts[-1][1]]}.{key_text(str(path[-1]))} = "
+    if node.kind == "pair":
+        edit.insert(node.end, f", {key}{inline(value)}")
+        return
+    indent = text[text.rfind("\n", 0, node.start) + 1 : node.start]
+    like = text[node.value : node.end]
+    value_text = written(value, like, spans.newline, indent, len(indent + key))
+    insert_lines(spans, edit, piece.end, f"{indent}{key}{value_text}{spans.newline}")
+
+
+def remove_key(spans: Spans, edit: Editor, path: Path) -> None:
+    """Remove a key or table with its comments, and the blank line before it where two would be left."""
+    for piece in spans.pieces(path):
+        if piece.node.kind == "pair":
+            _remove_pair(spans, edit, piece)
+        else:
+            edit.delete(blank_before(spans.text, piece), piece.end)
+
+
+def blank_before(text: str, piece: Piece) -> int:
+    """Return where to begin a deletion: before the blank lines above, if a blank line or the end follows."""
+    start = piece.start
+    if not _BLANK_LINE.match(text, piece.end):
+        return start
+    while start and not text[(above := text.rfind("\n", 0, start - 1) + 1) : start].strip():
+        start = above
+    return start
+
+
+def _remove_pair(spans: Spans, edit: Editor, piece: Piece) -> None:
+    comma = _COMMA.match(spans.text, piece.end)
+    if comma:
+        edit.delete(piece.start, comma.end())
+        return
+    before = spans.text[: piece.start].rstrip(" \t")
+    edit.delete(len(before[:-1].rstrip(" \t")) if before.endswith(",") else piece.start, piece.end)
+
+
+def copy_table(spans: Spans, edit: Editor, path: Path, name: str) -> None:
+    """Copy a key or table with its comments under another name, right after it."""
+    pieces = spans.pieces(path)
+    copies = [_renamed(spans, piece, len(path) - 1, name) for piece in pieces]
+    last = pieces[-1]
+    if last.node.kind == "pair":
+        edit.insert(last.end, "".join(f", {text}" for text in copies))
+    elif all(piece.node.kind == "key" for piece in pieces):
+        insert_lines(spans, edit, last.end, "".join(copies))
+    else:
+        insert_block(spans, edit, last.end, spans.newline.join(copies))
+
+
+def _renamed(spans: Spans, piece: Piece, depth: int, name: str) -> str:
+    """Return the text of a piece with another name for the step at ``depth`` of its paths, whole lines."""
+    editor = Editor(spans.text)
+    for start, end in _key_parts(spans, piece.node.path[: depth + 1]):
+        if piece.start <= start < piece.end:
+            editor.replace(start, end, key_text(name))
+    found, at = "", piece.start
+    for splice in editor.splices:
+        found += spans.text[at : splice.at] + splice.after
+        at = splice.at + len(splice.before)
+    found += spans.text[at : piece.end]
+    return found if piece.node.kind == "pair" or found.endswith("\n") else found + spans.newline
+
+
+def rename_key(spans: Spans, edit: Editor, path: Path, name: str) -> None:
+    """Write another name for a key wherever it stands."""
+    for start, end in _key_parts(spans, path):
+        edit.replace(start, end, key_text(name))
+
+
+def _key_parts(spans: Spans, path: Path) -> Iterator[tuple[int, int]]:
+    """Yield where the last step of a path is written, in headers and keys."""
+    depth = len(path) - 1
+    for node in spans.nodes:
+        if node.path[: depth + 1] != path or not node.parts:
+            continue
+        if node.kind in {"table", "array table"}:
+            yield node.parts[sum(isinstance(step, str) for step in path) - 1]
+        elif (place := depth - (len(node.path) - len(node.parts))) >= 0:
+            yield node.parts[place]
+
+
+_TO_COMMA: Final = re.compile(r"(?:[ \t\r\n]|#[^\n]*+)*+,")
+_LINE_REST: Final = re.compile(r"[ \t]*(\r?\n)")
+
+
+def _entry(path: Path) -> tuple[Path, int]:
+    index = path[-1]
+    if not isinstance(index, int):
+        raise Refused("an entry of an array has a number")
+    return path[:-1], index
+
+
+def insert_entry(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
+    """Insert an entry at the index that ends ``path``, into an array that is in the text."""
+    array, index = _entry(path)
+    node = spans.node(array)
+    if node is None:
+        _insert_table(spans, edit, path, value)
+        return
+    slots = spans.slots(array)
+    if not slots:
+        edit.insert(node.end - 1, inline(value))
+    elif index < len(slots):
+        slot = slots[index]
+        own = slot.own_line
+        edit.insert(
+            slot.start, f"{_indent(spans, slot)}{inline(value)},{spans.newline}" if own else f"{inline(value)}, "
+        )
+    elif slots[-1].own_line:
+        _append(spans, edit, slots[-1], inline(value))
+    elif _fits(spans, node.start, node.end, value):
+        edit.insert(slots[-1].end, f", {inline(value)}")
+    else:
+        _spread(spans, edit, array, slots, inline(value))
+
+
+def _fits(spans: Spans, start: int, end: int, value: Any) -> bool:
+    line = spans.text.rfind("\n", 0, start) + 1
+    return "\n" in spans.text[start:end] or end - line + len(inline(value)) + 2 <= WIDTH
+
+
+def _spread(spans: Spans, edit: Editor, array: Path, slots: list[Slot], value: str) -> None:
+    """Write an array that becomes too long for its line with a line for each entry."""
+    node = spans.node(array)
+    if node is None:
+        return
+    line = spans.text.rfind("\n", 0, node.start) + 1
+    indent = re.match(r"[ \t]*", spans.text[line:]).group()  # type: ignore[union-attr]
+    entries = [*(spans.text[slot.entry : slot.end] for slot in slots), value]
+    rows = "".join(f"{indent}{INDENT}{entry},{spans.newline}" for entry in entries)
+    edit.replace(node.value, node.end, f"[{spans.newline}{rows}{indent}]")
+
+
+def _indent(spans: Spans, slot: Slot) -> str:
+    return re.match(r"[ \t]*", spans.text[spans.text.rfind("\n", 0, slot.entry) + 1 :]).group()  # type: ignore[union-attr]
+
+
+def _append(spans: Spans, edit: Editor, last: Slot, body: str, tail: str = "") -> None:
+    """Add lines after the line on which an entry ends, with a comment behind; a missing comma is added before them."""
+    newline = spans.newline
+    comma = _TO_COMMA.match(spans.text, last.end)
+    if comma is None:
+        edit.insert(last.end, ",")
+        edit.insert(last.tail_end, f"{newline}{_indent(spans, last)}{body}{tail}")
+        return
+    edit.insert(max(comma.end(), last.tail_end), f"{newline}{_indent(spans, last)}{body},{tail}")
+
+
+def _insert_table(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
+    array, index = _entry(path)
+    if not isinstance(value, Mapping):
+        raise Refused("an entry of an array of tables is a table")
+    body = tables(path, value, spans.newline, entry=True)
+    if following := spans.pieces((*array, index)):
+        edit.insert(following[0].start, body + spans.newline)
+    else:
+        insert_block(spans, edit, spans.pieces(array)[-1].end, body)
+
+
+def remove_entry(spans: Spans, edit: Editor, path: Path) -> None:
+    """Remove an entry with its comments."""
+    array, index = _entry(path)
+    if spans.node(array) is None:
+        for piece in spans.pieces(path):
+            edit.delete(blank_before(spans.text, piece), piece.end)
+        return
+    text, slots = spans.text, spans.slots(array)
+    slot, last = slots[index], index == len(slots) - 1
+    comma = _TO_COMMA.match(text, slot.end)
+    if comma is None and index and not text[slots[index - 1].end : slot.entry].strip(", \t"):
+        edit.delete(slots[index - 1].end, slot.tail_end)  # with the comma before it, on one line
+        return
+    if comma is not None and comma.end() > slot.tail:  # the comma stands on a later line
+        edit.delete(comma.end() - 1, comma.end())
+    line = _LINE_REST.match(text, slot.tail_end)
+    if slot.own_line and line:
+        edit.delete(slot.start, line.end())
+        return
+    space = "" if last or slot.tail_end > slot.tail else re.match(r"[ \t]*", text[slot.tail_end :]).group()  # type: ignore[union-attr]
+    start = slot.start if text[slot.start : slot.entry].strip() else slot.entry
+    edit.delete(start, slot.tail_end + len(space))
+
+
+def copy_entry(spans: Spans, edit: Editor, path: Path) -> None:
+    """Copy an entry with its comments, right after it."""
+    array, index = _entry(path)
+    text, newline = spans.text, spans.newline
+    if spans.node(array) is None:
+        pieces = spans.pieces(path)
+        copies = (_lines(text, piece, newline) for piece in pieces)
+        insert_block(spans, edit, pieces[-1].end, newline.join(copies))
+        return
+    slots = spans.slots(array)
+    slot = slots[index]
+    tail = text[slot.tail : slot.tail_end]
+    if not slot.own_line and not tail:
+        edit.insert(slot.end, f", {text[slot.entry : slot.end]}")
+    elif slot.own_line and index < len(slots) - 1:
+        edit.insert(slots[index + 1].start, f"{text[slot.start : slot.end]},{tail}{newline}")
+    else:  # the comment behind it ends the line
+        _append(spans, edit, slot, text[slot.start : slot.end].lstrip(" \t"), tail)
+
+
+def _lines(text: str, piece: Piece, newline: str) -> str:
+    found = text[piece.start : piece.end]
+    return found if found.endswith("\n") else found + newline
+
+
+def move_entry(spans: Spans, edit: Editor, path: Path, to: int) -> None:
+    """Move an entry with its comments to another index; the others close up."""
+    array, index = _entry(path)
+    order = list(range(max(index, to) + 1))
+    order.insert(to, order.pop(index))
+    if spans.node(array) is None:
+        _move_table(spans, edit, array, order)
+        return
+    text, slots = spans.text, spans.slots(array)
+    for place, source in enumerate(order):
+        if place == source:
+            continue
+        old, new = slots[place], slots[source]
+        body, tail = text[new.start : new.end], text[new.tail : new.tail_end]
+        if old.own_line and not new.own_line:
+            body = _indent(spans, old) + body
+        elif new.own_line and not old.own_line:
+            body = body.lstrip(" \t")
+        edit.replace(old.start, old.end, body)
+        if tail and not _LINE_REST.match(text, old.tail_end):
+            tail += spans.newline
+        edit.replace(old.tail, old.tail_end, tail)
+
+
+def _move_table(spans: Spans, edit: Editor, array: Path, order: list[int]) -> None:
+    """Write the entries of an array of tables in another order, each into the place of another one."""
+    text = spans.text
+    pieces = [spans.pieces((*array, index)) for index in range(len(order))]
+    for place, source in enumerate(order):
+        if place == source:
+            continue
+        body = spans.newline.join(_lines(text, piece, spans.newline) for piece in pieces[source])
+        first, *others = pieces[place]
+        if not text[first.start : first.end].endswith("\n"):
+            body = body.removesuffix(spans.newline)
+        edit.replace(first.start, first.end, body)
+        for piece in others:
+            edit.delete(blank_before(text, piece), piece.end)
+
+
+Document: TypeAlias = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Set:
+    """Give a key or entry a value; a key that is missing is added, with the tables it is in, after ``after``."""
+
+    path: Path
+    value: Any
+    after: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Unset:
+    """Remove a key, table or entry."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Insert:
+    """Insert an entry into an array, at the index that ends ``path``."""
+
+    path: Path
+    value: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Duplicate:
+    """Copy a table or entry right after itself; a table under the name ``name``."""
+
+    path: Path
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Move an entry of an array to the index ``to``."""
+
+    path: Path
+    to: int
+
+
+@dataclass(frozen=True, slots=True)
+class Rename:
+    """Give a table another name; ``references`` are the places of texts that name it and follow."""
+
+    path: Path
+    name: str
+    references: tuple[Path, ...] = ()
+
+
+Edit: TypeAlias = Set | Unset | Insert | Duplicate | Move | Rename
+
+
+class WriterError(AssertionError):
+    """The text that an edit produced does not mean what the edit meant: a bug of the writer."""
+
+
+def apply(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
+    """Return the text after an edit, and the splices of its steps, each of the text before it.
+
+    Raises
+    ------
+    Refused
+        The edit makes no sense in this text.
+    WriterError
+        The edit was written wrongly; this is a bug.
+    """
+    document = _read(text)
+    meant = meaning(document, edit)
+    steps: list[Splices] = []
+    parts = list(_parts(document, edit))
+    while parts:
+        part = parts.pop(0)
+        spans, editor = spans_of(text), Editor(text)
+        if isinstance(part, Set) and _written_apart(spans, part.path):
+            parts = [Unset(part.path), part, *parts]
+            continue
+        _write(spans, editor, part)
+        if editor.splices:
+            steps.append(editor.splices)
+            text = applied(text, editor.splices)
+    try:
+        found = _read(text)
+    except tomllib.TOMLDecodeError as error:
+        raise WriterError(f"{edit} made a text that is not TOML: {error}") from error
+    if not same(found, meant) and not same(_pruned(copy.deepcopy(found), edit.path), _pruned(meant, edit.path)):
+        raise WriterError(f"{edit} made another document than the one meant")
+    return text, tuple(steps)
+
+
+@lru_cache(maxsize=4)
+def _read(text: str) -> Document:
+    """Return the document of a text, which must not be changed."""
+    return tomllib.loads(text)
+
+
+def meaning(document: Mapping[str, Any], edit: Edit) -> Document:
+    """Return the document that an edit means; what it does not change is shared with the document before.
+
+    Raises
+    ------
+    Refused
+        The edit makes no sense in this document.
+    """
+    found: Document = dict(document)
+    *parent, last = edit.path
+    if isinstance(edit, Set):
+        _check_value(edit.value)
+        node = _own(found, parent, makes=True)
+        if isinstance(node, list):
+            _at(node, last)
+        elif not isinstance(node, dict):
+            raise Refused(f"{_words(tuple(parent))} is not a table: it has no key {last}")
+        node[last] = copy.deepcopy(edit.value)
+        return found
+    node = _own(found, parent)
+    if isinstance(edit, Insert):
+        _check_value(edit.value)
+        if not isinstance(node, list) or not isinstance(last, int) or not 0 <= last <= len(node):
+            raise Refused(f"{_words(tuple(parent))} has no place {last} for a new entry")
+        node.insert(last, copy.deepcopy(edit.value))
+        return found
+    value = _at(node, last)
+    if isinstance(edit, Unset):
+        del node[last]
+    elif isinstance(edit, Duplicate):
+        _duplicate(node, last, value, edit.name)
+    elif isinstance(edit, Move):
+        if not isinstance(node, list) or not isinstance(last, int) or not 0 <= edit.to < len(node):
+            raise Refused(f"{_words(edit.path)} cannot move to place {edit.to + 1}")
+        node.insert(edit.to, node.pop(last))
+    else:
+        _rename(found, node, edit)
+    return found
+
+
+def _own(document: Document, path: Iterable[str | int], *, makes: bool = False) -> Any:
+    """Return what is at a path as the document's own: tables and arrays on the way are copied, the rest is shared."""
+    node: Any = document
+    for step in path:
+        inner = {} if makes and isinstance(node, dict) and step not in node else _at(node, step)
+        node[step] = dict(inner) if isinstance(inner, dict) else list(inner) if _is_array(inner) else inner
+        node = node[step]
+    return node
+
+
+def same(one: Any, other: Any) -> bool:
+    """Return whether two values are the same in TOML: 1, 1.0 and true differ."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return len(one) == len(other) and all(same(*pair) for pair in zip(one, other, strict=True))
+    return type(one) is type(other) and (one == other or (one != one and other != other))  # noqa: PLR0124 - NaN
+
+
+def _duplicate(node: Any, last: Any, value: Any, name: str) -> None:
+    if isinstance(node, list):
+        node.insert(last + 1, copy.deepcopy(value))
+        return
+    _check_free(node, name)
+    node[name] = copy.deepcopy(value)
+
+
+def _rename(found: Document, node: Any, edit: Rename) -> None:
+    if not isinstance(node, dict):
+        raise Refused("entries of an array have no name")
+    _check_free(node, edit.name)
+    for *parent, last in edit.references:
+        _own(found, parent)[last] = edit.name
+    node = _own(found, edit.path[:-1])
+    node[edit.name] = node.pop(edit.path[-1])
+
+
+def _check_free(node: Mapping[str, Any], name: str) -> None:
+    if name in node:
+        raise Refused(f'the name "{name}" is taken: choose another one')
+
+
+def _check_value(value: Any) -> None:
+    if isinstance(value, Mapping):
+        for key, part in value.items():
+            _check_value(key)
+            _check_value(part)
+    elif isinstance(value, list | tuple):
+        for part in value:
+            _check_value(part)
+    elif value is None:
+        raise Refused("a value cannot be empty: remove the key")
+    elif isinstance(value, str):
+        check_encodable(value)
+
+
+def check_encodable(text: str) -> None:
+    """Refuse a text that UTF-8 cannot write.
+
+    Raises
+    ------
+    Refused
+        It holds half of a character that needs two units of UTF-16.
+    """
+    if any("\ud800" <= letter <= "\udfff" for letter in text):
+        raise Refused("the text holds half a character, which UTF-8 cannot write: type it again")
+
+
+def _at(node: Any, step: str | int) -> Any:
+    if not _has(node, step):
+        raise Refused(f"there is no {step + 1 if isinstance(step, int) else step} in the study any more")
+    return node[step]
+
+
+def _has(node: Any, step: str | int) -> bool:
+    if _is_array(node):
+        return isinstance(step, int) and 0 <= step < len(node)
+    return isinstance(node, dict) and step in node
+
+
+def _is_array(node: Any) -> bool:
+    return isinstance(node, list | tuple)
+
+
+def _words(path: Path) -> str:
+    return ".".join(str(step + 1) if isinstance(step, int) else step for step in path) or "the file"
+
+
+def _parts(document: Document, edit: Edit) -> Iterator[Edit]:
+    """Yield edits that are one step of writing each."""
+    if not isinstance(edit, Set):
+        yield edit
+        return
+    node: Any = document
+    for depth, step in enumerate(edit.path):
+        if isinstance(node, dict) and step not in node:
+            value = edit.value
+            for missing in reversed(edit.path[depth + 1 :]):
+                value = {missing: value}
+            yield Set(edit.path[: depth + 1], value, edit.after if depth == len(edit.path) - 1 else None)
+            return
+        node = node[step]
+    yield from _changes(edit.path, node, edit.value)
+
+
+def _changes(path: Path, old: Any, new: Any) -> Iterator[Edit]:
+    """Yield the fewest edits that turn one value into another; what stays keeps its place and comments."""
+    if same(old, new):
+        return
+    if isinstance(old, dict) and isinstance(new, Mapping) and new:
+        for key in [key for key in new if key in old]:
+            yield from _changes((*path, key), old[key], new[key])
+        previous = None
+        for key in new:
+            if key not in old:
+                yield Set((*path, key), new[key], previous)
+            previous = key
+        yield from (Unset((*path, key)) for key in old if key not in new)
+    elif isinstance(old, list) and isinstance(new, list | tuple) and old and new:
+        yield from _list_changes(path, old, list(new))
+    else:
+        yield Set(path, new)
+
+
+def _list_changes(path: Path, old: list[Any], new: list[Any]) -> Iterator[Edit]:
+    shortest, first = min(len(old), len(new)), 0
+    while first < shortest and same(old[first], new[first]):
+        first += 1
+    last = 0
+    while last < shortest - first and same(old[-1 - last], new[-1 - last]):
+        last += 1
+    for index in range(first, shortest - last):
+        yield from _changes((*path, index), old[index], new[index])
+    for index in range(shortest - last, len(new) - last):
+        yield Insert((*path, index), new[index])
+    for index in reversed(range(shortest - last, len(old) - last)):
+        yield Unset((*path, index))
+
+
+def _write(spans: Spans, editor: Editor, edit: Edit) -> None:
+    path = edit.path
+    if isinstance(edit, Insert):
+        insert_entry(spans, editor, path, edit.value)
+    elif isinstance(edit, Move):
+        move_entry(spans, editor, path, edit.to)
+    elif isinstance(edit, Rename):
+        rename_key(spans, editor, path, edit.name)
+        for reference in edit.references:
+            if (node := spans.node(reference)) is not None:
+                editor.replace(node.value, node.end, written(edit.name, spans.text[node.value : node.end]))
+    elif isinstance(edit, Duplicate):
+        if isinstance(path[-1], int):
+            copy_entry(spans, editor, path)
+        else:
+            copy_table(spans, editor, path, edit.name)
+    elif isinstance(edit, Unset):
+        (remove_entry if isinstance(path[-1], int) else remove_key)(spans, editor, path)
+    elif spans.node(path) is None:
+        add_key(spans, editor, path, edit.value, edit.after)
+    else:
+        replace_value(spans, editor, path, edit.value)
+
+
+def _written_apart(spans: Spans, path: Path) -> bool:
+    """Return whether a value is written with headers or dotted keys, so that another one cannot be put in its place."""
+    node = spans.node(path)
+    apart = node.kind in {"table", "array table"} if node is not None else bool(spans.pieces(path))
+    if apart and isinstance(path[-1], int):
+        raise Refused(f"{_words(path)} is a table with a header: it cannot become a value")
+    return apart
+
+
+def _pruned(document: Document, path: Path) -> Document:
+    """Return a document without the tables and arrays around ``path`` that hold nothing: TOML may not write them."""
+    for length in range(len(path), 0, -1):
+        node: Any = document
+        for step in path[: length - 1]:
+            node = node[step] if _has(node, step) else None
+        if isinstance(node, dict) and node.get(path[length - 1]) in ({}, []):
+            del node[path[length - 1]]
+    return document

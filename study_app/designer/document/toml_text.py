@@ -1,0 +1,374 @@
+"""Where everything of a TOML text is written, with its comments; values as text, and splices of the text."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from typing import Any, Final, NamedTuple, TypeAlias
+
+import tomlkit
+import tomlkit.items
+
+from study_app.errors import StudyError
+from study_app.protocol.source.document import Node, Path, scan
+
+
+class Refused(StudyError):
+    """The study cannot be changed in this way; its message says why, and nothing was changed.
+
+    ``free`` is a name that would be taken in place of the one that is refused, "" where it is about something else.
+    """
+
+    def __init__(self, message: str, free: str = "") -> None:
+        super().__init__(message)
+        self.free = free
+
+
+def free_in(error: StudyError) -> str:
+    """Return the name that a refusal proposes, "" where it proposes none."""
+    return error.free if isinstance(error, Refused) else ""
+
+
+class Splice(NamedTuple):
+    """``before`` at position ``at`` of a text becomes ``after``."""
+
+    at: int
+    before: str
+    after: str
+
+
+Splices: TypeAlias = tuple[Splice, ...]
+"""Splices of one text, in order of their places, which do not overlap."""
+
+
+class Editor:
+    """Collects replacements of one text; insertions at one place keep their order."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self._found: list[Splice] = []
+
+    def replace(self, start: int, end: int, after: str) -> None:
+        """Replace the text from ``start`` to ``end``; nothing is kept of a replacement that changes nothing."""
+        if (before := self.text[start:end]) != after:
+            self._found.append(Splice(start, before, after))
+
+    def insert(self, at: int, after: str) -> None:
+        """Insert a text."""
+        self.replace(at, at, after)
+
+    def delete(self, start: int, end: int) -> None:
+        """Delete a piece; of pieces that overlap, what they cover together."""
+        self.replace(start, end, "")
+
+    @property
+    def splices(self) -> Splices:
+        """What was collected, overlapping deletions joined."""
+        joined: list[Splice] = []
+        for one in sorted(self._found, key=lambda splice: splice.at):
+            if joined and one.at < (end := joined[-1].at + len(joined[-1].before)):
+                last = joined.pop()
+                whole = self.text[last.at : max(end, one.at + len(one.before))]
+                one = Splice(last.at, whole, last.after + one.after)  # noqa: PLW2901
+            joined.append(one)
+        return tuple(joined)
+
+
+def applied(text: str, splices: Iterable[Splice]) -> str:
+    """Return a text with splices applied.
+
+    Raises
+    ------
+    ValueError
+        The text does not hold what a splice replaces.
+    """
+    parts: list[str] = []
+    end = 0
+    for at, before, after in splices:
+        if at < end or text[at : at + len(before)] != before:
+            raise ValueError("these splices belong to another text")
+        parts += (text[end:at], after)
+        end = at + len(before)
+    return "".join((*parts, text[end:]))
+
+
+def reverted(splices: Splices) -> Splices:
+    """Return the splices that undo these in the text that they produced."""
+    shift, found = 0, list[Splice]()
+    for at, before, after in splices:
+        found.append(Splice(at + shift, after, before))
+        shift += len(after) - len(before)
+    return tuple(found)
+
+
+_RULER: Final = re.compile(r"\s*#\s*[-=*#~]{3,}")
+_COMMENT: Final = re.compile(r"[ \t]*#")
+_REST: Final = re.compile(r"[ \t]*(?:#[^\r\n]*)?(\r?\n|\Z)")
+_TAIL: Final = re.compile(r"[ \t]*#[^\r\n]*")
+_COMMA: Final = re.compile(r"[ \t]*,")
+
+
+class Piece(NamedTuple):
+    """A part of the text that belongs to one path, from ``start`` to ``end``; ``node`` is what it begins with."""
+
+    node: Node
+    start: int
+    end: int
+
+
+class Slot(NamedTuple):
+    """An entry of an array in its place.
+
+    ``start`` to ``end`` is the entry with its comments above, then follows a comma until ``tail`` (or none), then the
+    comment behind it until ``tail_end``. ``own_line`` says that nothing precedes the entry on its line.
+    """
+
+    start: int
+    entry: int
+    end: int
+    tail: int
+    tail_end: int
+    own_line: bool
+
+
+@lru_cache(maxsize=4)
+def spans_of(text: str) -> Spans:
+    """Return where everything of a TOML text is written."""
+    return Spans(text)
+
+
+class Spans:
+    """Where everything of a TOML text is written."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.nodes = scan(text)
+        self.newline = "\r\n" if "\r\n" in text else "\n"
+        self._by_path = {node.path: node for node in self.nodes}
+        self._lines = [node for node in self.nodes if node.kind in {"table", "array table", "key"}]
+        self._starts = [node.start for node in self._lines]
+
+    def node(self, path: Path) -> Node | None:
+        """Return the header, key or entry of a path; None where it is only a part of others' paths, or not there."""
+        return self._by_path.get(path)
+
+    def pieces(self, path: Path) -> list[Piece]:
+        """Return everything that makes up the value at ``path``, in order.
+
+        A table may be written as several headers and dotted keys, which need not be next to each other.
+        """
+        found: list[Piece] = []
+        end = 0
+        for node in self.nodes:
+            if node.start >= end and node.path[: len(path)] == path:
+                found.append(self._piece(node))
+                end = found[-1].end
+        return found
+
+    def _piece(self, node: Node) -> Piece:
+        if node.kind in {"pair", "entry"}:
+            return Piece(node, node.start, node.end)
+        last = self.last_of(node) if node.kind != "key" else node
+        return Piece(node, self.owned_start(node), self.line_end(last))
+
+    def last_of(self, header: Node | None) -> Node | None:
+        """Return the last key of a header's section, the header where it has none; None stands for the root."""
+        place = -1 if header is None else self._place(header)
+        last = header
+        for node in self._lines[place + 1 :]:
+            if node.kind != "key":
+                break
+            last = node
+        return last
+
+    def section(self, header: Node | None) -> Iterator[Node]:
+        """Yield the keys of a header's section; None stands for the root."""
+        for node in self._lines[0 if header is None else self._place(header) + 1 :]:
+            if node.kind != "key":
+                return
+            yield node
+
+    def headers(self) -> Iterator[Node]:
+        """Yield every header."""
+        return (node for node in self._lines if node.kind != "key")
+
+    def line_end(self, node: Node | None) -> int:
+        """Return where the line ends on which a header or key ends, after its comment and line break."""
+        if node is None:
+            return 0
+        rest = _REST.match(self.text, node.end)
+        return rest.end() if rest else node.end
+
+    def owned_start(self, node: Node) -> int:
+        """Return where a header or key begins with its line and the comments right above it."""
+        place = self._place(node)
+        return self._with_comments(node.start, self.line_end(self._lines[place - 1]) if place else 0)
+
+    def _place(self, node: Node) -> int:
+        return bisect_right(self._starts, node.start) - 1
+
+    def _line_start(self, position: int) -> int:
+        return self.text.rfind("\n", 0, position) + 1
+
+    def _with_comments(self, position: int, floor: int) -> int:
+        """Return where the comments right above the line of ``position`` begin, not before ``floor``."""
+        start = max(self._line_start(position), floor)
+        while start > floor:
+            above = self._line_start(start - 1)
+            if above < floor or not _COMMENT.match(self.text, above) or _RULER.match(self.text, above):
+                break
+            start = above
+        return start
+
+    def slots(self, path: Path) -> list[Slot]:
+        """Return the entries of the array written at ``path``, each with its comments."""
+        node = self._by_path[path]
+        floor, found = node.value + 1, list[Slot]()
+        index = 0
+        while (entry := self._by_path.get((*path, index))) is not None:
+            line = self._line_start(entry.start)
+            own = line >= floor and not self.text[line : entry.start].strip()
+            start = self._with_comments(entry.start, floor) if own else entry.start
+            comma = _COMMA.match(self.text, entry.end)
+            after = comma.end() if comma else entry.end
+            tail = _TAIL.match(self.text, after)
+            found.append(Slot(start, entry.start, entry.end, after, tail.end() if tail else after, own))
+            floor = found[-1].tail_end
+            index += 1
+        return found
+
+
+_PIECES: Final = re.compile(
+    r'"""(?:\\.|[^\\])*?"""(?!")'
+    r"|'''.*?'''(?!')"
+    r'|"(?:\\.|[^"\\\n])*"'
+    r"|'[^'\n]*'"
+    r"|(?P<comment>#[^\r\n]*)",
+    re.DOTALL,
+)
+"""Strings, in which a # begins no comment, and comments."""
+
+
+class Comment(NamedTuple):
+    """A comment: its line, from 1, and its text with the #."""
+
+    line: int
+    text: str
+
+
+def comments_naming(text: str, name: str) -> tuple[Comment, ...]:
+    """Return the comments that mention a name as a whole word.
+
+    A name of letters alone may be a common word, so it counts only in quotes, after "[" or ".", or as a key before "=".
+    """
+    plain = re.escape(name)
+    as_code = rf"([`\"']){plain}\1|(?<=[\[.]){plain}(?![\w-])|(?<![\w.-]){plain}\s*="
+    word = re.compile(as_code if name.isalpha() else rf"(?<![\w-]){plain}(?![\w-])")
+    return tuple(
+        Comment(text.count("\n", 0, found.start()) + 1, found["comment"].rstrip())
+        for found in _PIECES.finditer(text)
+        if found["comment"] and word.search(found["comment"])
+    )
+
+
+WIDTH: Final = 120
+INDENT: Final = "    "
+_BARE: Final = re.compile(r"[A-Za-z0-9_-]+")
+_LITERAL: Final = re.compile(r"[^'\x00-\x08\x0a-\x1f\x7f]*")
+
+
+def key_text(key: str) -> str:
+    """Return a key as it is written, in quotes where it needs them."""
+    return key if _BARE.fullmatch(key) else str(tomlkit.key(key).as_string())
+
+
+def header_text(path: Iterable[str | int]) -> str:
+    """Return the path of a header as it is written; entries of arrays stand in it for themselves."""
+    return ".".join(key_text(key) for key in path if isinstance(key, str))
+
+
+def written(value: Any, like: str = "", newline: str = "\n", indent: str = "", column: int = 0) -> str:
+    """Return a value, as ``tomllib`` reads it, as TOML.
+
+    Parameters
+    ----------
+    value : str or bool or int or float
+        Or a date, a table or an array.
+    like : str
+        The text of the value that it replaces, or of a neighbour: its quotes and its lines are kept where possible.
+    newline, indent : str
+        The text's line break, and what a line begins with on which the value begins.
+    column : int
+        Characters on the line before the value.
+    """
+    if isinstance(value, str):
+        return _string(value, like, newline)
+    if isinstance(value, list | tuple) and value:
+        line = inline(value)
+        if "\n" not in like and column + len(line) <= WIDTH:
+            return line
+        inner = indent + (INDENT if not like else _indent_in(like, indent))
+        rows = "".join(f"{inner}{inline(entry)},{newline}" for entry in value)
+        return f"[{newline}{rows}{indent}]"
+    return inline(value)
+
+
+def inline(value: Any) -> str:
+    """Return a value as TOML without a line break."""
+    if isinstance(value, Mapping):
+        pairs = ", ".join(f"{key_text(key)} = {inline(entry)}" for key, entry in value.items())
+        return f"{{ {pairs} }}" if pairs else "{}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(inline, value))}]"
+    return str(tomlkit.item(value).as_string())
+
+
+def tables(path: tuple[str | int, ...], value: Mapping[str, Any], newline: str, *, entry: bool = False) -> str:
+    """Return a table with its header; inner tables that fill more than a line get headers of their own.
+
+    ``entry`` says that it is an entry of an array of tables.
+    """
+    name = header_text(path)
+    lines, inner = [f"[[{name}]]" if entry else f"[{name}]"], list[str]()
+    for key, part in value.items():
+        column = len(key_text(key)) + 3
+        fits = column + len(inline(part)) <= WIDTH
+        if isinstance(part, Mapping) and part and not fits:
+            inner.append(tables((*path, key), part, newline))
+        elif isinstance(part, list | tuple) and part and not fits and all(isinstance(row, Mapping) for row in part):
+            inner += [tables((*path, key), row, newline, entry=True) for row in part]
+        else:
+            lines.append(f"{key_text(key)} = {written(part, newline=newline, column=column)}")
+    return newline.join(["".join(f"{line}{newline}" for line in lines), *inner])
+
+
+def wrapped(text: str) -> str:
+    """Return a text of paragraphs with lines of at most 120 characters, as it is written between triple quotes."""
+    return "\n\n".join(_filled(part) for part in re.split(r"\n[ \t]*\n", text)) + "\n"
+
+
+def _filled(paragraph: str) -> str:
+    lines = [""]
+    for word in paragraph.split():
+        if lines[-1] and len(lines[-1]) + 1 + len(word) > WIDTH:
+            lines.append("")
+        lines[-1] += f" {word}" if lines[-1] else word
+    return "\n".join(lines)
+
+
+def _string(value: str, like: str, newline: str) -> str:
+    if "\n" in value and "\r" not in value:
+        # tomlkit writes another line break before a text that begins with one: with the sign, none does.
+        body = tomlkit.string(f"-{value}", multiline=True).as_string()[4:-3]
+        return f'"""{newline}{body.replace(chr(10), newline)}"""'
+    if like.startswith("'") and _LITERAL.fullmatch(value):
+        return f"'{value}'"
+    return inline(value)
+
+
+def _indent_in(array: str, indent: str) -> str:
+    """Return by how much the entries of an array are indented."""
+    found = re.search(r"\n([ \t]*)[^\s#\]]", array)
+    return found.group(1).removeprefix(indent) if found else INDENT

@@ -1,0 +1,205 @@
+"""The form of one element of a study, made from its tables, faults and places in the file."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+from study_app.designer.document.additions import number_rows
+from study_app.designer.document.elements import FIRST, brief, kind_of, place_words, position_of, title_of, used_by
+from study_app.designer.document.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
+from study_app.designer.document.names import named_at
+from study_app.designer.document.study import Study
+from study_app.designer.form.row_widget import EDITORS
+from study_app.designer.form.rows import NO_QUESTIONS, STUDY_LANGUAGES, Entry, Form, FormRow, Section, question_lines
+from study_app.designer.measures.participant_texts import copied_texts, texts_by_language
+from study_app.designer.outline.outline_rows import icon_of
+from study_app.protocol.source.document import Path, Places, entries, places_of, value_at
+from study_app.protocol.wording.languages import LANGUAGES, language_name
+
+ENTRIES: Final = "Entries"
+DEEPEST: Final = 3
+"""So many tables within each other are shown in one form."""
+UNREADABLE: Final = "Correct the text in the tab File"
+WITH_LIQUIDS = ("liquids", "conditions", "blocks")
+"""Sections whose elements the lab opens."""
+
+
+def form(study: Study, path: Path) -> Form:
+    """Return the form of the element at ``path``."""
+    if study.unreadable:
+        lines = [f"Line {one.line}: " if one.line else "" for one in study.problems]
+        said = [_sentence(one.message, one.hint) for one in study.problems]
+        why = tuple(map("".join, zip(lines, said, strict=True)))
+        return Form(FIRST, title_of({}, FIRST), icon_of(FIRST, {}), UNREADABLE, faults=why, unreadable=True)
+    document, places = study.document, places_of(study.text)
+    own_row = row_at(document, path) if len(path) == 1 else None
+    if own_row is not None and own_row.kind == "tables":
+        own_row = replace(own_row, label=ENTRIES)
+        sections: tuple[Section, ...] = (Section(path, "", (_form_row(study, own_row, places),)),)
+    else:
+        sections = tuple(_sections(study, path, places, 0))
+    shown = {row.row.path for section in sections for row in section.rows}
+    shown |= {section.path for section in sections if section.path != path}
+    within = [fault for fault in study.faults if fault.path[: len(path)] == path]
+    within = [fault for fault in within if not any(fault.path[: len(one)] == one for one in shown)]
+    own = tuple(_sentence(one.message, one.hint) for one in within if one.path != (*path, "id"))
+    of_id = tuple(_sentence(one.message, one.hint) for one in within if one.path == (*path, "id"))
+    value = value_at(document, path)
+    name = value.get("id") if isinstance(value, Mapping) else None
+    if name is None and len(path) == 2 and isinstance(value, Mapping):
+        name = str(path[1])
+    if name is None and of_id:
+        name = ""
+    title = title_of(document, path)
+    return Form(
+        path, title, icon_of(path, document), kind_of(path) or "Section of the file",
+        None if name is None else str(name), sections, own, of_id, position_of(document, path),
+        question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
+        tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
+        f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
+        bool(number_rows(document, path)),
+        used_by(document, path),
+    )  # fmt: skip
+
+
+def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[Section]:
+    whole = row_at(study.document, path) if len(path) == 1 else None
+    if whole is not None and whole.kind not in {"table", "tables"}:
+        yield Section(path, "", (_form_row(study, whole, places),))
+        return
+    shown: list[FormRow] = []
+    absent: list[Row] = []
+    below: list[Path] = []
+    of_table, refused = rows(study.document, path), refused_at(study.document, path)
+    other = {row.path[-1]: row for row in of_table}
+    for row in of_table:
+        faulty = any(fault.path[: len(row.path)] == row.path for fault in study.faults)
+        if row.kind == "table" and row.value is not None and depth < DEEPEST and isinstance(row.value, Mapping):
+            below.append(row.path)
+        elif (
+            row.kind == "tables"
+            and _facts_of(row) is None
+            and depth < DEEPEST
+            and len(row.path) > 1
+            and isinstance(row.value, Mapping)
+            and not any(isinstance(value, Mapping) for value in row.value.values())
+        ):
+            shown += [
+                _form_row(study, replace(inner, label=f"{row.label}, {inner.label}"), places)
+                for key in row.value
+                if (inner := row_at(study.document, (*row.path, key))) is not None
+            ]
+        elif row.instead and not _given(other[row.instead]) and (_given(row) or faulty):
+            both = tuple((str(key), one.label) for key, one in other.items() if key in {row.path[-1], row.instead})
+            shown.append(replace(_form_row(study, row, places), instead=both))
+        elif (row.value is None and not faulty and row.path[-1] in refused) or (
+            row.instead and _given(other[row.instead]) and not _given(row)
+        ):
+            continue
+        elif row.value is None and _optional(row) and not (row.required or faulty):
+            absent.append(row)
+        elif row.path[-1] != "id" or len(path) < 3:
+            shown.append(_form_row(study, row, places))
+    title = "" if depth == 0 else label_of(path[-1])
+    inside = {row.row.path for row in shown}
+    faults = tuple(
+        _sentence(fault.message, fault.hint)
+        for fault in study.faults
+        if depth
+        and fault.path[: len(path)] == path
+        and not any(fault.path[: len(one)] == one for one in inside)
+        and not any(fault.path[: len(one)] == one for one in below)
+    )
+    rest = (title, tuple(row.path[-1] for row in (*(one.row for one in shown), *absent)))
+    for words, keys in (*sections_of(study.document, path), rest):
+        own = tuple(row for key in keys for row in shown if row.row.path[len(path)] == key)
+        missing = tuple(row for key in keys for row in absent if row.path[-1] == key)
+        shown = [row for row in shown if row not in own]
+        absent = [row for row in absent if row not in missing]
+        if own or missing:
+            yield Section(path, words, own, missing, faults)
+            faults = ()
+    for table in below:
+        yield from _sections(study, table, places, depth + 1)
+
+
+def _given(row: Row) -> bool:
+    return row.value not in (None, ())
+
+
+def _optional(row: Row) -> bool:
+    """Return whether a key that the file lacks is offered below its section, not shown with what counts without it."""
+    return row.kind == "table" or (row.default in (None, [], {}) and row.kind not in {"kind", "switch"})
+
+
+def _form_row(study: Study, row: Row, places: Places) -> FormRow:
+    document, path = study.document, row.path
+    faults = tuple(_sentence(fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path)
+    if path == STUDY_LANGUAGES:
+        row = replace(row, choices=tuple(Choice(code, language_name(code)) for code in LANGUAGES))
+    codes = [str(code) for _, code in entries(document, "study.languages.*")] or ["en"]
+    number = None
+    if row.kind == "either":
+        number = next((index for index, one in enumerate(row.either) if _fits(one, row.value)), 0)
+    return FormRow(
+        row,
+        place_words(path, places.line(path)),
+        faults,
+        tuple((code, language_name(code)) for code in codes) if row.kind in {"localised", "paragraphs"} else (),
+        tuple(_entries(study, row)),
+        named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
+        tuple(_notes(document, row)),
+        number,
+        facts=facts(study, row) if (facts := _facts_of(row)) is not None else None,
+    )
+
+
+def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:
+    if row.kind == "reference":
+        for choice in row.choices:
+            facts = (brief(document, (section, str(choice.value))) for section in row.sections)
+            yield str(choice.value), next(filter(None, facts), "")
+
+
+def _entries(study: Study, row: Row) -> Iterator[Entry]:
+    if row.path == STUDY_LANGUAGES:
+        counts, copied = texts_by_language(study), copied_texts(study)
+        for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
+            (there, wanted), alike = counts.get(str(code), (0, 0)), copied.get(str(code), 0)
+            note = f"{there - alike} of {wanted} texts" + (f", {alike} to translate" if alike else "")
+            yield Entry((*row.path, at), language_name(str(code)), note, wanted - there)
+    if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
+        keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))
+        for key in keys:
+            path = (*row.path, key)
+            faults = sum(fault.path[: len(path)] == path for fault in study.faults)
+            if row.kind == "references":
+                named = named_at(study.document, path)
+                title = str(row.value[key]) if named is None else title_of(study.document, named)
+                note = "" if named is None or isinstance(named[-1], int) else named[-1]
+                yield Entry(path, title, note, faults, named or ())
+            else:
+                inner = value_at(study.document, path)
+                note = inner.get("id", "") if isinstance(inner, Mapping) else ""
+                yield Entry(path, title_of(study.document, path), str(note), faults, path)
+
+
+def _fits(row: Row, value: Any) -> bool:
+    """Return whether a value is of the kind that a row edits."""
+    if row.kind in {"number", "whole number"}:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    if isinstance(value, tuple):
+        return row.kind in {"numbers", "vector", "points", "texts", "choices", "references", "list"}
+    if isinstance(value, Mapping):
+        return row.kind in {"table", "tables", "localised"}
+    return row.kind not in {"numbers", "vector", "points", "texts", "choices", "references", "list", "table", "tables"}
+
+
+def _sentence(message: str, hint: str) -> str:
+    sentence = f"{message[:1].upper()}{message[1:]}"
+    return f"{sentence} ({hint})" if hint else sentence
+
+
+def _facts_of(row: Row) -> Callable[[Study, Row], Any] | None:
+    special = EDITORS.get((row.model, str(row.path[-1])))
+    return None if special is None else special.facts

@@ -1,0 +1,471 @@
+"""Lists in the form: entries that are selected, moved, copied and removed together, each time as one step."""
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final
+
+from PySide6.QtCore import QEvent, QItemSelectionModel, QSize, Qt, Signal
+from PySide6.QtGui import QDropEvent, QFocusEvent, QGuiApplication, QKeyEvent, QKeySequence, QResizeEvent
+from PySide6.QtWidgets import QAbstractItemView, QBoxLayout, QFrame, QLabel, QListWidget, QListWidgetItem, QWidget
+
+from study_app.designer.document.elements import title_of
+from study_app.designer.document.fields import Row
+from study_app.designer.document.study import Study
+from study_app.designer.form.fields import Field, SpecialEditor, add_button, kept, written
+from study_app.designer.form.rows import FormRow, new_words
+from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
+from study_app.designer.measures.number_cards import UNKNOWN
+from study_app.designer.measures.valid_part import valid_part
+from study_app.designer.place.requests import (
+    AddElement,
+    AddEntry,
+    AddNamed,
+    AskSeries,
+    ChangeLanguage,
+    DuplicateEntries,
+    MoveEntries,
+    Paste,
+    RemoveKey,
+    Request,
+    SetValue,
+    Several,
+)
+from study_app.gui.kit.commands import tip, with_key
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
+from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
+from study_app.gui.widgets.labels import Elided, figures
+from study_app.haptics.model.slope_limits import HAND_MPS, steady
+from study_app.number_text import typed_numbers
+from study_app.protocol.source.document import Path
+
+CAPTION: Final = f"force at {HAND_MPS:g} m/s of the hand"
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionLine:
+    """One condition of a block.
+
+    Attributes
+    ----------
+    liquid : tuple of str or None
+        The place of its liquid, None where it has several or is not in the study.
+    note : str
+        Its liquid where it is named otherwise, and by how much the picture is late.
+    force : str
+        Its force with unit, "–" where it is not known.
+    clipped : bool
+        Whether a limit takes part of the force away.
+    """
+
+    liquid: Path | None
+    note: str
+    force: str
+    clipped: bool = False
+
+
+def condition_lines(study: Study, row: Row) -> tuple[ConditionLine, ...]:
+    """Return a line for each condition that a block presents."""
+    names = row.value if isinstance(row.value, tuple) else ()
+    return tuple(_line(study, name) for name in names)
+
+
+def _line(study: Study, name: Any) -> ConditionLine:
+    document = study.document
+    conditions, liquids = document.get("conditions", {}), document.get("liquids", {})
+    table = conditions.get(name) if isinstance(conditions, Mapping) and isinstance(name, str) else None
+    if not isinstance(table, Mapping):
+        return ConditionLine(None, "not in the study", UNKNOWN)
+    named = table.get("liquid")
+    known = isinstance(named, str) and isinstance(liquids, Mapping) and named in liquids
+    liquid: Path | None = ("liquids", str(named)) if known else None
+    several = table.get("liquids")
+    words = [title_of(document, liquid)] if liquid is not None and named != name else []
+    if isinstance(several, tuple):
+        words.append(f"{len(several)} liquids")
+    delay_ms = table.get("delay_ms", 0)
+    if isinstance(delay_ms, int | float):
+        words.append(f"{delay_ms:g} ms late")
+    valid = valid_part(study)
+    protocol = valid.protocol if valid.forces else None
+    if protocol is None or liquid is None or name not in protocol.conditions:
+        return ConditionLine(liquid, ", ".join(words), UNKNOWN)
+    found = steady(protocol.scene_for(str(name)))
+    return ConditionLine(liquid, ", ".join(words), f"{found.force_n:.2f} N", found.limit is not None)
+
+
+RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+
+
+class Rows(QListWidget):
+    """Qt's list, as high as its entries; ``keys`` are its own, and ``dropped`` says where a drag ended."""
+
+    dropped = Signal(int)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.keys: dict[str, Callable[[], object]] = {}
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setResizeMode(QListWidget.ResizeMode.Adjust)
+        self.setSpacing(2)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+
+    def event(self, event: QEvent) -> bool:
+        """Keep its keys from the place, which has the same ones for whole elements."""
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and self._own(event):
+            event.accept()
+            return True
+        return super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        own = self._own(event)
+        own() if own else super().keyPressEvent(event)
+
+    def _own(self, event: QKeyEvent) -> Callable[[], object] | None:
+        modifiers = event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
+        return self.keys.get(QKeySequence(event.key() | modifiers.value).toString())
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        if event.reason() != Qt.FocusReason.MouseFocusReason and not self.selectedIndexes():
+            self.setCurrentRow(max(0, self.currentRow()))  # where the keyboard is
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.doItemsLayout()  # else rows keep the width they had
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Say before which entry the dragged ones come; the study moves them."""
+        place = event.position().toPoint()
+        index = self.indexAt(place)
+        below = place.y() > self.visualRect(index).center().y()
+        event.setDropAction(Qt.DropAction.IgnoreAction)
+        self.dropped.emit(index.row() + below if index.isValid() else self.count())
+
+
+class EntryRow(QFrame):
+    """The frame of an entry, with its parts in a line."""
+
+    def __init__(self, words: str, parts: Iterable[QWidget | tuple[QWidget, int]], *, faulty: bool) -> None:
+        super().__init__()
+        self.setProperty("role", "entry")
+        self.setProperty("state", "refused" if faulty else "")
+        self.setAccessibleName(words)
+        self.setFixedHeight(FIELD_PX + 2)
+        self.line = hbox(*parts, spacing=2, margins=(12, 0, 2, 0), parent=self)
+
+    def add_button(self, icon: str, name: str, do: Callable[[], object], action: str = "") -> IconButton:
+        """Add a button; Tab passes one whose action has a key."""
+        made = IconButton(icon, name, with_key(name, action) if action else "", size=FIELD_PX - 2, role="plain")
+        if action:
+            made.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        made.clicked.connect(do)
+        self.line.addWidget(made)
+        return made
+
+
+class EntryList(Field):
+    """Entries in rows; ``changes`` carries a request and the indexes of the entries that are selected after it."""
+
+    changes = Signal(object, object)
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
+        self.box.setSpacing(6)
+        self.ordered = row.row.kind != "tables"
+        self.rows: list[EntryRow] = []
+        self.list = Rows()
+        self.list.setAccessibleName(row.row.label)
+        self.list.dropped.connect(self.move_entries)
+        self.list.itemDoubleClicked.connect(lambda item: self.open(self.list.row(item)))
+        self.list.keys = {
+            "Return": self._open_current,
+            "Enter": self._open_current,
+            "Ctrl+C": self._copy,
+            "Ctrl+V": self._paste,
+        }
+        if self.ordered:
+            self.list.setDragDropMode(QAbstractItemView.DragDropMode.InternalMove)
+            self.list.keys |= {"Alt+Up": partial(self._move_by, -1), "Alt+Down": partial(self._move_by, 1),
+                               "Del": lambda: self.remove(self.chosen), "Ctrl+D": self._duplicate}  # fmt: skip
+            self.list.setAccessibleDescription("Alt+Up and Alt+Down move entries, Delete removes them")
+        else:
+            self.list.itemClicked.connect(lambda item: self.open(self.list.row(item)))
+        self.box.addWidget(self.list)
+
+    def add_row(self, words: str, *parts: QWidget | tuple[QWidget, int], faulty: bool = False) -> EntryRow:
+        """Add an entry that shows some parts."""
+        made, item = EntryRow(words, parts, faulty=faulty), QListWidgetItem(self.list)
+        item.setData(Qt.ItemDataRole.AccessibleTextRole, words)
+        item.setSizeHint(QSize(0, FIELD_PX + 2))
+        self.list.setItemWidget(item, made)
+        self.rows.append(made)
+        self.list.setFixedHeight(len(self.rows) * (FIELD_PX + 6) + 4)
+        return made
+
+    def show_value(self) -> None:
+        """Do nothing: other entries make another field."""
+
+    def freeze(self) -> None:
+        """Change nothing from now on; entries can still be opened and copied."""
+        self.list.setDragEnabled(False)
+        self.list.setAccessibleDescription("")
+        self.list.keys = {keys: do for keys, do in self.list.keys.items() if keys in {"Return", "Enter", "Ctrl+C"}}
+
+    @property
+    def chosen(self) -> tuple[int, ...]:
+        """The entries that are selected."""
+        return tuple(sorted(index.row() for index in self.list.selectedIndexes()))
+
+    def choose(self, indexes: Iterable[int]) -> None:
+        """Select entries together; the first gets the keyboard with the list."""
+        self.list.clearSelection()
+        for at in sorted(indexes, reverse=True):
+            self.list.setCurrentRow(at, QItemSelectionModel.SelectionFlag.Select)
+
+    def take_keyboard(self) -> None:
+        """Give the keyboard to the entries where some are selected, else to the editor."""
+        (self.list if self.chosen else self).setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def place(self, at: int) -> tuple[str | int, ...]:
+        """Return the place of an entry in the study."""
+        return (*self.row.row.path, at)
+
+    def open(self, at: int) -> None:
+        """Open what an entry names."""
+        if at < len(self.row.entries) and (target := self.row.entries[at].target):
+            self.open_asked.emit(target)
+
+    def _open_current(self) -> None:
+        self.open(self.list.currentRow())
+
+    def _move_by(self, by: int) -> None:
+        if self.chosen:
+            self.move_entries(min(self.chosen) + by if by < 0 else max(self.chosen) + 1 + by)
+
+    def move_entries(self, to: int, indexes: tuple[int, ...] = ()) -> None:
+        """Ask to move entries, by default the selected ones, before the one at ``to``."""
+        indexes = indexes or self.chosen
+        first = to - sum(index < to for index in indexes)
+        after = tuple(range(first, first + len(indexes)))
+        if 0 <= to <= len(self.rows) and after != indexes:
+            self.changes.emit(MoveEntries(tuple(map(self.place, indexes)), to), after)
+
+    def remove(self, indexes: tuple[int, ...]) -> None:
+        """Ask to remove entries, the last first."""
+        if not indexes:
+            return
+        gone: tuple[Request, ...] = tuple(RemoveKey(self.place(index)) for index in reversed(indexes))
+        near = min(indexes[0], len(self.rows) - len(indexes) - 1)
+        words = f"Remove {len(gone)} entries of {self.row.row.label}"
+        self.changes.emit(gone[0] if len(gone) == 1 else Several(words, gone), () if near < 0 else (near,))
+
+    def _duplicate(self) -> None:
+        if self.row.row.kind != "references":  # a name that is listed twice is a fault
+            after = tuple(index + rank for rank, index in enumerate(self.chosen, start=1))
+            self.changes.emit(DuplicateEntries(tuple(map(self.place, self.chosen))), after)
+
+    def _copy(self) -> None:
+        self.copy_asked.emit(tuple(map(self.place, self.chosen)))
+
+    def _paste(self) -> None:
+        if text := QGuiApplication.clipboard().text().strip():
+            self.asked.emit(Paste(self.place(self.list.currentRow()), text))
+
+
+def names_list(
+    name: str, placeholder: str, items: Iterable[tuple[str, Any]], choose: Callable[[Any], object]
+) -> Choice:
+    """Return a list of what can be added: it shows no choice of its own."""
+    made = Choice()
+    made.setProperty("dense", "true")
+    made.setFont(font("label", weight=400))
+    made.setFixedHeight(FIELD_PX)
+    made.setAccessibleName(name)
+    made.setPlaceholderText(placeholder)
+    for words, data in items:
+        made.addItem(words, data)
+    made.setCurrentIndex(-1)
+    made.setEnabled(bool(made.count()))
+
+    def take(at: int) -> None:
+        made.setCurrentIndex(-1)
+        choose(made.itemData(at))
+
+    made.activated.connect(take)
+    return made
+
+
+class EntriesField(EntryList):
+    """References, tables in a list, or tables by name."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        label, path, count = row.row.label, row.row.path, len(row.entries)
+        for at, entry in enumerate(row.entries):
+            title = Elided("label", "bad" if entry.faults else "text")
+            title.show_text(entry.title)
+            shown = self.add_row(f"{label}, {entry.title}, {at + 1} of {count}", (title, 1), faulty=bool(entry.faults))
+            self.fill(shown, at)
+            if self.ordered:
+                for by, icon, word in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
+                    move = partial(self.move_entries, at - 1 if by < 0 else at + 2, (at,))
+                    shown.add_button(icon, f"Move {entry.title} {word}", move, word).setEnabled(0 <= at + by < count)
+            action = "open entry" if self.ordered else ""
+            opens = shown.add_button("arrow_right", f"Open {entry.title}", partial(self.open, at), action)
+            opens.setEnabled(bool(entry.target))
+            if self.ordered:
+                shown.add_button("cross", f"Remove {entry.title} from {label}", partial(self.remove, (at,)), "delete")
+        if row.row.kind == "references":
+            known = [(str(choice.value), AddEntry(path, str(choice.value))) for choice in row.row.choices]
+            new = [(new_words(section), AddNamed(path, section)) for section in row.row.sections]
+            self.add: QWidget = names_list(f"Add to {label}", "Add …", (*known, *new), self.asked.emit)
+        else:
+            self.add = add_button(f"Add to {label}", "Add")
+            self.add.clicked.connect(lambda: self.asked.emit(AddElement(path)))
+        self.foot = hbox(self.add, STRETCH)
+        add_layout(self.box, self.foot)
+        self.setFocusProxy(self.add)
+
+    def fill(self, shown: EntryRow, at: int) -> None:
+        """Show what is known of an entry beside its title."""
+        entry = self.row.entries[at]
+        if entry.note and entry.note.replace("_", " ") != entry.title.lower():
+            note = Elided("small", "text2")
+            note.show_text(entry.note)
+            note.setAlignment(RIGHT)
+            shown.line.addWidget(note)
+
+    def place(self, at: int) -> tuple[str | int, ...]:
+        """Return the place of an entry in the study."""
+        return self.row.entries[at].path
+
+
+class ConditionsField(EntriesField):
+    """The conditions of a block, each with its liquid, its delay and its force."""
+
+    caption = CAPTION
+
+    def __init__(self, row: FormRow) -> None:
+        self.lines: list[tuple[Elided, QLabel, IconButton]] = []
+        super().__init__(row)
+        self.show_value()
+        self.series = add_button(f"Series of {row.row.label.lower()}", "Series …")
+        self.series.setToolTip(tip("series"))
+        self.series.setEnabled(bool(row.entries))
+        self.series.clicked.connect(self._ask_for_series)
+        self.foot.insertWidget(1, self.series)
+
+    def _ask_for_series(self) -> None:
+        """Ask for a series of the selected condition, or of the last one."""
+        path = self.row.entries[self.chosen[0] if len(self.chosen) == 1 else -1].target
+        if path:
+            self.asked.emit(AskSeries(path))
+
+    def fill(self, shown: EntryRow, at: int) -> None:
+        """Show liquid and delay, force, and a button that opens the liquid."""
+        note, force = Elided("small", "text2"), figures()
+        force.setMinimumWidth(52)
+        for part in (note, force):
+            part.setAlignment(RIGHT)
+            shown.line.addWidget(part)
+        name = f"Open the liquid of {self.row.entries[at].title}"
+        liquid = shown.add_button("drop", name, lambda: self.open_asked.emit(self.row.facts[at].liquid))
+        self.lines.append((note, force, liquid))
+
+    def show_value(self) -> None:
+        """Show what is known of each condition."""
+        for (note, force, liquid), line in zip(self.lines, self.row.facts, strict=True):
+            note.show_text(line.note)
+            force.setText(f"{line.force}, clipped" if line.clipped else line.force)
+            liquid.setEnabled(line.liquid is not None)
+
+
+class LinesField(EntryList):
+    """Texts, or points, one in each line, with a button that adds one."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.lines: list[TypedLine] = []
+        count = len(row.row.value or ())
+        for at in range(count):
+            line = TypedLine(f"{row.row.label} {at + 1}")
+            line.typed.connect(partial(self._take, at))
+            line.came.connect(self.came)
+            shown = self.add_row(f"{row.row.label} {at + 1} of {count}", (line, 1))
+            shown.add_button("cross", f"Remove {line.accessibleName()}", partial(self.remove, (at,)), "delete")
+            self.lines.append(line)
+        self.add = add_button(f"Add to {row.row.label}")
+        self.add.clicked.connect(lambda: self.asked.emit(AddEntry(self.row.row.path)))
+        self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
+        self.setFocusProxy(self.lines[0] if self.lines else self.add)
+        self.show_value()
+
+    def show_value(self) -> None:
+        """Show each entry."""
+        for line, value in zip(self.lines, self.row.row.value or (), strict=False):
+            if not line.property("state"):
+                line.show_text(written(value))
+
+    def _copy(self) -> None:
+        QGuiApplication.clipboard().setText("\n".join(self.lines[at].words() for at in self.chosen))
+
+    def _paste(self) -> None:
+        with suppress(ValueError):  # another text than points
+            lines = filter(str.strip, QGuiApplication.clipboard().text().splitlines())
+            added = tuple(AddEntry(self.row.row.path, self._value(line)) for line in lines)
+            after = tuple(range(len(self.lines), len(self.lines) + len(added)))
+            self.changes.emit(Several(f"Paste into {self.row.row.label}", added), after)
+
+    def _value(self, text: str) -> Any:
+        """Return the value that a line says; a ValueError says why it is not a point."""
+        return text if self.row.row.kind == "texts" else [number for _, number in typed_numbers(text)]
+
+    def _take(self, at: int, text: str) -> None:
+        self.refusal, value = "", None
+        try:
+            value = self._value(text)
+        except ValueError as unclear:
+            self.refusal = f"{unclear}. {kept(self.row.row.value[at])}"
+        self.lines[at].show_refused(bool(self.refusal))
+        self.came.emit()
+        if not self.refusal:
+            self.asked.emit(SetValue((*self.row.row.path, at), value, typing=True))
+
+
+class LanguageListField(EntryList):
+    """The languages, each with what it lacks; a language is added to every text, and taken away with its texts."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.freeze()
+        codes = [str(code) for code in row.row.value] if isinstance(row.row.value, tuple) else []
+        first = row.entries[0].title if row.entries else ""
+        self.copies: dict[str, ActionButton] = {}
+        for at, (code, entry) in enumerate(zip(codes, row.entries, strict=True)):
+            title, note = Elided("label", "bad" if entry.faults else "text"), Elided("small", "text2")
+            title.show_text(entry.title)
+            note.show_text(entry.note)
+            note.setAlignment(RIGHT)
+            words = f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}"
+            shown = self.add_row(words, title, note, faulty=bool(entry.faults))
+            if entry.faults and at:
+                made = self.copies[code] = add_button(f"Copy {first} where {entry.title} has no text", f"Copy {first}")
+                made.clicked.connect(partial(self.asked.emit, ChangeLanguage("copy", code)))
+                shown.line.addWidget(made)
+            if len(codes) > 1:
+                name = f"Remove {entry.title} from every text"
+                shown.add_button("cross", name, partial(self.asked.emit, ChangeLanguage("remove", code)))
+        others = ((choice.sentence, choice.value) for choice in row.row.choices if choice.value not in codes)
+        add = lambda code: self.asked.emit(ChangeLanguage("add", code))  # noqa: E731
+        self.names = names_list("Add a language to every text", "Language …", others, add)
+        self.box.addWidget(self.names, 0, Qt.AlignmentFlag.AlignLeft)
+        self.setFocusProxy(self.names)
+
+
+CONDITIONS: Final = SpecialEditor((("Block", "conditions"),), ConditionsField, wide=True, facts=condition_lines)

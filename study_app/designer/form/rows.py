@@ -1,0 +1,275 @@
+"""What a form shows: its rows in sections, their words, and the lines of a questionnaire."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from study_app.designer.document.changes import is_copied
+from study_app.designer.document.fields import Choice, Row, label_of, singular
+from study_app.designer.document.study import Study
+from study_app.protocol.source.document import Path, entries, value_at
+from study_app.protocol.wording.languages import LANGUAGES, language_name
+
+ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}
+STATEMENT: Final = "statement"
+
+
+@dataclass(frozen=True, slots=True)
+class QuestionLine:
+    """One question.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        Its place.
+    number : int
+        Its place in the questionnaire, from 1.
+    kind, icon : str
+        Its kind, and the name of its icon.
+    texts : tuple of str
+        Its text in each language of the study, "" where it is missing.
+    note : str
+        When it is shown, "" where it always is.
+    faults : int
+        How many faults it has.
+    """
+
+    path: Path
+    number: int
+    kind: str
+    icon: str
+    texts: tuple[str, ...]
+    note: str = ""
+    faults: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class QuestionLines:
+    """Names of the study's languages, and the questions."""
+
+    languages: tuple[str, ...]
+    lines: tuple[QuestionLine, ...]
+
+
+def question_lines(study: Study, path: Path) -> QuestionLines:
+    """Return a line for each question of the list at ``path``."""
+    codes = [str(code) for _, code in entries(study.document, "study.languages.*")] or ["en"]
+    listed = value_at(study.document, path)
+    items = listed if isinstance(listed, tuple) else ()
+    numbers = {str(item.get("id")): at for at, item in enumerate(items, start=1) if isinstance(item, Mapping)}
+    lines = tuple(
+        _line(study, (*path, at), item, codes, numbers) for at, item in enumerate(items) if isinstance(item, Mapping)
+    )
+    return QuestionLines(tuple(language_name(code) for code in codes), lines)
+
+
+def _line(
+    study: Study, path: Path, item: Mapping[str, Any], codes: list[str], numbers: Mapping[str, int]
+) -> QuestionLine:
+    kind, text = str(item.get("kind", STATEMENT)), item.get("text", "")
+    texts = [text.get(code, "") for code in codes] if isinstance(text, Mapping) else [text, *[""] * (len(codes) - 1)]
+    faults = sum(fault.path[: len(path)] == path for fault in study.faults)
+    shown = tuple(one.strip() if isinstance(one, str) else "" for one in texts)
+    number = path[-1] + 1 if isinstance(path[-1], int) else 0
+    return QuestionLine(path, number, kind, ICONS.get(kind, "scale"), shown, _note(item, numbers), faults)
+
+
+def _note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
+    rule = item.get("show_if")
+    if not isinstance(rule, Mapping):
+        return ""
+    name, values = str(rule.get("item")), rule.get("is", ())
+    words = [label_of(str(value)) for value in (values if isinstance(values, tuple) else (values,))]
+    limits = [f"{label_of(key).lower()} {rule[key]:g}" for key in ("at_least", "at_most")
+              if isinstance(rule.get(key), int | float)]  # fmt: skip
+    return f"shown if {numbers.get(name, name)} is {' or '.join(words) if words else ' and '.join(limits)}"
+
+
+STUDY_LANGUAGES: Final = ("study", "languages")
+NO_QUESTIONS: Final = QuestionLines((), ())
+LEAST, MOST = "at least ", "at most "
+BELOW: Final = 2
+"""Where the keys of an element begin in a path, after its section and its id."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One entry of a list, or one table of a section: where it is, what it is called, and how many faults it has.
+
+    ``target`` is the element that it opens: what a reference names, else itself.
+    """
+
+    path: Path
+    title: str
+    note: str = ""
+    faults: int = 0
+    target: Path = ()
+
+
+@dataclass(frozen=True, slots=True)
+class FormRow:
+    """One row of the form.
+
+    Attributes
+    ----------
+    row : Row
+        What is edited and how.
+    place : str
+        Its place in the file, such as ``blocks.liquids.order``, with its line.
+    faults : tuple of str
+        What is wrong with it, in the words of ``check``.
+    languages : tuple of (str, str)
+        Code and name of each language of the study, for texts.
+    entries : tuple of Entry
+        What a list holds, or what references name.
+    target : tuple of str or int or None
+        What a reference names.
+    notes : tuple of (str, str)
+        Elements that a reference can name, each with its `brief` fact.
+    number : int or None
+        Of alternatives ("either"), which one the value is.
+    instead : tuple of (str, str)
+        Keys of which exactly one is given, with their labels: this row's and the other one.
+    facts : object
+        What its special editor shows beyond the value; None where it has none.
+    """
+
+    row: Row
+    place: str
+    faults: tuple[str, ...] = ()
+    languages: tuple[tuple[str, str], ...] = ()
+    entries: tuple[Entry, ...] = ()
+    target: Path | None = None
+    notes: tuple[tuple[str, str], ...] = ()
+    number: int | None = None
+    instead: tuple[tuple[str, str], ...] = ()
+    facts: Any = None
+
+    @property
+    def copied(self) -> tuple[str, ...]:
+        """The languages in which a text is still that of the first language."""
+        texts = self.row.value if isinstance(self.row.value, Mapping) else {}
+        return tuple(name for code, name in self.languages[1:] if is_copied(texts, code, self.languages[0][0]))
+
+    @property
+    def removable(self) -> bool:
+        """Whether the file holds the key and would be complete without it."""
+        path = self.row.path
+        given = self.row.value is not None and isinstance(path[-1], str)
+        section = (len(path) == 1 and self.row.kind == "tables") or path == STUDY_LANGUAGES
+        return given and not (self.row.required or self.instead or section)
+
+    @property
+    def bounds(self) -> str:
+        """What is permitted, in one line."""
+        return ", ".join(self.row.bounds)
+
+    @property
+    def range(self) -> str:
+        """What numbers are permitted, as short as can be: "1 to 100"."""
+        bounds = self.row.bounds
+        if len(bounds) == 2 and bounds[0].startswith(LEAST) and bounds[1].startswith(MOST):
+            return f"{bounds[0].removeprefix(LEAST)} to {bounds[1].removeprefix(MOST)}"
+        return self.bounds
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Rows under one heading ("" for those of the element itself), keys that can be added, and faults of no row."""
+
+    path: Path
+    title: str
+    rows: tuple[FormRow, ...]
+    absent: tuple[Row, ...] = ()
+    faults: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """The form of one element.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        The element.
+    title, icon, kind : str
+        What it is called, the name of its icon, and what it is: "Block".
+    id : str or None
+        Its name in the file, None where it has none of its own.
+    sections : tuple of Section
+        Its rows.
+    faults, id_faults : tuple of str
+        What is wrong with it that belongs to no row, and what is wrong with its id.
+    position : tuple of int or None
+        Its place in the session or list and how many there are, from 1; None where it has no order.
+    questions : QuestionLines
+        The questions of the questionnaire that it is in, itself included; none where it is no question.
+    around : tuple of (path, str)
+        The section and the elements that it is in, with their titles, and itself.
+    feel : str
+        What the button says that opens the lab with its liquids, "" where it has none.
+    series : bool
+        Whether there can be a series of it: elements that differ in one of its numbers.
+    used : str
+        How many other elements use it (`used_by`); "" where that is not said.
+    unreadable : bool
+        Whether nothing can be edited but the text of the file, in which the study cannot be read.
+    """
+
+    path: Path
+    title: str
+    icon: str
+    kind: str
+    id: str | None = None
+    sections: tuple[Section, ...] = ()
+    faults: tuple[str, ...] = ()
+    id_faults: tuple[str, ...] = ()
+    position: tuple[int, int] | None = None
+    questions: QuestionLines = NO_QUESTIONS
+    around: tuple[tuple[Path, str], ...] = ()
+    feel: str = ""
+    series: bool = False
+    used: str = ""
+    unreadable: bool = False
+
+    @property
+    def rows(self) -> tuple[FormRow, ...]:
+        """Every row."""
+        return tuple(row for section in self.sections for row in section.rows)
+
+
+def shape_of(form: Form) -> object:
+    """Return what makes other editors necessary, beside the rows: other questions, sections, keys to add."""
+    others = [line for line in form.questions.lines if line.path != form.path]
+    return (
+        others,
+        form.questions.languages,
+        [
+            (one.path[BELOW:], one.title, tuple(row.path[BELOW:] for row in one.absent), one.faults)
+            for one in form.sections
+        ],
+    )
+
+
+def added_row(form: Form, before: Form) -> Path | None:
+    """Return the path of the first row that the form did not have before; None where it had each."""
+    known = {row.row.path for row in before.rows}
+    return next((row.row.path for row in form.rows if row.row.path not in known), None)
+
+
+def is_right_to_left(code: str) -> bool:
+    """Return whether a language is written from right to left."""
+    return code in LANGUAGES and LANGUAGES[code].right_to_left
+
+
+def new_words(section: str) -> str:
+    """Return what the choice is called that adds an element to a section and names it."""
+    return f"New {label_of(singular(section)).lower()} …"
+
+
+def choice_words(choice: Choice, default: object) -> str:
+    """Return what a choice is called: its value in words, marked where it counts without being written."""
+    if choice.value is None:
+        return "Not set"
+    words = label_of(str(choice.value)) if not str(choice.value).isdigit() else str(choice.value)
+    return f"{words} (default)" if choice.value == default else words

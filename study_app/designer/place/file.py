@@ -1,0 +1,367 @@
+"""The text of the file: which lines are marked, and the editor that shows it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from PySide6.QtCore import QEvent, QRect, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QColor,
+    QFocusEvent,
+    QFont,
+    QFontDatabase,
+    QKeyEvent,
+    QPainter,
+    QPaintEvent,
+    QResizeEvent,
+    QShowEvent,
+    QSyntaxHighlighter,
+    QTextCharFormat,
+    QTextCursor,
+    QTextDocument,
+)
+from PySide6.QtWidgets import QFrame, QPlainTextEdit, QWidget
+
+from study_app.designer.document.study import Study
+from study_app.designer.document.toml_text import spans_of
+from study_app.designer.form.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import Theme
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.boxes import hbox
+from study_app.gui.widgets.cards import Card, Icon
+from study_app.gui.widgets.labels import Elided, label
+from study_app.protocol.source.document import Path
+
+
+def visible_lines(text: QPlainTextEdit) -> list[tuple[int, float, float]]:
+    """Return the visible lines: the number of each from 0, how far down it is, and its height [px]."""
+    found = []
+    block, offset = text.firstVisibleBlock(), text.contentOffset()
+    while block.isValid():
+        place = text.blockBoundingGeometry(block).translated(offset)
+        if place.top() > text.viewport().height():
+            break
+        found.append((block.blockNumber(), place.top(), place.height()))
+        block = block.next()
+    return found
+
+
+_ENDS: Final = re.compile("\r\n|\r|\u2029")
+"""What an editor takes as the end of a line beyond line feeds."""
+
+
+@dataclass(frozen=True, slots=True)
+class FileText:
+    """The text of the pane; lines count from 0.
+
+    Attributes
+    ----------
+    name : str
+        The name of the file.
+    text : str
+        Its text with line feeds alone.
+    selected : tuple of (int, int)
+        First and last line of each part of the selected element.
+    faulty : tuple of int
+        Lines with a fault.
+    """
+
+    name: str = ""
+    text: str = ""
+    selected: tuple[tuple[int, int], ...] = ()
+    faulty: tuple[int, ...] = ()
+
+
+def file_text(study: Study, name: str, path: Path) -> FileText:
+    """Return the file with the lines of the element at ``path`` marked."""
+    faulty = tuple(sorted({problem.line - 1 for problem in study.problems if problem.line}))
+    selected: tuple[tuple[int, int], ...] = ()
+    if study.is_toml and path:
+        pieces = spans_of(study.text).pieces(path)
+        lines = [
+            (_line(study.text, piece.start), _line(study.text, max(piece.start, piece.end - 1))) for piece in pieces
+        ]
+        selected = tuple(lines)
+    return FileText(name, shown(study.text), selected, faulty)
+
+
+def shown(text: str) -> str:
+    """Return a text with line feeds alone."""
+    return _ENDS.sub("\n", text)
+
+
+def retyped(text: str, typed: str) -> str:
+    """Return a text with its own ends of lines after what was typed in the pane.
+
+    Parameters
+    ----------
+    text : str
+        The file's text.
+    typed : str
+        The text of the pane after typing.
+    """
+    old, newline = shown(text), "\r\n" if "\r\n" in text else "\n"
+    shortest, first, last = min(len(old), len(typed)), 0, 0
+    while first < shortest and old[first] == typed[first]:
+        first += 1
+    while last < shortest - first and old[-1 - last] == typed[-1 - last]:
+        last += 1
+    begin, end = _original(text, first), _original(text, len(old) - last)
+    return text[:begin] + typed[first : len(typed) - last].replace("\n", newline) + text[end:]
+
+
+def _original(text: str, place: int) -> int:
+    """Return where a place of the shown text is in the file's text."""
+    for match in _ENDS.finditer(text):
+        if match.start() >= place:
+            break
+        place += len(match[0]) - 1
+    return place
+
+
+def _line(text: str, place: int) -> int:
+    return text.count("\n", 0, place)
+
+
+LETTERS_PX = 13
+_PIECES = re.compile(r"(#.*$)|(^\s*\[.*?\]\]?)|(\"\"\"|\"(?:[^\"\\]|\\.)*\"|'[^']*')")
+
+
+class _Colours(QSyntaxHighlighter):
+    """Comments, headers and strings."""
+
+    def __init__(self, document: QTextDocument) -> None:
+        super().__init__(document)
+        self.formats: list[QTextCharFormat] = []
+
+    def apply_theme(self, theme: Theme) -> None:
+        self.formats = []
+        for ink, weight in ((theme.text3, 400), (theme.accent, 600), (theme.warn, 400)):
+            made = QTextCharFormat()
+            made.setForeground(QColor(ink))
+            made.setFontWeight(weight)
+            self.formats.append(made)
+        self.rehighlight()
+
+    def highlightBlock(self, text: str) -> None:
+        if not self.formats:
+            return
+        for match in _PIECES.finditer(text):
+            kind = next(number for number in (1, 2, 3) if match[number] is not None)
+            self.setFormat(match.start(), match.end() - match.start(), self.formats[kind - 1])
+
+
+class _Gutter(QWidget):
+    """The numbers of the lines."""
+
+    def __init__(self, editor: FileEditor) -> None:
+        super().__init__(editor)
+        self._editor = editor
+
+    def sizeHint(self) -> QSize:
+        return QSize(self._editor.gutter_px(), 0)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        self._editor.paint_gutter(QPainter(self), event.rect())
+
+
+class FileEditor(Themed, QPlainTextEdit):
+    """The text; ``typed`` carries it within moments. While it is hidden, it is not brought up to date."""
+
+    typed = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.shown = FileText()
+        self.pending = False
+        self._showing = False
+        self._late: bool | None = None
+        fixed = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
+        fixed.setPixelSize(LETTERS_PX)
+        fixed.setStyleHint(QFont.StyleHint.Monospace)
+        self.setFont(fixed)
+        self.setAccessibleName("Text of the file")
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self.setUndoRedoEnabled(False)
+        self.setTabChangesFocus(True)
+        self.setStyleSheet(
+            "QPlainTextEdit, QPlainTextEdit:focus { border: none; padding: 0; background: transparent; }"
+            "QAbstractScrollArea::corner { background: transparent; border: none; }"
+        )
+        self._colours = _Colours(self.document())
+        self._gutter = _Gutter(self)
+        self._rest = QTimer(self)
+        self._rest.setSingleShot(True)
+        self._rest.timeout.connect(self.flush)
+        self.textChanged.connect(self._note)
+        self.updateRequest.connect(self._scroll_gutter)
+        self.blockCountChanged.connect(lambda _count: self._place_gutter())
+        self._place_gutter()
+
+    def words(self) -> str:
+        """Return the text; Qt's own plain text would lose spaces that do not break."""
+        self._catch_up()
+        return self.document().toRawText().replace("\u2029", "\n")
+
+    def show_file(self, file: FileText, *, scroll: bool) -> None:
+        """Show a file, as soon as the editor is seen; only what differs is replaced: cursor and scroll bar stay."""
+        self.shown = file
+        if not self.pending:
+            self._late = scroll or bool(self._late)
+            if self.isVisible():
+                self._catch_up()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._catch_up()
+
+    def _catch_up(self) -> None:
+        """Show the file that was given last, and go to the selected element where that was asked for."""
+        if self._late is None:
+            return
+        scroll, self._late = self._late, None
+        old, new = self.words(), self.shown.text
+        if old != new:
+            self._replace(old, new)
+        self._mark()
+        if scroll and self.shown.selected and not self.hasFocus():
+            self.go_to(self.shown.selected[0][0])
+
+    def go_to(self, line: int) -> None:
+        """Put the cursor on a line, from 0, and show it in the upper part."""
+        self._catch_up()
+        block = self.document().findBlockByNumber(line)
+        if block.isValid():
+            cursor = QTextCursor(block)
+            self.setTextCursor(cursor)
+            self.verticalScrollBar().setValue(max(0, line - 3))
+
+    def flush(self) -> None:
+        """Hand on what was typed."""
+        self._rest.stop()
+        if self.pending:
+            self.pending = False
+            self.typed.emit(self.words())
+
+    def _note(self) -> None:
+        if not self._showing:
+            self.pending = True
+            if not self._rest.isActive():
+                self._rest.start(HAND_ON_MS)
+
+    def _replace(self, old: str, new: str) -> None:
+        shortest, first, last = min(len(old), len(new)), 0, 0
+        while first < shortest and old[first] == new[first]:
+            first += 1
+        while last < shortest - first and old[-1 - last] == new[-1 - last]:
+            last += 1
+        self._showing = True
+        cursor = QTextCursor(self.document())
+        cursor.setPosition(_units(old[:first]))
+        cursor.setPosition(_units(old[: len(old) - last]), QTextCursor.MoveMode.KeepAnchor)
+        cursor.insertText(new[first : len(new) - last])
+        self._showing = False
+
+    def apply_theme(self, theme: Theme) -> None:
+        super().apply_theme(theme)
+        self._showing = True
+        self._colours.apply_theme(theme)
+        self._showing = False
+        self._mark()
+
+    def _mark(self) -> None:
+        """Repaint the marks, which are painted below the text."""
+        self.viewport().update()
+        self._gutter.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self.viewport())
+        width = self.viewport().width()
+        for line, top, height in visible_lines(self):
+            if line in self.shown.faulty:
+                painter.fillRect(QRectF(0, top, width, height), QColor(self.theme.bad_bg))
+            elif self._selected(line):
+                painter.fillRect(QRectF(0, top, width, height), QColor(self.theme.selected))
+            if self._selected(line):
+                painter.fillRect(QRectF(0, top, 2, height), QColor(self.theme.accent))
+        painter.end()
+        super().paintEvent(event)
+
+    def _selected(self, line: int) -> bool:
+        return any(first <= line <= last for first, last in self.shown.selected)
+
+    def gutter_px(self) -> int:
+        """Return the width of the gutter."""
+        return 34 + self.fontMetrics().horizontalAdvance("9") * max(3, len(str(self.blockCount())))
+
+    def paint_gutter(self, painter: QPainter, _place: QRect) -> None:
+        """Paint the numbers of the lines in view, faulty ones with a sign."""
+        painter.setFont(self.font())
+        width = self._gutter.width()
+        for line, top, height in visible_lines(self):
+            faulty = line in self.shown.faulty
+            painter.setPen(QColor(self.theme.bad if faulty else self.theme.text2))
+            painter.drawText(QRectF(0, top, width - 10, height), Qt.AlignmentFlag.AlignRight, str(line + 1))
+            if faulty:
+                draw_icon(painter, "warning", QRectF(2, top + height / 2 - 7, 14, 14), self.theme.bad, 2.0)
+
+    def _place_gutter(self) -> None:
+        self.setViewportMargins(self.gutter_px(), 0, 0, 0)
+        inside = self.contentsRect()
+        self._gutter.setGeometry(inside.left(), inside.top(), self.gutter_px(), inside.height())
+
+    def _scroll_gutter(self, place: QRect, by: int) -> None:
+        if by:
+            self._gutter.scroll(0, by)
+        else:
+            self._gutter.update(0, place.y(), self._gutter.width(), place.height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._place_gutter()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self.flush()
+
+    def event(self, event: QEvent) -> bool:
+        """Leave undo, redo and Save to the place."""
+        overrides = event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
+        if overrides and any(event.matches(key) for key in KEYS_OF_PLACE):  # type: ignore[attr-defined]  # a key event
+            self.flush()
+            event.ignore()
+            return True
+        return super().event(event)
+
+
+class FileCard(Card):
+    """The editor; ``aside`` holds the name of the file, for the right of the tabs; ``typed`` carries the text."""
+
+    typed = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__(padding=14, gap=8)
+        self.setAccessibleName("File")
+        self.name = Elided("label", "text2")
+        self.name.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.editor = FileEditor()
+        self.editor.typed.connect(self.typed)
+        self.setFocusProxy(self.editor)
+        self.aside = QWidget()
+        kept = Icon("check", "ok", 16), label("comments and order are kept", "small", "text2")
+        hbox(*kept, 10, self.name, spacing=6, margins=0, parent=self.aside)
+        self.column.addWidget(self.editor, 1)
+
+    def show_file(self, file: FileText, *, scroll: bool, read_only: bool) -> None:
+        self.name.show_text(file.name)
+        self.editor.setReadOnly(read_only)
+        self.editor.show_file(file, scroll=scroll)
+
+
+def _units(text: str) -> int:
+    """Return how many places of a text editor a text takes: letters beyond the basic plane take two."""
+    return len(text.encode("utf-16-le")) // 2
