@@ -21,8 +21,13 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.failures import ended_from_outside
-from study_app.app.session.bridge import SessionBridge
-from study_app.app.session.session_windows import connect_windows, make_cockpit, make_participant_window, show_windows
+from study_app.app.session.bridge import (
+    SessionBridge,
+    connect_windows,
+    make_cockpit,
+    make_participant_window,
+    show_windows,
+)
 from study_app.app.session.timing import collecting_here
 from study_app.devices.hand import hand_of
 from study_app.devices.rig import open_rig, study_settings

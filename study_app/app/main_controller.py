@@ -1,38 +1,368 @@
-"""The main window's stay: its places, one session at a time, and home again after it."""
+"""The main window's stay: its places, the settings and devices of this machine, one session at a time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Sequence
+from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
-from PySide6.QtCore import QEventLoop, QObject, QTimer
+from PySide6.QtCore import QEventLoop, QObject, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 
 from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, ended_from_outside
-from study_app.app.lab_and_designer import LabAndDesigner
-from study_app.app.machine import DevicesController, WorkstationController
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.session.timing import collecting_here
+from study_app.devices.descriptor import Backend
+from study_app.devices.registry import backends
 from study_app.errors import StoreError
-from study_app.gui.application import application_here
+from study_app.gui.application import application_here, open_here
+from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog, diagnosis
+from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.display.screens import place
 from study_app.gui.home.dialogs import WorkspaceDialog
 from study_app.gui.home.main_window import MainWindow, bug_words
 from study_app.gui.home.study_facts import DraftWords
 from study_app.gui.home.view import HomePlace
-from study_app.gui.kit.workstation import screen_number, theme_named
-from study_app.gui.widgets.background import wait_for_jobs
+from study_app.gui.kit.devices import DeviceShown, benches_shown, device_named, devices_shown
+from study_app.gui.kit.workstation import screen_number, settings_here, theme_named
+from study_app.gui.settings.view import MachinePlace
+from study_app.gui.widgets.background import Background, wait_for_jobs
 from study_app.session.start import NewSession
-from study_app.store.workstation import MachineSettings, create_workspace
+from study_app.store import workstation
+from study_app.store.workstation import DisplayOffset, MachineSettings, create_workspace
+from study_app.user_folder import settings_file
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
+
+if TYPE_CHECKING:
+    from study_app.app.lab_controller import LabController
+    from study_app.app.session.playing import Playing
+    from study_app.designer.participant.feeling import LabLiquids
+    from study_app.designer.place.controller import DesignerController
+    from study_app.designer.place.view import DesignerPlace
+    from study_app.gui.lab.view import LabPlace
+    from study_app.gui.sessions.session_facts import SessionFacts
+    from study_app.lab.ab_comparison import Setting, Side
+
+CALLED: Final = {
+    "screen": "participant's screen",
+    "viewing_distance_mm": "viewing distance",
+    "screen_width_mm": "screen width",
+    "display_offset": "display offset",
+    "device": "device",
+    "firmware": "firmware",
+    "camera": "camera",
+    "workspace": "workspace",
+    "theme": "theme",
+    "sound": "sound",
+    "photodiode": "photodiode square",
+    "lsl_markers": "LSL markers",
+    "lsl_samples": "LSL samples",
+    "triggers": "trigger port",
+}
+
+
+class WorkstationController(QObject):
+    """Holds the settings, keeps them at once, and takes the last change back.
+
+    ``changed`` comes when something else is set; ``troubled(title, sentence)`` where they cannot be read or kept.
+    """
+
+    changed = Signal(object)
+    troubled = Signal(str, str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.settings, self.trouble = settings_here()
+        self._before: list[tuple[str, MachineSettings]] = []
+        self.place: MachinePlace | None = None
+
+    def make_place(self) -> MachinePlace:
+        """Return the machine's place, which shows what is set from now on."""
+        place = self.place = MachinePlace()
+        place.changed.connect(self.change)
+        place.offset_measured.connect(self.measured)
+        place.undo_asked.connect(self.undo)
+        self._show()
+        return place
+
+    def change(self, values: dict[str, Any]) -> None:
+        """Set values by their names, and keep them."""
+        made = MachineSettings.model_validate(_plain(self.settings) | values)
+        if made == self.settings:
+            self._show()
+            return
+        self._before.append((CALLED[next(iter(values))], self.settings))
+        self._keep(made)
+
+    def remember_operator(self, operator: str) -> None:
+        """Offer these initials in the next session; this is not a setting, so undo ignores it."""
+        if operator and operator != self.settings.operator:
+            self._keep(self.settings.model_copy(update={"operator": operator}))
+
+    def remember_protocol(self, protocol: Path) -> None:
+        """Keep a protocol file among the recent ones; this is not a setting, so undo ignores it."""
+        made = self.settings.with_recent(protocol)
+        if made != self.settings:
+            self._keep(made)
+
+    def measured(self, mean_ms: float, spread_ms: float, how: str, screen: str) -> None:
+        offset = {"mean_ms": mean_ms, "spread_ms": spread_ms, "how": how, "screen": screen}
+        self.change({"display_offset": DisplayOffset.model_validate(offset | {"measured": date.today().isoformat()})})
+
+    def undo(self) -> None:
+        if self._before:
+            kept = {"operator": self.settings.operator, "recent": self.settings.recent}
+            self._keep(self._before.pop()[1].model_copy(update=kept))
+
+    @property
+    def undo_called(self) -> str:
+        """What can be taken back; nothing where nothing can."""
+        return self._before[-1][0] if self._before else ""
+
+    def _keep(self, settings: MachineSettings) -> None:
+        self.settings = settings
+        try:
+            workstation.save(settings)
+        except StoreError as error:
+            self.troubled.emit("This machine's settings could not be saved", f"{error}.")
+        self._show()
+        self.changed.emit(settings)
+
+    def _show(self) -> None:
+        if self.place is not None:
+            self.place.show_settings(
+                self.settings,
+                folder=str(workspace().folder.absolute()),
+                undo=self.undo_called,
+                kept_in=str(settings_file()),
+            )
+
+
+def _plain(settings: MachineSettings) -> dict[str, Any]:
+    return {name: getattr(settings, name) for name in MachineSettings.model_fields}
+
+
+PATIENCE_S = 5.0
+
+
+class DevicesController(QObject):
+    """Looks at the machine when it is asked, one look at a time, and shows what was found.
+
+    ``looked`` comes with what was found of every device; ``troubled(title, sentence)`` where one could not look.
+    """
+
+    looked = Signal(object)
+    troubled = Signal(str, str)
+
+    def __init__(self, workstation: WorkstationController, look: Callable[[], Sequence[Backend]] = backends) -> None:
+        super().__init__()
+        self._workstation, self.backends = workstation, look
+        self.looking = Background(self)
+        self.looking.done.connect(self._show_found)
+        self._ended = False
+        self.shown: tuple[DeviceShown, ...] = ()
+        self.place: DevicesPlace | None = None
+        self.dialog: DiagnosisDialog | None = None
+        workstation.changed.connect(self._show)
+
+    @property
+    def preferred(self) -> DeviceShown:
+        """The device that sessions begin with, as it was found."""
+        return device_named(self._workstation.settings.device, self.shown)
+
+    def make_place(self) -> DevicesPlace:
+        place = self.place = DevicesPlace()
+        place.look_asked.connect(self.look)
+        place.chosen.connect(lambda name: self._workstation.change({"device": name}))
+        place.option_chosen.connect(lambda name, path: self._workstation.change({name: path}))
+        place.diagnose_asked.connect(self.diagnose)
+        place.report_asked.connect(open_here)
+        place.left.connect(self.end_diagnosis)
+        self._show()
+        return place
+
+    def look(self) -> None:
+        """Look at the machine, in the background."""
+        if self.looking.busy or self._ended:
+            return
+        if self.place is not None:
+            self.place.show_looking(True)
+        self.looking.run(self._look)
+
+    def end(self, patience_s: float = PATIENCE_S) -> None:
+        """Look no more, wait for a look that is under way, and show nothing of it: the windows go."""
+        self._ended = True
+        self.looking.wait(min(patience_s, PATIENCE_S))
+
+    def diagnose(self, name: str) -> None:
+        """Open the diagnosis of a device; a serial number that is preferred is taken along."""
+        settings = self._workstation.settings
+        asked = settings.device if settings.device.partition(":")[0] == name else name
+        assert self.place is not None  # noqa: S101 - it has just asked
+        self.end_diagnosis()
+        self.dialog = diagnosis(self.place.window(), self.place.theme, asked, settings)
+        self.dialog.finished.connect(self._forget_dialog)
+        self.dialog.show()
+
+    def end_diagnosis(self) -> None:
+        """Close the diagnosis, which ends it."""
+        if self.dialog is not None:
+            self.dialog.reject()
+
+    def _forget_dialog(self) -> None:
+        self.dialog = None
+
+    def _look(self) -> tuple[DeviceShown, ...] | Exception:
+        try:
+            return devices_shown(self.backends())
+        except Exception as error:  # noqa: BLE001 - a bug of a driver is told as what it is of the machine
+            return error
+
+    def _show_found(self, found: tuple[DeviceShown, ...] | Exception) -> None:
+        if self._ended:
+            return
+        if isinstance(found, Exception):
+            self._show()
+            self.troubled.emit("This machine could not be examined", f"{found}.")
+            return
+        self.shown = found
+        self._show()
+        self.looked.emit(found)
+
+    def _show(self) -> None:
+        if self.place is not None:
+            self.place.show_looking(self.looking.busy)
+            self.place.show_devices(self.shown, self._workstation.settings.device)
+            self.place.show_benches(benches_shown(self._workstation.settings.benches))
+            self.place.show_options(self._workstation.settings.device_options)
+
+
+class LabAndDesigner(QObject):
+    """Makes both places for the main window, and does there what is asked for elsewhere.
+
+    ``go_asked`` carries the name of a place to go to, which makes it; ``saved`` comes when a study or pilot was saved.
+
+    Parameters
+    ----------
+    results
+        Folder that holds the studies' folders; it need not exist.
+    """
+
+    go_asked = Signal(str)
+    saved = Signal()
+
+    def __init__(self, machine: WorkstationController, results: Path) -> None:
+        super().__init__()
+        self._machine, self._results = machine, results
+        self.designer: DesignerController | None = None
+        self.playing: Playing | None = None
+        self.lab: LabController | None = None
+        self._loading = Background(self)
+
+    def preload(self) -> None:
+        """Load the modules of both places in the background, so that the first visit seldom waits for them."""
+        self._loading.run(load_modules)
+
+    def make_lab(self) -> LabPlace:
+        """Return the lab's place, with its controller."""
+        self._loading.wait()  # two threads that load modules of one cycle may see them half loaded
+        from study_app.app.lab_controller import LabController  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
+
+        made = LabPlace()
+        settings = self._machine.settings
+        self.lab = LabController(made, device=settings.device, options=settings.device_options)
+        made.put_back_asked.connect(self._put_back)
+        return made
+
+    def make_designer(self) -> DesignerPlace:
+        """Return the study designer's place, with its controller."""
+        self._loading.wait()
+        from study_app.app.session.playing import Playing  # noqa: PLC0415 - only once they are needed
+        from study_app.designer.place.controller import DesignerController  # noqa: PLC0415
+
+        self.designer = DesignerController(self._results)
+        self.playing = Playing(self.designer)
+        self.designer.saving.saved.connect(self.saved)
+        self.playing.kept.connect(self.saved)
+        self.designer.feeling.asked.connect(self._feel)
+        self.designer.editing.opened_other.connect(self._forget_study)
+        self.designer.feeling.returned.connect(lambda: self.go_asked.emit("designer"))
+        return self.designer.place
+
+    def open_designer(self, source: str) -> None:
+        self._go_to_designer(lambda designer: designer.open(source))
+
+    def show_version(self, session: SessionFacts) -> None:
+        """Go to the study designer, to what changed in a session's study since it was run."""
+        self._go_to_designer(
+            lambda designer: designer.open(session.study),
+            lambda designer: designer.changes.compare_with_session(session.study, session.folder),
+        )
+
+    def begin_study(self, source: str = "", name: str = "") -> None:
+        """Go to the study designer with what a new study can begin from; with a name begin it at once."""
+        self._go_to_designer(lambda it: it.ask_for_new(source), lambda it: it.begin(source, name) if name else None)
+
+    def _go_to_designer(self, *actions: Callable[[DesignerController], None]) -> None:
+        self.go_asked.emit("designer")
+        if self.designer is not None:  # else the window says why it could not be made
+            for act in actions:
+                act(self.designer)
+
+    def _feel(self, liquids: LabLiquids) -> None:
+        self.go_asked.emit("lab")
+        if self.lab is not None:
+            self.lab.feel_of_study(liquids.a, liquids.b, liquids.study)
+
+    def _forget_study(self) -> None:
+        """Let the lab offer no more to put its liquids back: another study is open in the designer."""
+        if self.lab is not None:
+            self.lab.study = ""
+
+    def _put_back(self, side: Side, setting: Setting) -> None:
+        """Put a liquid back into the study that is edited, and go there."""
+        if self.designer is not None:
+            self.designer.feeling.put_back(side, setting)
+
+    def show_results(self, results: Path) -> None:
+        self._results = results
+        if self.designer is not None:
+            self.designer.editing.results = results
+
+    def end(self, patience: Patience) -> None:
+        """End what plays, and let go of the lab's device."""
+        if self.playing is not None:
+            self.playing.end(patience)
+        if self.lab is not None:
+            self.lab.end(patience)
+
+    def end_by_signal(self, number: int) -> None:
+        if self.playing is not None:
+            self.playing.end_by_signal(number)
+
+
+def load_modules() -> None:
+    """Load the modules of lab and designer, the compiler, and what the first page is computed from."""
+    import study_app.app.lab_controller  # noqa: PLC0415
+    import study_app.app.session.playing  # noqa: PLC0415
+    import study_app.lab.live  # noqa: F401, PLC0415
+    from study_app.gui.participant.tank.glass import brightness  # noqa: PLC0415
+    from study_app.protocol.source.json_schema import schema  # noqa: PLC0415
+
+    brightness()
+    schema()
+    gc.freeze()  # no collection need look through all that was loaded here
+
 
 LOOK_AFTER_MS = 300  # the window stands by then
 JOBS_PATIENCE_S = 5.0
 
 if TYPE_CHECKING:
-    from study_app.app.computer_check import ComputerCheck
     from study_app.app.results_controller import ResultsController
+    from study_app.app.session.preflight_controller import ComputerCheck
     from study_app.gui.help.view import HelpPlace
     from study_app.gui.results.view import ResultsPlace
     from study_app.gui.settings.view import MachinePlace
@@ -139,7 +469,7 @@ class MainController(QObject):
 
     def check_computer(self) -> None:
         """Open the check of this computer, and measure."""
-        from study_app.app.computer_check import ComputerCheck  # noqa: PLC0415 - only where it is asked for
+        from study_app.app.session.preflight_controller import ComputerCheck  # noqa: PLC0415 - only where it is asked for
 
         screens = QGuiApplication.screens()
         participants = screens[screen_number(self.machine.settings) - 1]

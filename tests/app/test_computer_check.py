@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from study_app.app.computer_check import ComputerCheck
 from study_app.app.main_controller import MainController
+from study_app.app.session.preflight_controller import ComputerCheck
 from study_app.gui.preflight.window import OF_THE_COMPUTER
 from tests.compiled import needs_servo
 

@@ -13,8 +13,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QLabel
 
 from study_app.analysis import worker_messages as of
 from study_app.app import main_controller
-from study_app.app.machine import DevicesController, WorkstationController
-from study_app.app.main_controller import MainController
+from study_app.app.main_controller import DevicesController, MainController, WorkstationController
 from study_app.app.results_controller import ResultsController
 from study_app.app.session.live_session import BUG
 from study_app.devices.descriptor import NONE, READY, Backend
@@ -188,7 +187,7 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
 
         def connect(self, _slot: Any) -> None: ...
 
-    monkeypatch.setattr("study_app.app.machine.DiagnosisDialog", Dialog)
+    monkeypatch.setattr("study_app.gui.devices.diagnosis_dialog.DiagnosisDialog", Dialog)
     devices = DevicesController(machine, look)
     devices.looked.connect(lambda shown: heard.append(f"looked {len(shown)}"))
     devices.troubled.connect(lambda *words: heard.append(f"troubled {words}"))
@@ -346,7 +345,7 @@ def test_lab_and_designer(qapp: Any, monkeypatch: Any, pytestconfig: pytest.Conf
         done.append(f"lab with {device} {dict(options)}")
         return lab
 
-    monkeypatch.setattr("study_app.app.lab.controller.LabController", compose)
+    monkeypatch.setattr("study_app.app.lab_controller.LabController", compose)
     of_window: Any = main_controller
     both = of_window.LabAndDesigner(WorkstationController(), Path("results"))
     for name in ("go_asked", "saved"):

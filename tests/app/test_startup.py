@@ -60,7 +60,7 @@ wait_for_jobs(60)
 beside = threading.Thread(target=live_session.load_windows)
 beside.start()
 beside.join()
-windows = {"study_app.app.session.preflight_controller", "study_app.app.session.session_windows", "pyarrow.parquet"}
+windows = {"study_app.app.session.preflight_controller", "study_app.app.session.bridge", "pyarrow.parquet"}
 objects = [one for one in gc.get_objects() if isinstance(one, QObject)]
 assert application in objects
 elsewhere = [repr(one) for one in objects if one.thread() != application.thread()]

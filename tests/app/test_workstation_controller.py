@@ -7,8 +7,7 @@ import pytest
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QMainWindow
 
-from study_app.app.machine import WorkstationController
-from study_app.app.main_controller import MainController
+from study_app.app.main_controller import MainController, WorkstationController
 from study_app.app.session.live_session import LiveSession
 from study_app.devices.descriptor import READY, Backend
 from study_app.gui.kit.workstation import described, settings_here, text_scale_on
@@ -92,7 +91,7 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qt
         asked.append((name, held))
         return SimpleNamespace(show=lambda: None)
 
-    monkeypatch.setattr("study_app.app.machine.diagnosis", diagnosis)
+    monkeypatch.setattr("study_app.gui.devices.diagnosis_dialog.diagnosis", diagnosis)
     live = LiveSession(NewSession("demo", "P001", 1, 7, "", "en", device, True, None, Path("nowhere")), LIGHT)
     operator = QMainWindow()
     operator.theme = DARK

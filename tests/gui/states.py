@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt, QTimer, QUrl
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.app.computer_check import ComputerCheck
+from study_app.app.session.preflight_controller import ComputerCheck
 from study_app.devices.descriptor import Backend
 from study_app.devices.doctor import Report
 from study_app.devices.falcon.failures import failures_on

@@ -46,9 +46,9 @@ if TYPE_CHECKING:
 
 def load_windows() -> None:
     """Load what a session's windows need while the note is shown: modules, and versions, read from the disk once."""
-    import study_app.app.machine  # noqa: PLC0415
+    import study_app.app.session.bridge  # noqa: PLC0415
     import study_app.app.session.preflight_controller  # noqa: PLC0415
-    import study_app.app.session.session_windows  # noqa: PLC0415
+    import study_app.gui.devices.diagnosis_dialog  # noqa: PLC0415
     import study_app.store.receipt  # noqa: PLC0415
     import study_app.store.recordings  # noqa: PLC0415 - and pyarrow, which the recorder is made with
 
@@ -219,7 +219,7 @@ class LiveSession(QObject):
         """Go on with what the thread made ready, or raise what it met; what comes up to a yield takes a few frames."""
         if not isinstance(made, Ready):
             raise made if isinstance(made, Exception) else TypeError(made)
-        from study_app.app.session import session_windows  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.app.session import bridge  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         chosen, rig = self.chosen, made.rig
         source = chosen.read_source()
@@ -231,10 +231,10 @@ class LiveSession(QObject):
         self._pass_checks(found)
         screens = described(self.settings, shown_on, operated_on)
         yield
-        operator = session_windows.make_cockpit(chosen, protocol, rig, self.theme)
+        operator = bridge.make_cockpit(chosen, protocol, rig, self.theme)
         self._windows.append(operator)
         yield
-        participant = session_windows.make_participant_window(
+        participant = bridge.make_participant_window(
             chosen,
             self._seconds,
             shares_screen=shares_screen,
@@ -250,8 +250,8 @@ class LiveSession(QObject):
                 keep_content(source)
         self._crash_trace = CrashTrace(store.folder.crash)
         store.append(journal_events.Preflight(checks=[one.entry for one in found]))
-        plan = session_windows.planned(chosen, protocol, store)
-        self.bridge = session_windows.connect_windows(
+        plan = bridge.planned(chosen, protocol, store)
+        self.bridge = bridge.connect_windows(
             chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz, videos=made.videos
         )
         self._windows.clear()
@@ -260,7 +260,7 @@ class LiveSession(QObject):
         yield
         self.bridge.start()  # before its windows are shown: nothing can be asked of a session that has not begun
         yield
-        yield from session_windows.show_windows(self.bridge, self.screens, played=chosen.played)
+        yield from bridge.show_windows(self.bridge, self.screens, played=chosen.played)
         self._close_note()
         self._close_preflight()
 
@@ -275,7 +275,7 @@ class LiveSession(QObject):
 
     def diagnose(self) -> None:
         """Open the diagnosis of the haptic device over the operator's window; the bridge has stopped the force."""
-        from study_app.app.machine import diagnosis  # noqa: PLC0415 - the note comes before it
+        from study_app.gui.devices.diagnosis_dialog import diagnosis  # noqa: PLC0415 - the note comes before it
 
         assert self.bridge is not None  # noqa: S101 - it has just asked
         name = self.chosen.device

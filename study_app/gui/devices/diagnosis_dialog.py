@@ -6,11 +6,11 @@ from typing import TypeAlias
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent
-from PySide6.QtWidgets import QDialog, QFileDialog, QGridLayout, QLineEdit, QProgressBar, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QGridLayout, QLineEdit, QProgressBar, QWidget
 
 from study_app.devices.doctor import Finding, Report, State, lines
 from study_app.devices.doctor_worker import ExaminationClient, start_examination
-from study_app.devices.registry import doctor_of, title_of
+from study_app.devices.registry import descriptor_of, doctor_of, title_of
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within
@@ -19,6 +19,7 @@ from study_app.gui.widgets.cards import Card, Chip, Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label, set_ink
 from study_app.store.support import NAME, write_support
+from study_app.store.workstation import MachineSettings
 from study_app.workers.server import Crashed, Refused
 
 STATES: dict[State, tuple[Tone, str, str]] = {
@@ -359,3 +360,21 @@ class DiagnosisDialog(QDialog):
 
 def _sentence(words: str) -> str:
     return words[:1].upper() + words[1:] + ("" if words.endswith((".", "!", "?")) else ".")
+
+
+HELD = (
+    "This session uses the device, so some checks cannot run. For a full diagnosis, end the session first; you can "
+    "resume it later."
+)
+
+
+def diagnosis(
+    parent: QWidget, theme: Theme, name: str, settings: MachineSettings, *, held: bool = False
+) -> DiagnosisDialog:
+    """Return the diagnosis of a device, begun; ``held`` where a session has it open."""
+    options = descriptor_of(name).window_values(settings.device_options)
+    made = DiagnosisDialog(parent, theme, name, options=options, note=HELD if held else "")
+    made.finished.connect(made.deleteLater)
+    if settings.sound:
+        made.over.connect(lambda _well: QApplication.beep())
+    return made

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from study_app.devices import DEFAULT_DEVICE
 from study_app.devices.descriptor import DRIVER_READY, NONE, READY, Backend, DeviceDescriptor, DeviceOption
-from study_app.devices.registry import descriptor_of, discover, title_of
+from study_app.devices.registry import descriptor_of, discover, list_devices, title_of
 from study_app.errors import DeviceError
 from study_app.store.workstation import REMEMBERED_OPTIONS, DeviceBench
 
@@ -121,6 +121,11 @@ def looking(name: str) -> DeviceShown:
 def device_label(device: str) -> str:
     """Return what to choose a device by."""
     return descriptor_of(device).label
+
+
+def device_choices() -> tuple[tuple[str, str], ...]:
+    """Return every device's name, and the words to choose it by."""
+    return tuple((name, device_label(name)) for name in list_devices())
 
 
 def device_or_default(device: str) -> str:

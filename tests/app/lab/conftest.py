@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.failures import Patience
-from study_app.app.lab.controller import LabController
+from study_app.app.lab_controller import LabController
 from study_app.gui.lab.view import LabPlace
 from study_app.protocol.load import load_scene
 from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices, force_n

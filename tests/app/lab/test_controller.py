@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from PySide6.QtWidgets import QMainWindow
 
-from study_app.app.lab.controller import LabController
+from study_app.app.lab_controller import LabController
 from study_app.errors import ServoFault
 from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices, Stays, force_n, is_let_go
 from tests.compiled import needs_servo

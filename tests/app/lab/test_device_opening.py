@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from study_app.app.failures import Patience
-from study_app.app.lab.controller import LabController
-from study_app.app.lab.jobs import LabOpening
+from study_app.app.lab_controller import LabController, LabOpening
 from study_app.errors import ServoFault
 from tests.app.lab.worlds import SOON_MS, SlowDevices
 from tests.compiled import needs_servo

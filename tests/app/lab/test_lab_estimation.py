@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from study_app.app.failures import Patience
-from study_app.app.lab.controller import LabController
+from study_app.app.lab_controller import LabController
 from study_app.lab.ab_comparison import Setting
 from study_app.lab.presets import save
 from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices
@@ -108,7 +108,7 @@ def test_a_preset_is_on_the_disk_before_the_program_ends(
         save(path, text)
         written.append(path.name)
 
-    monkeypatch.setattr("study_app.app.lab.jobs.save", slowly)
+    monkeypatch.setattr("study_app.app.lab_controller.save", slowly)
     for name in ("one.toml", "two.toml"):
         visit.place.save_asked.emit(tmp_path / name, visit.bench.a)
     assert not list(tmp_path.iterdir())

@@ -6,9 +6,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from study_app.app import lab_controller
 from study_app.app.failures import Patience
-from study_app.app.lab import jobs
-from study_app.app.lab.controller import LabController
+from study_app.app.lab_controller import LabController
 from study_app.errors import DeviceNotFound, ServoFault
 from study_app.lab.ab_comparison import Workbench
 from study_app.lab.presets import Choice
@@ -173,8 +173,8 @@ OPENING = ("entered", "fade in after a fault", "open again", "device", "no devic
 def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any, pytestconfig: Any) -> None:
     from study_app.gui.lab.view import LabPlace
 
-    monkeypatch.setattr(jobs, "STARTS_AFTER_MS", 0)
-    at_hand = "study_app.app.lab.jobs.liquids_at_hand"
+    monkeypatch.setattr(lab_controller, "STARTS_AFTER_MS", 0)
+    at_hand = "study_app.app.lab_controller.liquids_at_hand"
     monkeypatch.setattr(at_hand, lambda saved: (Choice(saved[-1], "new", "New"),))
     (tmp_path / "study.toml").write_bytes(source_bytes("demo"))
     (tmp_path / "broken.toml").write_text("format = 1")

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from study_app.app.lab.controller import LabController
+from study_app.app.lab_controller import LabController
 from study_app.evidence.appraisal import Costs, EffectCost, Errors, Question
 from study_app.haptics.model.scene import Scene
 

@@ -1,1 +1,0 @@
-"""The liquid lab: the window, the servo and the files behind it."""

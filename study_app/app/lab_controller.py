@@ -1,0 +1,857 @@
+"""The liquid lab: where its place, a device's servo, the edits, their cost and the estimation meet.
+
+Nothing of it acts on the hand once the place is left: leaving it, closing the window, an exception in a slot or in
+painting, all end in zero force first, then the servo, then the device.
+"""
+
+from __future__ import annotations
+
+import gc
+import logging
+import math
+import random
+import threading
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
+
+from study_app.app.failures import Patience, UncaughtExceptions, guarded
+from study_app.devices import DEFAULT_DEVICE
+from study_app.devices.registry import descriptor_of, title_of
+from study_app.errors import StudyError
+from study_app.evidence.appraisal import AppraisalClient, Costs, Errors, Question, start_appraisal_worker
+from study_app.gui.home.startup_window import LONG_AFTER_S
+from study_app.gui.kit.devices import device_choices
+from study_app.gui.lab.lab_state import (
+    DRAG,
+    LSL,
+    OFF,
+    SOURCES,
+    WAKE,
+    CostRow,
+    DeviceShown,
+    ErrorRow,
+    EstimateRow,
+    EstimateShown,
+    LabView,
+    Now,
+)
+from study_app.gui.lab.view import LabPlace
+from study_app.haptics.model.effects import NAMED
+from study_app.haptics.model.scene import Scene
+from study_app.lab.ab_comparison import Setting, Side, Workbench
+from study_app.lab.estimation.sources import available
+from study_app.lab.presets import Choice, liquids_at_hand, liquids_of, preset_text, save, spoken, use_in_study
+from study_app.lab.programmed_paths import TITLES
+from study_app.protocol.quantities import QUANTITIES
+
+if TYPE_CHECKING:
+    pass
+    from study_app.lab.estimation.live_estimation import LiveEstimation
+    from study_app.lab.live import Live
+
+SMALLEST_N = 0.001
+
+
+def cost_rows(costs: Costs) -> tuple[CostRow, ...]:
+    """Return what each part of a tick takes, the most expensive first, then what is not there, and why."""
+    there = [CostRow(NAMED[it.effect].label, it.ns) for it in costs.effects if it.ns is not None]
+    there.append(CostRow("Servo alone", costs.rest_ns))
+    absent = (CostRow(NAMED[it.effect].label, None, it.why) for it in costs.effects if it.ns is None)
+    return (*sorted(there, key=lambda row: -(row.ns or 0.0)), *absent)
+
+
+def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
+    """Return how far a setting is from the definition."""
+    without = ", ".join(NAMED[it].label.lower() for it in errors.left_out)
+    note = f"of drag and wake; no reference for {without}" if without else "along programmed paths"
+    return (
+        ErrorRow("Wake, of Σ|e|/S", "no wake" if errors.wake is None else _tiny(errors.wake), note),
+        ErrorRow("Force, largest", "no drag" if errors.force_n is None else _newtons(errors.force_n), note),
+        ErrorRow("Lag of the velocity filter", f"{1e3 * errors.lag_s:z.1f} ms", "at constant acceleration"),
+    )
+
+
+def _tiny(share: float) -> str:
+    return f"{share:.0e}".replace("e-0", "e−").replace("e-", "e−") if share > 0 else "0"
+
+
+def _newtons(force_n: float) -> str:
+    return f"< {SMALLEST_N:g} N" if force_n < SMALLEST_N else f"{force_n:.3f} N"
+
+
+log = logging.getLogger(__name__)
+
+
+class Prices:
+    """What the felt setting costs and how true it is, as far as it was answered."""
+
+    def __init__(self, make_appraiser: Callable[[], AppraisalClient]) -> None:
+        self._make = make_appraiser
+        self._appraiser: AppraisalClient | None = None
+        self._asked = 0
+        self.costs: Costs | None = None
+        self.errors: Errors | None = None
+        self.waits = False
+
+    def forget(self) -> None:
+        """Know nothing of a setting that was changed."""
+        self._asked, self.costs, self.errors, self.waits = -1, None, None, False
+
+    def ask(self, scene: Scene) -> None:
+        """Ask about a setting; the answers come to `take`."""
+        self.forget()
+        if self._appraiser is not None and not self._appraiser.works:
+            self.close()
+        if self._appraiser is None:
+            try:
+                self._appraiser = self._make()
+            except OSError as error:  # no process to be had: the lab continues without costs
+                log.info("the appraisal failed: %s", error)
+                return
+        self._asked, self.waits = self._appraiser.order(Question(scene)), True
+
+    def take(self) -> None:
+        for number, answer in () if self._appraiser is None else self._appraiser.answers():
+            if number != self._asked:
+                continue
+            if isinstance(answer, Costs):
+                self.costs = answer
+            elif isinstance(answer, Errors):
+                self.errors, self.waits = answer, False
+            else:
+                self.waits = False
+
+    def close(self) -> None:
+        appraiser, self._appraiser, self.waits = self._appraiser, None, False
+        if appraiser is not None:
+            appraiser.close()
+
+
+PATIENCE_S = 20.0
+STARTS_AFTER_MS = 150  # the lab is laid out and painted first: opening a device takes Python's lock for long
+
+
+class LabOpening(QObject):
+    """Opens the device that is wanted, and lets go of one that is not any more.
+
+    ``opened`` carries a `Live` whose servo runs at rest; ``failed`` what was met instead; ``said`` a line that the
+    device asks for while it is opened.
+
+    Parameters
+    ----------
+    open_live : opens a device by its name, as ``lab.live.open_live`` does
+    options : values of devices' options, by name
+    """
+
+    opened = Signal(object)
+    failed = Signal(object)
+    said = Signal(str)
+    _done = Signal(object)
+
+    def __init__(self, open_live: Callable[..., Live] | None = None, options: Mapping[str, Path] | None = None) -> None:
+        super().__init__()
+        self._open_live = open_live
+        self._options = options
+        self._wanted: str | None = None
+        self._opening: str | None = None
+        self._cancelled = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._began_s = 0.0
+        self._start = QTimer(self)
+        self._start.setSingleShot(True)
+        self._start.setInterval(STARTS_AFTER_MS)
+        self._start.timeout.connect(self._begin)
+        self._done.connect(self._end, Qt.ConnectionType.QueuedConnection)
+
+    @property
+    def busy_with(self) -> str | None:
+        """The device that is being opened and still wanted; None where none is."""
+        return self._wanted
+
+    @property
+    def lasts_s(self) -> float:
+        """How long a device has been opened so far [s]; 0 where none is."""
+        return 0.0 if self._thread is None or self._wanted is None else time.monotonic() - self._began_s
+
+    def want(self, name: str) -> None:
+        """Open a device; one that is being opened is given up first."""
+        self.cancel()
+        self._wanted = name
+        if self._thread is None:
+            self._start.start()
+
+    def cancel(self) -> None:
+        """Want nothing any more: what is being opened is closed as soon as it is open."""
+        self._wanted = None
+        self._start.stop()
+        self._cancelled.set()
+
+    def wait(self, patience_s: float = PATIENCE_S) -> None:
+        """Wait for what is being opened: it must be let go of in the windows' thread, not in its own."""
+        if self._thread is not None:
+            self._thread.join(patience_s)
+            QCoreApplication.sendPostedEvents(self)
+
+    def _begin(self) -> None:
+        assert self._wanted is not None  # noqa: S101 - begun only where something is wanted
+        self._opening, self._cancelled, self._began_s = self._wanted, threading.Event(), time.monotonic()
+        self._thread = threading.Thread(
+            target=self._open, args=(self._wanted, self._cancelled), name="lab opening", daemon=True
+        )
+        self._thread.start()
+
+    def _open(self, name: str, cancelled: threading.Event) -> None:
+        """Compile, open and start, in a thread of its own; whatever comes of it goes to ``_end``."""
+        try:
+            loads = self._open_live is None
+            if self._open_live is None:
+                from study_app.lab.live import open_live  # noqa: PLC0415 - the compiler: only once it is needed
+
+                self._open_live = partial(open_live, options=self._options)
+            made: object = self._open_live(name, progress=self.said.emit, cancelled=cancelled.is_set)
+            if loads:
+                gc.freeze()  # the windows' thread need not look through all that was loaded here
+        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
+            made = error
+        self._done.emit((made, cancelled))
+
+    def _end(self, done: tuple[object, threading.Event]) -> None:
+        """Hand over what was opened, or let go of it where it is not wanted any more."""
+        made, cancelled = done
+        self._thread = None
+        if not cancelled.is_set():
+            self._wanted = None
+            (self.failed if isinstance(made, Exception) else self.opened).emit(made)
+            return
+        if not isinstance(made, Exception):
+            try:
+                made.close()  # type: ignore[attr-defined]
+            except Exception as error:  # noqa: BLE001 - reported: it may push, and the next one does not wait
+                self.failed.emit(error)
+        if self._wanted is not None:
+            self._begin()
+
+
+class LabSaving(QObject):
+    """The liquids at hand; writes presets, one at a time, and looks which liquids there are then.
+
+    ``said`` tells what was written or opened last. ``saved`` comes when something was written, ``failed`` carries what
+    was met instead.
+    """
+
+    saved = Signal()
+    failed = Signal(object)
+    _done = Signal(object)
+
+    def __init__(self, liquids: tuple[Choice, ...]) -> None:
+        super().__init__()
+        self.liquids = liquids
+        self.said = ""
+        self._before: threading.Thread | None = None
+        self._files: list[tuple[Scene, Path]] = []
+        self._done.connect(self._tell, Qt.ConnectionType.QueuedConnection)
+
+    def save(self, path: Path, setting: Setting) -> None:
+        self._begin(partial(self._save, path, setting), (str(path),))
+
+    def use(self, study: Path, setting: Setting) -> None:
+        """Name a setting's file in a study, after it was saved in the study's folder where it has no file yet."""
+        self._begin(partial(self._use, study, setting), ())
+
+    def open(self, path: Path) -> Choice:
+        """Have the liquids of a file at hand; return the first.
+
+        Raises
+        ------
+        ProtocolError
+            Every problem of the file.
+        """
+        found = liquids_of(str(path))
+        self.liquids = (*(it for it in self.liquids if it not in found), *found)
+        if len(found) == 1:
+            self._files.insert(0, (found[0].scene, path))
+        self.said = f"Opened {path.name}: {', '.join(spoken(it.liquid) for it in found)}"
+        return found[0]
+
+    def wait(self, patience_s: float = PATIENCE_S) -> None:
+        """Wait until everything is on the disk, and tell of it."""
+        if self._before is not None:
+            self._before.join(patience_s)
+            QCoreApplication.sendPostedEvents(self)
+
+    def _begin(self, write: Callable[[], str], more: tuple[str, ...]) -> None:
+        at_hand = (*(it.source for it in self.liquids), *more)
+        self._before = threading.Thread(
+            target=self._write, args=(self._before, write, at_hand), name="preset", daemon=True
+        )
+        self._before.start()
+
+    def _write(self, before: threading.Thread | None, write: Callable[[], str], at_hand: tuple[str, ...]) -> None:
+        """Write, in a thread of its own, after the one before."""
+        if before is not None:
+            before.join()
+        try:
+            found: object = write(), liquids_at_hand(saved=at_hand)
+        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
+            found = error
+        self._done.emit(found)
+
+    def _save(self, path: Path, setting: Setting) -> str:
+        save(path, preset_text(setting))
+        self._files = [(setting.scene, path), *((scene, file) for scene, file in self._files if file != path)]
+        return f"Saved as {path.name} in {path.parent}"
+
+    def _use(self, study: Path, setting: Setting) -> str:
+        file = next((path for scene, path in self._files if scene == setting.scene and path.is_file()), None)
+        return use_in_study(study, setting, file)
+
+    def _tell(self, found: Exception | tuple[str, tuple[Choice, ...]]) -> None:
+        if isinstance(found, Exception):
+            self.failed.emit(found)
+            return
+        self.said, written = found
+        self.liquids = tuple(dict.fromkeys((*self.liquids, *written)))
+        self.saved.emit()
+
+
+PREPARING: Final = "Loading the force model …"
+NAMES: Final = {DRAG: ("drag_coefficient",), WAKE: ("drag_coefficient", "length", "scaling")}
+
+
+class Lab(Protocol):
+    """What an estimation needs of the lab."""
+
+    bench: Workbench
+    live: Live | None
+
+    def feel(self, bench: Workbench) -> None: ...
+
+    def fail(self, error: BaseException) -> None: ...
+
+
+class LabEstimation(QObject):
+    """An estimation for the lab's selected setting: `poll` with each frame, `shown` for its view, `close` to end."""
+
+    def __init__(self, place: LabPlace, lab: Lab) -> None:
+        super().__init__()
+        self._lab = lab
+        self._executor: ThreadPoolExecutor | None = None
+        self._loading: Future[LiveEstimation] | None = None
+        self._wanted: tuple[str, str, Path | None] = (OFF, DRAG, None)
+        self.estimation: LiveEstimation | None = None
+        self._trouble = self._refused = ""
+        self._sources = (*SOURCES, *(LSL if available() else ()))
+        place.estimate_source_chosen.connect(self._choose_source)
+        place.estimate_parameters_chosen.connect(self._choose_parameters)
+        place.estimate_apply_asked.connect(self._apply)
+        place.estimate_follow_asked.connect(self._follow)
+
+    def fail(self, error: BaseException) -> None:
+        """End with zero force; the lab ends the estimation, too."""
+        self._lab.fail(error)
+
+    def poll(self) -> None:
+        """Take what was measured since, and apply what is applied continuously."""
+        if self._loading is not None and self._loading.done():
+            loading, self._loading = self._loading, None
+            self.estimation = loading.result()
+            self._begin()
+        if self.estimation is None or self._wanted[0] == OFF:
+            return
+        from study_app.lab.estimation.live_estimation import set_values  # noqa: PLC0415 - loads the compiler
+
+        values = self.estimation.poll(self._lab.live, self._lab.bench)
+        if self.estimation.trouble:
+            self._trouble = f"{self.estimation.trouble[:1].upper()}{self.estimation.trouble[1:]}"
+            self._wanted = (OFF, *self._wanted[1:])
+        elif values:
+            self._change(lambda bench: set_values(bench, values, held=True))
+
+    def close(self) -> None:
+        """Estimate nothing; a search that is under way ends by itself."""
+        self._wanted, self._trouble = (OFF, *self._wanted[1:]), ""
+        self._loading = None
+        if self.estimation is not None:
+            self.estimation.close()
+        self.estimation = None
+        executor, self._executor = self._executor, None
+        if executor is not None:
+            executor.shutdown(wait=False, cancel_futures=True)
+
+    def shown(self) -> EstimateShown:
+        source, parameters, _ = self._wanted
+        shown = EstimateShown(self._sources, source, parameters, message=self._trouble)
+        if source == OFF:
+            return shown
+        if self.estimation is None:
+            return replace(shown, message=PREPARING)
+        found = self.estimation.estimate
+        rows = tuple(
+            EstimateRow(_label(name), f"{value:.4g}", _interval(*found.intervals[name]))
+            for name, value in found.values.items()
+            if name in found.intervals
+        )
+        if found.identified:
+            share = 100 * found.rms_n / found.force_rms_n if found.force_rms_n > 0 else 0.0
+            message = f"Residual {found.rms_n:.3f} N, {share:.0f} % of the force; {found.seconds:.0f} s measured."
+        else:
+            message = f"{found.reason[:1].upper()}{found.reason[1:]}."
+        if not self.estimation.applies:
+            message += " Compared only: it is not applied."
+        elif not found.identified:
+            message += " Nothing is changed."
+        applies = self.estimation.applies and self._lab.live is not None
+        return replace(
+            shown,
+            rows=rows,
+            message=f"{message}{self._refused}",
+            sound=found.identified,
+            may_apply=applies and found.identified,
+            may_follow=applies,
+            follows=self.estimation.follows,
+        )
+
+    @guarded
+    def _choose_source(self, source: str, path: Path | None) -> None:
+        self._want(source, self._wanted[1], path)
+
+    @guarded
+    def _choose_parameters(self, parameters: str) -> None:
+        self._want(self._wanted[0], parameters, self._wanted[2])
+
+    def _want(self, source: str, parameters: str, path: Path | None) -> None:
+        """Estimate from a source; load what that needs in the thread first."""
+        self._wanted, self._trouble, self._refused = (source, parameters, path), "", ""
+        if self.estimation is not None:
+            self._begin()
+        elif source != OFF and self._loading is None:
+            self._executor = ThreadPoolExecutor(1, thread_name_prefix="lab estimation")
+            self._loading = self._executor.submit(_load, self._executor)
+
+    def _begin(self) -> None:
+        assert self.estimation is not None  # noqa: S101 - begun where it is loaded
+        from study_app.lab.estimation.live_estimation import Chosen  # noqa: PLC0415 - loads the compiler
+
+        source, parameters, path = self._wanted
+        try:
+            self.estimation.choose(Chosen(source, NAMES[parameters], path))  # type: ignore[arg-type]
+        except StudyError as error:
+            self._trouble = f"{error}"
+            self._wanted = (OFF, parameters, None)
+
+    @guarded
+    def _apply(self) -> None:
+        if self.estimation is not None:
+            self._change(self.estimation.applied)
+
+    def _change(self, edit: Callable[[Workbench], Workbench]) -> None:
+        """Change the selected setting; where it refuses the values, say so and apply none continuously."""
+        assert self.estimation is not None  # noqa: S101 - of which the values are
+        try:
+            bench = edit(self._lab.bench)
+        except StudyError as error:
+            self.estimation.follows = False
+            self._refused = f" Not applied: {error}."
+            return
+        self._refused = ""
+        self._lab.feel(bench)
+
+    @guarded
+    def _follow(self, on: bool) -> None:
+        if self.estimation is not None:
+            self.estimation.follows = on
+
+
+def _load(executor: ThreadPoolExecutor) -> LiveEstimation:
+    """Load and compile the estimation, in its thread."""
+    from study_app.lab.estimation.fits import prepare  # noqa: PLC0415
+    from study_app.lab.estimation.live_estimation import LiveEstimation  # noqa: PLC0415 - loads the compiler
+
+    prepare()
+    return LiveEstimation(executor)
+
+
+def _label(name: str) -> str:
+    place = "body" if name == "drag_coefficient" else "wake"
+    return QUANTITIES[f"{place}.{name}"].label
+
+
+def _interval(lower: float, upper: float) -> str:
+    return f"{lower:.3g} … {upper:.3g}"
+
+
+INITIAL_A: Final = Choice("rek2024", "water", "Water")
+INITIAL_B: Final = Choice("rek2024", "light_oil", "Light oil")
+FRAME_MS: Final = 33
+APPRAISE_AFTER_MS: Final = 300
+COMPILING: Final = "Compiling the force model, once after an installation or an update; this takes about a minute"
+
+
+class LabController(QObject):
+    """The lab's stay at its place.
+
+    Parameters
+    ----------
+    place : the widgets; this ends with them
+    device, options : the device it begins with, and the values of devices' options, by name
+    open_live, make_appraiser : what opens a device by its name, what begins the process that appraises
+    chance : what a blinding is drawn from
+    bench, liquids : what it begins with, and the liquids that can be chosen
+    """
+
+    def __init__(
+        self,
+        place: LabPlace,
+        *,
+        device: str = DEFAULT_DEVICE,
+        options: Mapping[str, Path] | None = None,
+        open_live: Callable[..., Live] | None = None,
+        make_appraiser: Callable[[], AppraisalClient] = start_appraisal_worker,
+        chance: random.Random | None = None,
+        bench: Workbench | None = None,
+        liquids: tuple[Choice, ...] | None = None,
+    ) -> None:
+        super().__init__(place)
+        self.place = place
+        self.live: Live | None = None
+        self.device = device
+        self.bench = Workbench(INITIAL_A.setting(), INITIAL_B.setting()) if bench is None else bench
+        self.trouble = self.study = ""
+        self._refused: tuple[str, str] | None = None
+        self._entered = False
+        self._prices = Prices(make_appraiser)
+        self._opening = LabOpening(open_live, options)
+        self._saving = LabSaving(liquids_at_hand() if liquids is None else liquids)
+        self.estimation = LabEstimation(place, self)
+        self.chance = chance if chance is not None else random.SystemRandom()
+        self._said = ""
+        self.uncaught = UncaughtExceptions(self._handle_uncaught)
+        self.frames = self._timer(FRAME_MS, self._frame)
+        self._due = self._timer(0, self._frame, once=True)
+        self._cost_due = self._timer(APPRAISE_AFTER_MS, self._ask_price, once=True)
+        self._connect()
+
+    def _timer(self, interval_ms: int, slot: Callable[[], None], *, once: bool = False) -> QTimer:
+        timer = QTimer(self)
+        timer.setInterval(interval_ms)
+        timer.setSingleShot(once)
+        timer.setTimerType(Qt.TimerType.PreciseTimer)
+        timer.timeout.connect(slot)
+        return timer
+
+    def _connect(self) -> None:
+        place, opening, saving = self.place, self._opening, self._saving
+        for signal, slot in (
+            (place.entered, self._enter),
+            (place.left, self.leave),
+            (place.changed, self._change),
+            (place.liquid_chosen, self._choose),
+            (place.copied, self._copy),
+            (place.switched, self._switch),
+            (place.blind_asked, self._blind),
+            (place.undo_asked, self._undo),
+            (place.redo_asked, self._redo),
+            (place.device_chosen, self._open),
+            (place.cancel_asked, self._cancel),
+            (place.path_chosen, self._play),
+            (place.stop_asked, self._stop_force),
+            (place.fade_in_asked, self._fade_in),
+            (place.hand_moved, self._point),
+            (place.hand_pressed, self._press),
+            (place.save_asked, self._save),
+            (place.preset_opened, self._open_preset),
+            (place.use_asked, self._use),
+            (opening.opened, self._begin),
+            (opening.failed, self._could_not_open),
+            (opening.said, self._say),
+            (saving.failed, self._could_not_save),
+        ):
+            signal.connect(slot)
+
+    @property
+    def liquids(self) -> tuple[Choice, ...]:
+        return self._saving.liquids
+
+    def leave(self) -> None:
+        """Let go of the hand: zero force, the servo's end, the device; then of everything else."""
+        if not self._entered:
+            return
+        self._entered = False
+        for timer in (self.frames, self._due, self._cost_due):
+            timer.stop()
+        self._opening.cancel()
+        try:
+            self._let_go()
+        except StudyError as error:
+            log.warning("the servo did not stop properly: %s", error)
+            self.place.message.emit("The device was not released properly", f"{error}.")
+        finally:
+            self.estimation.close()
+            self._prices.close()
+            self.uncaught.remove()
+
+    def end(self, patience: Patience) -> None:
+        """Leave, and wait for a preset that is being written, and for a device, so that it is let go of, too."""
+        self.leave()
+        self._saving.wait(patience.left_s)
+        self._opening.wait(patience.left_s)
+
+    def fail(self, error: BaseException) -> None:
+        """Zero force, then say what failed; the force can be faded in again, through a device opened anew.
+
+        A painter is at work for as long as something holds it, as a traceback does: Qt would paint nothing any more.
+        """
+        self._opening.cancel()
+        try:
+            self._let_go()
+        except StudyError as second:
+            log.warning("the servo did not stop properly: %s", second)
+        self.estimation.close()
+        traceback.clear_frames(error.__traceback__)
+        known = isinstance(error, StudyError)
+        said = f"{error}" if known else f"{type(error).__name__}: {error}; the force is off"
+        before, self.trouble = self.trouble, said
+        if not known and self.trouble != before:  # once, though it may come with every frame
+            log.error("the lab failed: %s", error, exc_info=error)
+
+    def view(self) -> LabView:
+        bench, live, opening, costs = self.bench, self.live, self._opening.busy_with, self._prices.costs
+        reading = None if live is None else live.reading()
+        fault = "" if reading is None else reading.fault
+        if fault or (self.trouble and live is None):  # an edit or a file that was refused stops no device
+            state = "stopped"
+        else:
+            state = "opening" if opening is not None else "ready" if live is not None else "closed"
+        scene = bench.in_hand.scene
+        progress = self._said or (COMPILING if self._opening.lasts_s > LONG_AFTER_S else "")
+        shown: dict[str, Any] = {}
+        if live is not None and reading is not None:
+            half_x, half_y, half_z = live.device.workspace_m
+            shown = {
+                "workspace_m": (2 * half_x, 2 * half_y, 2 * half_z),
+                "path": live.path,
+                "trace": live.trace(),
+                "tail_a": live.tail("A"),
+                "tail_b": live.tail("B"),
+                "now": Now(reading.position_m, reading.force_n, reading.wake_mps),
+                "limiters": live.limiters(),
+            }
+        if not bench.blind:  # the ball's size would tell one from the other
+            shown["body_radius_m"] = scene.body.diameter_m / 2 / scene.scale
+        pointer = descriptor_of(self.device).pointer
+        return LabView(
+            workbench=bench,
+            liquids=self.liquids,
+            device=DeviceShown(device_choices(), self.device, state, live is not None and not fault, pointer),
+            paths=tuple(TITLES.items()),
+            cost=() if costs is None else cost_rows(costs),
+            tick_ns=None if costs is None else costs.tick_ns,
+            errors=() if self._prices.errors is None else error_rows(self._prices.errors),
+            measuring=self._prices.waits or self._cost_due.isActive(),
+            force_on=reading is not None and reading.force_on,
+            busy="" if opening is None else progress or f"Opening {title_of(opening)}",
+            trouble=self.trouble or fault,
+            refused=self._refused,
+            said=self._saving.said,
+            study=self.study,
+            estimate=self.estimation.shown(),
+            **shown,
+        )
+
+    def feel_of_study(self, a: Setting, b: Setting, study: str) -> None:
+        """Feel liquids of a study that is edited, which takes changes back; "" where it cannot."""
+        self.study = study
+        self.feel(Workbench(a, b), anew=True)
+
+    @guarded
+    def _enter(self) -> None:
+        if self._entered:
+            return
+        self._entered = True
+        self.uncaught.install()
+        self.frames.start()
+        self._open(self.device)
+
+    @guarded
+    def _frame(self) -> None:
+        if self.live is not None:
+            self.live.poll()
+        self.estimation.poll()
+        self._prices.take()
+        self._show()
+
+    def _show(self) -> None:
+        self.place.show_view(self.view())
+
+    @guarded
+    def _open(self, name: str) -> None:
+        self._let_go()
+        self.device, self.trouble, self._said = name, "", ""
+        self._opening.want(name)
+
+    @guarded
+    def _begin(self, live: Live) -> None:
+        if not self._entered:
+            live.close()
+            return
+        self.live = live
+        live.feel(self.bench)
+        self._cost_due.start()
+
+    @guarded
+    def _could_not_open(self, error: Exception) -> None:
+        raise error
+
+    @guarded
+    def _cancel(self) -> None:
+        self._opening.cancel()
+        self.trouble = "No device is open"
+
+    @guarded
+    def _say(self, line: str) -> None:
+        self._said = line
+
+    @guarded
+    def _change(self, name: str, value: object, held: bool) -> None:
+        self._try(lambda: self.bench.change(name, value, held=held), name)  # type: ignore[arg-type]
+
+    @guarded
+    def _choose(self, side: Side, choice: Choice) -> None:
+        self._try(lambda: self.bench.choose(side, spoken(choice.liquid), choice.scene), "")
+
+    @guarded
+    def _copy(self) -> None:
+        self._try(self.bench.copy_to_other, "")
+
+    def _try(self, edit: Callable[[], Workbench], name: str) -> None:
+        """Make an edit, or keep why it was refused, for its parameter."""
+        try:
+            bench = edit()
+        except StudyError as error:
+            if name:
+                self._refused = (name, str(error))
+            else:
+                self.trouble = str(error)
+            return
+        self.feel(bench)
+
+    @guarded
+    def _switch(self) -> None:
+        """Feel the other setting; a knob that is held is let go of at once, for it was the other one's."""
+        self.feel(self.bench.switch())
+        self._show()
+
+    @guarded
+    def _blind(self, asked: bool) -> None:
+        if asked:
+            self.feel(self.bench.blinded(self.chance), anew=True)
+        else:
+            self.feel(self.bench.revealed())
+
+    @guarded
+    def _undo(self) -> None:
+        self.feel(self.bench.undo())
+
+    @guarded
+    def _redo(self) -> None:
+        self.feel(self.bench.redo())
+
+    def feel(self, bench: Workbench, *, anew: bool = False) -> None:
+        """Let a workbench be felt at once, and be appraised once it has rested for a while."""
+        before, self.bench, self._refused = self.bench, bench, None
+        self._forget_trouble()
+        if bench.in_hand.scene != before.in_hand.scene:
+            self._prices.forget()
+            self._cost_due.start()
+        if self.live is not None:
+            self.live.feel(bench, anew=anew)
+            waits_s = self.live.due_in_s
+            if waits_s is not None and not self._due.isActive():
+                self._due.start(math.ceil(1e3 * waits_s))
+
+    @guarded
+    def _ask_price(self) -> None:
+        self._prices.ask(self.bench.in_hand.scene)
+
+    @guarded
+    def _play(self, name: str | None) -> None:
+        if self.live is not None:
+            self.live.play(name)
+
+    @guarded
+    def _stop_force(self) -> None:
+        """Send zero force; a device that is being opened, which would bring its own, is given up."""
+        if self.live is not None:
+            self.live.stop_force()
+        elif self._opening.busy_with is not None:
+            self._cancel()
+
+    @guarded
+    def _fade_in(self) -> None:
+        """Let the force return; where the servo stopped itself, by opening its device again."""
+        if self.live is None or self.live.servo.fault is not None:
+            self._open(self.device)
+        else:
+            self.live.fade_in()
+
+    @guarded
+    def _point(self, x_m: float, y_m: float, z_m: float) -> None:
+        if self.live is not None:
+            self.live.point_to(x_m, y_m, z_m)
+
+    @guarded
+    def _press(self, buttons: int) -> None:
+        if self.live is not None:
+            self.live.press(buttons)
+
+    @guarded
+    def _save(self, path: Path, setting: Setting) -> None:
+        if self.bench.blind:
+            self.trouble = "no preset can be saved during a blind comparison: end it first"
+            return
+        self._forget_trouble()
+        self._saving.save(path, setting)
+
+    @guarded
+    def _use(self, study: Path, setting: Setting) -> None:
+        self._forget_trouble()
+        self._saving.use(study, setting)
+
+    @guarded
+    def _open_preset(self, path: Path) -> None:
+        """Feel the first liquid of a file; its others are at hand from then on."""
+        try:
+            first = self._saving.open(path)
+        except StudyError as error:
+            self.trouble = str(error)
+            return
+        self._choose(self.bench.presented, first)
+
+    @guarded
+    def _could_not_save(self, error: Exception) -> None:
+        """Show why a preset could not be written; the force continues. Any other exception is a bug and is raised."""
+        if not isinstance(error, StudyError):
+            raise error
+        self.trouble = str(error)
+
+    def _forget_trouble(self) -> None:
+        """Let what went wrong before be over, unless it says why no device is open."""
+        if self.live is not None:
+            self.trouble = ""
+
+    def _let_go(self) -> None:
+        live, self.live = self.live, None
+        if live is not None:
+            live.close()
+
+    def _handle_uncaught(self, error: BaseException) -> bool:
+        self.fail(error)
+        return False
