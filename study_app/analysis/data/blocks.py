@@ -301,10 +301,6 @@ class LevelBlock:
             return assumed_for(self.stimulus, self.design)
         return self.method.assumed(self.stimulus, self.design)
 
-    def presents_modulus(self, index: int) -> bool:
-        """Return whether the trial at this place in the block presents the modulus, which is not analysed."""
-        return self.design.first is not None and index == 1
-
 
 def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlock, ...]:
     """Return the blocks with a design of the protocol in a receipt, in the order of the session; ``key`` is open."""
@@ -369,10 +365,6 @@ class Decided:
     def direction(self, item: str) -> Direction | None:
         """Return where answers to a statement were expected to go as delay grows; None: nothing was expected."""
         return "increasing" if item in self.rising else "decreasing" if item in self.falling else None
-
-    def named_in(self, block: Block) -> bool:
-        """Return whether the statements that name a liquid are those of a block."""
-        return bool(self.names) and set(self.names) <= {item.id for item in block.items}
 
 
 NOTHING_DECIDED: Final = Decided(False, False, 0.05, None, (), (), (), (), None)

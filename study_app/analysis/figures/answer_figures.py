@@ -40,8 +40,6 @@ ANSWERS_TOP_PT: Final = 40.0
 ANSWERS_FOOT_PT: Final = 17.0
 BOTTOM: Final = 0.55
 TOP: Final = 7.5
-LEVEL_PT: Final = ANSWERS_PT / (TOP - BOTTOM)
-DOT_PT: Final = 1.8
 MOST_LINES: Final = 60
 """Of more participants so many are drawn: more lines hide the median and the band."""
 
@@ -52,17 +50,15 @@ SPREAD: Final = 0.24
 @style.own_settings()
 def draw_answers(
     plots: Sequence[tuple[str, Array]],
-    settings: Sequence[str],
-    delays_ms: Sequence[float] | None,
+    delays_ms: Sequence[float],
     lowest_ms: Sequence[float | None],
     foot: str,
     look: Look,
 ) -> Sheet:
-    """Draw statements over delay, or, without ``delays_ms``, over the settings' codes.
+    """Draw statements over delay on a true scale: a thin line per participant (of many: of some), band, thick median.
 
-    Over delay (true scale, ascending): a thin line per participant (of many: of some), quartile band, thick median.
-    Over codes, whose order says nothing: a dot per participant, quartile band, median ring, and no line. ``plots`` are
-    short texts and answers (participants, settings), ``lowest_ms`` the lowest delays at which a trend shows.
+    ``plots`` are short texts and answers (participants, delays), ``lowest_ms`` the lowest delays at which a trend
+    shows.
     """
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     columns = min(len(plots), PLOTS_A_ROW)
@@ -72,7 +68,7 @@ def draw_answers(
     rows = -(-len(plots) // PLOTS_A_ROW)
     row_pt = title_pt + 6 + ANSWERS_PT + 14
     sheet = look.sheet(ANSWERS_TOP_PT + rows * row_pt + (rows - 1) * 6 + ANSWERS_FOOT_PT)
-    legend(sheet, lines=delays_ms is not None)
+    legend(sheet)
     for place, (_, values) in enumerate(plots):
         row, column = divmod(place, PLOTS_A_ROW)
         x = MARGIN_PT + SCALE_PT + column * (width + ANSWERS_GAP_PT)
@@ -83,11 +79,8 @@ def draw_answers(
         axes.set_label(f"item{place + 1}")
         axes.set_ylim(BOTTOM, TOP)
         sheet.scale(axes, "y", LEVELS, LEVELS if column == 0 else (), lines=True)
-        if delays_ms is not None:
-            over_delay(sheet, axes, values, np.asarray(delays_ms, dtype=float), SPREAD)
-            _lowest(sheet, axes, lowest_ms[place], float(np.mean(delays_ms)))
-        else:
-            _over_codes(sheet, axes, values, settings, width)
+        over_delay(sheet, axes, values, np.asarray(delays_ms, dtype=float), SPREAD)
+        _lowest(sheet, axes, lowest_ms[place], float(np.mean(delays_ms)))
         counts = (~np.isnan(values)).sum(axis=0)
         if (counts < len(values)).any():  # not every participant answered at every setting
             low, high = int(counts.min()), int(counts.max())
@@ -103,7 +96,8 @@ def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread
     low, high = float(delays_ms.min()), float(delays_ms.max())
     reach = (high - low) or 1.0
     axes.set_xlim(low - 0.06 * reach, high + 0.06 * reach)
-    sheet.scale(axes, "x", round_ticks(low, high, low, high))
+    ticks = MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+    sheet.scale(axes, "x", [float(tick) for tick in ticks if low <= tick <= high])
     shown = lines_of(len(values))
     offsets = np.linspace(-spread / 2, spread / 2, len(shown)) if len(shown) > 1 else np.zeros(1)
     thin: Style = {
@@ -120,12 +114,6 @@ def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread
     band.set_gid(f"{axes.get_label()}-quartiles")
     thick: Style = {"linewidth": 1.6, "markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 1.0}
     axes.plot(delays_ms, median, "o-", color=style.ACCENT, zorder=4, gid=f"{axes.get_label()}-median", **thick)
-
-
-def round_ticks(low: float, high: float, least: float, most: float) -> list[float]:
-    """Return round numbers for an axis from ``low`` to ``high``, of those from ``least`` to ``most``."""
-    ticks = MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    return [float(tick) for tick in ticks if least <= tick <= most]
 
 
 def lines_of(participants: int) -> list[int]:
@@ -153,53 +141,16 @@ def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float)
     axes.annotate(f"≤ {lowest_ms:g}", (lowest_ms, TOP), xytext=(across, -6), textcoords="offset points", **look)
 
 
-def _over_codes(sheet: Sheet, axes: Axes, values: Array, codes: Sequence[str], width_pt: float) -> None:
-    axes.set_xlim(-0.6, len(codes) - 0.4)
-    slot_pt = width_pt / (len(codes) + 0.2)
-    crowded = max(sheet.text_width(code, 6.5) for code in codes) > slot_pt - 1
-    axes.set_xticks(range(len(codes)), codes, fontproperties=sheet.font(6.5), rotation=90 if crowded else 0)
-    ring: Style = {"markersize": 2.8, "markerfacecolor": "white", "markeredgewidth": 0.9}
-    dots: Style = {"markersize": DOT_PT - 0.2, "markeredgewidth": 0}
-    for place, column in enumerate(values.T):
-        q1, median, q3 = quartiles(column)
-        axes.fill_between((place + 0.18, place + 0.42), q1, q3, color=style.BAND, linewidth=0, zorder=1)
-        axes.plot(place + 0.3, median, "o-", color=style.ACCENT, zorder=3, **ring)
-        xs, ys = _beside_each_other(column, max(1, int(0.6 * slot_pt / DOT_PT)))
-        name = f"{axes.get_label()}-{codes[place]}"
-        axes.plot(place - 0.18 + xs * DOT_PT / slot_pt, ys, "o", color=style.AXIS, zorder=2, gid=name, **dots)
-
-
-def _beside_each_other(values: Array, across: int) -> tuple[Array, Array]:
-    """Lay equal answers out in rows of ``across`` around their level: x in dots from the middle, y in levels."""
-    xs: list[float] = []
-    ys: list[float] = []
-    for value in np.unique(values[~np.isnan(values)]):
-        count = int((values == value).sum())
-        rows = -(-count // across)
-        pitch = min(DOT_PT / LEVEL_PT, 0.84 / max(rows - 1, 1))
-        for row in range(rows):
-            here = min(across, count - row * across)
-            xs += [number - (here - 1) / 2 for number in range(here)]
-            ys += [float(value) + (row - (rows - 1) / 2) * pitch] * here
-    return np.array(xs), np.array(ys)
-
-
-def legend(sheet: Sheet, *, lines: bool) -> None:
-    """Write at the right, under the heading, what median, band and single marks are."""
+def legend(sheet: Sheet) -> None:
+    """Write at the right, under the heading, what median, band and single lines are."""
     words = ("median", "middle half (IQR)", "one participant")
     y, x = 30.0, sheet.width_pt - MARGIN_PT + 12 - sum(sheet.text_width(word, 7) + 30 for word in words)
-    middle = y - 2.4
-    ring: Style = {"marker": "o", "markersize": 3.2, "markerfacecolor": "white", "markeredgewidth": 0.9}
-    dot: Style = {"marker": "o", "markersize": DOT_PT, "markeredgewidth": 0}
     for word in words:
         if word == "middle half (IQR)":
             sheet.box(x, y - 6.2, 14, 7.6, style.BAND)
-        elif lines:
-            colour, width = (style.ACCENT, 1.6) if word == "median" else (style.PARTICIPANT, 0.6)
-            sheet.line((x, x + 14), (middle, middle), color=colour, linewidth=width)
         else:
-            colour, marker = (style.ACCENT, ring) if word == "median" else (style.AXIS, dot)
-            sheet.line((x + 8,), (middle,), color=colour, **marker)
+            colour, width = (style.ACCENT, 1.6) if word == "median" else (style.PARTICIPANT, 0.6)
+            sheet.line((x, x + 14), (y - 2.4, y - 2.4), color=colour, linewidth=width)
         sheet.text(x + 18, y, word, size=7, colour=style.TEXT_SOFT)
         x += sheet.text_width(word, 7) + 30
 
@@ -289,7 +240,8 @@ def _sentences(study: Study, block: Block) -> Iterator[str]:
         f"{'Pilot. ' if study.pilot else ''}Agreement with {counted(len(block.items), 'statement')} on "
         f"{counted(len(block.settings), _noun(block))} ({simulated}{counts(study, block)[0]})."
     )
-    yield from _marks_of_delays(study, block) if block.kind == "delays" else _marks_of_bars(block)
+    over_delay = block.kind == "delays" and block.revealed
+    yield from _marks_of_delays(study, block) if over_delay else _marks_of_bars(block)
     if not study.revealed:
         yield "Settings are shown by code in the order of the codes, since the key is sealed; the order says nothing."
     trials = _counted_trials(study, block)
@@ -327,14 +279,10 @@ def _marks_of_bars(block: Block) -> Iterator[str]:
 
 
 def _marks_of_delays(study: Study, block: Block) -> Iterator[str]:
-    quartiles = f"the middle half of the answers; quartiles {QUARTILES}."
-    if block.revealed:
-        yield (
-            f"Thin lines: {line_words(len(set(study.answers(block)['participant'])))}, slightly apart in height where "
-            f"they coincide; thick line: median; band: {quartiles}"
-        )
-    else:
-        yield f"Dots: participants, equal answers side by side; ring: median; band: {quartiles}"
+    yield (
+        f"Thin lines: {line_words(len(set(study.answers(block)['participant'])))}, slightly apart in height where "
+        f"they coincide; thick line: median; band: the middle half of the answers; quartiles {QUARTILES}."
+    )
     yield f"Answers from 1 ({block.labels[0]}) to 7 ({block.labels[-1]})."
 
 
@@ -548,16 +496,14 @@ def answers_picture(
 
 def draw_block(study: Study, block: Block, lowest: Mapping[str, float], look: Look) -> Sheet:
     """Draw the answers of a block; a participant's repeated answers are drawn over delay as their median."""
-    if block.kind != "delays":
+    if block.kind != "delays" or not block.revealed:
         return draw_agreement(study, block, look)
     answers = study.answers(block)
     people = sorted(answers["participant"].unique())
     plots = [(item.short, by_participant(answers, people, block.columns, item.id)) for item in block.items]
     marked = [lowest.get(item.id) for item in block.items]
-    shown = block.delays_ms if block.revealed else None
-    said = "Added delay, ms." if block.revealed else "Delay settings by code; the order of the codes says nothing."
-    foot = f"{said}   1 = {block.labels[0]}, 7 = {block.labels[-1]}."
-    return draw_answers(plots, block.codes, shown, marked, foot, look)
+    foot = f"Added delay, ms.   1 = {block.labels[0]}, 7 = {block.labels[-1]}."
+    return draw_answers(plots, block.delays_ms, marked, foot, look)
 
 
 CELL_PT: Final = (52.0, 26.0)

@@ -1,13 +1,12 @@
 """Recognition of liquids by the statement rated highest, and the first page's answer to which were distinguished."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import combinations
+from typing import Final
 
 import numpy as np
 
-from study_app.analysis.data.blocks import Decided
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.finding import (
@@ -22,12 +21,11 @@ from study_app.analysis.findings.finding import (
     test_row,
     verdict,
 )
-from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer, smallest_of_pairs
+from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer
 from study_app.analysis.report.html_page import heading, paragraph, table_of
 from study_app.analysis.results import (
     BlockResult,
     NotTested,
-    Tested,
     Verdict,
     counted,
     interval,
@@ -40,6 +38,8 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
 from study_app.analysis.statistics.recognition import Recognition, named, recognition
+
+NONE_RECOGNISED: Final = "No liquid was shown to be recognised above chance."
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         """Test whether settings were named for what they were."""
         labels = answers.decided.names
         right = tuple(setting.label for setting in answers.block.settings)
-        if not answers.decided.named_in(answers.block) or not any(right):
+        if not labels or not set(labels) <= answers.values.keys() or not any(right):
             return None, (NotTested(cls.what, "the protocol does not say which statements name these liquids"),)
         if not 2 <= answers.k <= MOST_NAMED or len(labels) < 2:
             return None, (NotTested(cls.what, f"it needs 2 to {MOST_NAMED} settings and two names"),)
@@ -178,91 +178,6 @@ def given(named: RecognitionResult, label: str) -> float:
     return sum(row[place] for row in named.found.table) / asked if asked else 0.0
 
 
-def _suggested(tests: Sequence[Tested]) -> bool:
-    """Return whether no test of a primary statement is among these."""
-    return all(one.verdict == "suggested" for one in tests)
-
-
-def _of_names(found: BlockResult, named: RecognitionResult, known: Sequence[int]) -> str:
-    """Return which liquids were recognised and which were not, with the name that was given instead."""
-    yes = [found.names[place].lower() for place in known]
-    no = [rate.setting for rate in named.found.rates if rate.setting not in known]
-    text = [f"{listed(yes)} {'was' if len(yes) == 1 else 'were'} recognised above chance"] if yes else []
-    if no:
-        of_no = listed([found.names[place].lower() for place in no])
-        others = [words for place in no if (words := _instead(found, named, place))]
-        verb = "was" if len(no) == 1 else "were"
-        rest = "" if yes else " recognised above chance"
-        text.append(f"{of_no} {verb} not shown to be{rest}{f' ({listed(others)})' if others else ''}")
-    words = "; ".join(text)
-    return f"{words[:1].upper()}{words[1:]}."
-
-
-def _instead(found: BlockResult, named: RecognitionResult, place: int) -> str:
-    """Return the wrong name that a setting was given most, if it was given more often than the right one."""
-    counts = named.found.table[place]
-    right = named.right[place]
-    hits = counts[named.labels.index(right)] if right is not None else 0
-    most = max(counts[: len(named.labels)])
-    label = named.labels[counts.index(most)]
-    if most <= hits:
-        return ""
-    called = next((found.names[at].lower() for at, other in enumerate(named.right) if other == label), "")
-    return f"{found.names[place].lower()} was called {called or short(found, label).lower()} by {most} of {sum(counts)}"
-
-
-def _compared(found: BlockResult) -> dict[tuple[str, str], list[Tested]]:
-    """Return in which statements each two settings (codes) were rated differently."""
-    codes = [setting.code for setting in found.settings]
-    if len(codes) == 2:
-        return {(codes[0], codes[1]): [one for one in SettingsDiffer.of(found) if one.verdict in FOUND]}
-    return {
-        (first, second): [
-            one.tested
-            for one in Pairs.of(found)
-            if (one.first, one.second) == (first, second) and one.tested.verdict in FOUND
-        ]
-        for first, second in combinations(codes, 2)
-    }
-
-
-def _of_pairs(
-    found: BlockResult,
-    apart: dict[tuple[str, str], list[Tested]],
-    differing: Sequence[Tested],
-    decided: Decided,
-    *,
-    mark: bool,
-) -> str:
-    """Return which settings were rated differently in some statement, and which were not.
-
-    ``mark``: say of single pairs and statements that they are exploratory.
-    """
-    pairs = list(combinations([setting.code for setting in found.settings], 2))
-    if not pairs:
-        return "There is only one setting, and nothing to compare it with."
-    yes = [f"{_pair(found, pair)}{_mark(apart[pair], mark)}" for pair in pairs if pair in apart]
-    no = [_pair(found, pair) for pair in pairs if pair not in apart]
-    if not yes and differing:
-        items = listed([f"“{short(found, one.item)}”{_mark([one], mark)}" for one in differing])
-        out_of_reach = smallest_of_pairs(len(found.settings), found.n) > decided.alpha
-        rest = f"cannot be shown with {counted(found.n, 'participant')}" if out_of_reach else "is not shown"
-        return f"The {found.kind} were rated differently in {items}; which ones {rest}."
-    if not yes:
-        return "In no statement were two of them shown to be rated differently."
-    rest = f"; not shown to be: {listed(no)}" if no else ""
-    return f"Rated differently: {listed(yes)}{rest}."
-
-
-def _mark(tests: Sequence[Tested], mark: bool) -> str:
-    return " (exploratory)" if mark and _suggested(tests) else ""
-
-
-def _pair(found: BlockResult, pair: tuple[str, str]) -> str:
-    between = " and " if len(found.settings) == 2 else " – "
-    return between.join(name(found, code).lower() for code in pair)
-
-
 class Distinguished(Finding[None]):
     """The first page's answer to which liquids, or views, were distinguished."""
 
@@ -272,18 +187,34 @@ class Distinguished(Finding[None]):
     question = "Which {kind} were distinguished?"
 
     def answer(self) -> Answer:
-        """Return which liquids were recognised by name, and which of them, or of the views, were rated differently."""
-        apart = {pair: tests for pair, tests in _compared(self.found).items() if tests}
-        differing = [one for one in SettingsDiffer.of(self.found) if one.verdict in FOUND]
-        decisive = [one for tests in apart.values() for one in tests] or differing
-        named = LiquidRecognition.of(self.found)
-        if named is not None and named.found.p is None:
-            named = None
+        """Return which liquids were recognised by name, and which of them, or of the views, were rated differently.
+
+        Exploratory tests count only where no primary one shows anything.
+        """
+        found, named = self.found, LiquidRecognition.of(self.found)
         known = () if named is None else recognised(named)
-        exploratory = _suggested(decisive) and (named is None or not known or named.verdict == "suggested")
-        text = _of_pairs(self.found, apart, differing, self.results.decided, mark=not exploratory)
-        if named is not None:
-            text = f"{_of_names(self.found, named, known)} {text}"
-        if not decisive and not known:
+        differing = [one for one in SettingsDiffer.of(found) if one.verdict in FOUND]
+        pairs = [((one.first, one.second), one.tested) for one in Pairs.of(found) if one.tested.verdict in FOUND]
+        if len(found.settings) == 2:
+            pairs = [((found.settings[0].code, found.settings[1].code), one) for one in differing]
+        verdicts = {one.verdict for one in (*differing, *(tested for _, tested in pairs))}
+        verdicts |= {named.verdict} if named is not None and known else set()
+        verdict = "shown" if "shown" in verdicts else "suggested"
+        apart = [
+            f"{name(found, first)} – {name(found, second)}".lower()
+            for (first, second), one in pairs
+            if one.verdict == verdict
+        ]
+        items = [f"“{short(found, one.item)}”" for one in differing if one.verdict == verdict]
+        if apart:
+            text = f"Rated differently: {listed(list(dict.fromkeys(apart)))}."
+        elif items:
+            text = f"The {found.kind} were rated differently in {listed(items)}; which ones is not shown."
+        else:
+            text = "In no statement were two of them shown to be rated differently."
+        if named is not None and named.found.p is not None:
+            names = listed([found.names[place].lower() for place in known])
+            text = f"Recognised above chance: {names}. {text}" if names else f"{NONE_RECOGNISED} {text}"
+        if not verdicts:
             return self.answered("not shown", f"{text} {NO_EVIDENCE}")
-        return self.answered("suggested" if exploratory else "shown", text, claims=True)
+        return self.answered(verdict, text, claims=True)

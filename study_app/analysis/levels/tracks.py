@@ -97,7 +97,8 @@ def _reversals(found: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Seri
 def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:
     track = next(one.condition for one in block.settings if one.code == row["code"])
     found: dict[str, Any] = {**dict.fromkeys(_TYPES, pd.NA), "track": track}
-    found["analysed"] = bool(row["counted"]) and not block.presents_modulus(int(row["index"]))
+    modulus = block.design.first is not None and int(row["index"]) == 1
+    found["analysed"] = bool(row["counted"]) and not modulus
     letters = row["arrangement"]
     if pd.isna(letters) or len(letters) < block.design.intervals:  # the trial ended before its last interval
         return found

@@ -39,11 +39,6 @@ def _part(macro: str, *values: object) -> Markup:
     return Markup(getattr(_environment().get_template("parts.html").module, macro)(*values))  # noqa: S704
 
 
-def page(title: str, body: str) -> str:
-    """Return the whole file; ``body`` is HTML."""
-    return render("page.html", title=title, body=Markup(body))  # noqa: S704 - HTML
-
-
 def heading(level: int, words: str) -> Markup:
     """Return a heading."""
     return _part("heading", level, words)

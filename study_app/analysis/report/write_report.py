@@ -30,7 +30,7 @@ from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
 from study_app.analysis.planning.preregistration import deviations
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
 from study_app.analysis.report import sections
-from study_app.analysis.report.html_page import attempted, box, bullets, heading, page, paragraph, render, table
+from study_app.analysis.report.html_page import attempted, box, bullets, heading, paragraph, render, table
 from study_app.analysis.report.sections import methods, version_words
 from study_app.analysis.results import (
     BlockResult,
@@ -334,7 +334,7 @@ def _page(
         failures=[str(one) for one in failures.found],
         first=Markup().join(first),
     )
-    return page(f"{study.title}: report", body)
+    return render("page.html", title=f"{study.title}: report", body=body)
 
 
 def _facts(study: Study) -> str:

@@ -75,10 +75,6 @@ class Outcome:
     no_interval: str = ""
     note: str = ""
 
-    def reaches(self, alpha: float) -> bool:
-        """Return whether these participants could have given a p of at most ``alpha`` at all."""
-        return self.p is not None and (self.smallest_p is None or self.smallest_p <= alpha)
-
 
 def checked(values: ArrayLike, axes: str) -> Array:
     """Return ``values`` as floats, NaN where an answer is missing; ``axes`` names them ("participants, settings")."""

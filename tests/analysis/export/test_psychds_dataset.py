@@ -53,7 +53,7 @@ def kitchen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def without_report(monkeypatch: pytest.MonkeyPatch) -> None:
     """Export without the report, which takes most of the time."""
-    monkeypatch.setattr("study_app.analysis.report.write_report.asks", lambda _study: False)
+    monkeypatch.setattr("study_app.analysis.report.write_report.has_questions", lambda _study: False)
 
 
 @pytest.mark.nightly

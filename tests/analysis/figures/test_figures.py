@@ -104,21 +104,13 @@ def test_delays_lie_on_a_true_scale_with_a_line_per_participant_and_the_median(r
     )
 
 
-def test_blinded_delays_are_dots_by_code_in_code_order_without_lines(rek: Results) -> None:
+def test_blinded_delays_are_bars_by_code_in_code_order(rek: Results) -> None:
     by_person(rek, [2, 2, 2, 5])
-    axes = panel(delays(load_study(rek.folder)), "item1")
+    figure = delays(load_study(rek.folder))
     codes = [f"D{number}" for number in range(1, 8)]
-    assert [label.get_text() for label in axes.get_xticklabels()] == codes
-    for place, code in enumerate(codes):
-        (dots,) = gids(axes, code)
-        assert dots.get_linestyle() == "None"
-        assert len(dots.get_xdata()) == 4
-        assert np.abs(np.asarray(dots.get_xdata()) - place).max() < 0.5
-        assert sorted(np.round(dots.get_ydata())) == [2, 2, 2, 5]
-    grid = [line for line in axes.lines if len(line.get_xdata()) == 2 and list(line.get_xdata()) == [0, 1]]
-    assert [
-        line for line in axes.lines if line not in grid and line.get_linestyle() != "None" and len(line.get_xdata()) > 1
-    ] == []
+    assert [axes.get_label() for axes in figure.axes] == codes
+    for code in codes:
+        assert {level: width for level, (_, width, _) in segments(panel(figure, code), 1).items()} == {2: 3, 5: 1}
 
 
 @pytest.mark.parametrize("fonts", [style.screen_fonts(), style.PRINT_FONTS], ids=["screen", "print"])
@@ -184,7 +176,7 @@ def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
     values = np.tile(np.array([1.0, 2.0, 3.0]), (500, 1))
     values[::2] += 1
     look = Look("Answers", [], ["n = 500"], style.PRINT_FONTS)
-    figure = answer_figures.draw_answers([("Harder", values)], [], [0.0, 100.0, 200.0], [None], "", look).figure
+    figure = answer_figures.draw_answers([("Harder", values)], [0.0, 100.0, 200.0], [None], "", look).figure
     gids = {str(line.get_gid()): line for line in figure.axes[0].lines}
     drawn = [gid for gid in gids if "participant" in gid]
     assert len(drawn) == answer_figures.MOST_LINES

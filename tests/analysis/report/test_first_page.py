@@ -103,9 +103,9 @@ def test_liquids_are_recognised_by_name_and_the_wrong_name_is_told() -> None:
     )
     told = named(evaluate(right), "distinguished")
     assert told.claims
-    assert told.text.startswith("Liquid1 and liquid2 were recognised above chance. Rated differently: ")
+    assert told.text.startswith("Recognised above chance: liquid1 and liquid2. Rated differently: ")
     wrong = named(evaluate(study(settings, list(everybody(settings, 12, answer)))), "distinguished")
-    assert "liquid2 was called liquid1 by 12 of 12" in wrong.text
+    assert wrong.text.startswith("No liquid was shown to be recognised above chance. ")
 
 
 def test_decisions_that_came_later_are_marked_as_exploratory() -> None:
@@ -127,9 +127,7 @@ def ordered(people: int, decided: Decided = DECIDED) -> Results:
 
 def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() -> None:
     told = named(ordered(5), "distinguished")
-    assert told.text == (
-        "The liquids were rated differently in “Harder”; which ones cannot be shown with five participants."
-    )
+    assert told.text == "The liquids were rated differently in “Harder”; which ones is not shown."
     assert told.claims
     assert told.verdict == "shown"
     assert named(ordered(5, replace(DECIDED, primary=ITEMS[:1])), "distinguished").verdict == "suggested"
@@ -144,14 +142,13 @@ def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() ->
     )
 
 
-def test_pairs_that_only_exploratory_statements_tell_apart_are_marked() -> None:
+def test_pairs_of_exploratory_statements_are_given_only_without_primary_ones() -> None:
     results = ordered(8)
     block = results.blocks[0]
     first = replace(Pairs.of(block)[0], tested=replace(Pairs.of(block)[0].tested, verdict="suggested"))
-    marked = named(replace(results, blocks=(Pairs.add_to(block, (first, *Pairs.of(block)[1:])),)), "distinguished")
-    assert marked.text.startswith("Rated differently: liquid1 – liquid2 (exploratory), liquid1 – liquid3 and")
-    assert marked.verdict == "shown"
-    assert "exploratory" not in named(results, "distinguished").text
+    found = named(replace(results, blocks=(Pairs.add_to(block, (first, *Pairs.of(block)[1:])),)), "distinguished")
+    assert found.text == "Rated differently: liquid1 – liquid3 and liquid2 – liquid3."
+    assert found.verdict == "shown"
 
 
 def test_the_verdict_is_of_primary_statements_and_of_exploratory_ones_without_them() -> None:
