@@ -96,7 +96,6 @@ class OpenRequest:
 
     @property
     def limits(self) -> dict[str, Any]:
-        """Workspace and force limit as keyword arguments, if given."""
         given = {"workspace_m": self.workspace_m, "force_limit_n": self.force_limit_n}
         return {name: value for name, value in given.items() if value is not None}
 
@@ -161,17 +160,14 @@ class DeviceDescriptor:
 
     @property
     def simulated(self) -> bool:
-        """Whether no participant uses it."""
         return self.kind == "simulated"
 
     @property
     def usage(self) -> str:
-        """The name as ``--device`` takes it."""
         return f"{self.name}:{self.argument}" if self.argument_required else self.name
 
     @property
     def label(self) -> str:
-        """The title, with its difference from a device with force."""
         if self.moves_by_itself:
             return f"{self.title} (simulated)"
         return f"{self.title} (visual only)" if self.kind == "seen" else self.title
@@ -181,7 +177,6 @@ class DeviceDescriptor:
         return tuple(option for option in self.options if option.in_windows)
 
     def window_values(self, values: Mapping[str, str | Path]) -> dict[str, str | Path]:
-        """Return those of some values, by name, that are of its window options."""
         return {option.name: values[option.name] for option in self.window_options if option.name in values}
 
 

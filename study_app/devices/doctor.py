@@ -148,18 +148,11 @@ class FailureTable:
         return f"{known.symptom}{detail}: {known.cause}; {known.cure}"
 
     def failure(self, mode: str, seen: str = "") -> DeviceFailure:
-        """Return the error to raise for a mode."""
         kind = DeviceFailureNotFound if mode in self.not_found else DeviceFailure
         return kind(mode, f"{self.device} cannot be used: {self.sentence(mode, seen)}")
 
     def findings(self, found: Container[str] = (), passed: Container[str] = ()) -> tuple[Finding, ...]:
-        """Return every mode in its order.
-
-        Parameters
-        ----------
-        found : ids of the modes that were found
-        passed : ids of those that were tested and not found; others count as not checked
-        """
+        """Return every mode in its order, ``found``, ``passed`` (tested and not found), or not checked."""
 
         def finding(number: int, mode: FailureMode) -> Finding:
             state: State = "found" if mode.id in found else "ok" if mode.id in passed else "not checked"

@@ -215,7 +215,6 @@ class FramedDevice(Device):
 
     @property
     def counters(self) -> dict[str, int]:
-        """What was counted since it was opened."""
         return {name: int(self.exchange[name]) for name in self.counted}
 
     @property
@@ -243,7 +242,6 @@ class FramedDevice(Device):
             raise DeviceLost(self.failure)
 
     def describe(self) -> dict[str, Any]:
-        """Return what the receipt says of it."""
         return {
             "name": self.name,
             "workspace_m": list(self.workspace_m),
@@ -277,10 +275,7 @@ def dynamics_of(
 ) -> Dynamics:
     """Return a device's dynamics: as it reports them, else as its latest bench on this computer measured them.
 
-    Parameters
-    ----------
-    delay_s, count_m, mass_kg : as the device reports them; None: it does not
-    name, serial : by which its bench is kept; settings that cannot be read hold none
+    ``name`` and ``serial`` name its bench; settings that cannot be read hold none.
     """
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         for bench in json.loads(settings_file().read_bytes())["benches"]:
@@ -338,10 +333,7 @@ def examine(
 def run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:
     """Run an open device without force; a simulated hand moves, and its time is virtual.
 
-    Returns
-    -------
-    samples : (n,) array of ``layout.SAMPLE``
-    fault : why the servo stopped itself; None: it did not
+    Return the samples (n,), and why the servo stopped itself; None: it did not.
     """
     hand = hand_of(device)
     kept: list[Any] = []

@@ -86,7 +86,6 @@ class Guard:
 
     @property
     def watching(self) -> bool:
-        """Whether it was started and still runs."""
         return self.child is not None and self.child.poll() is None
 
     def _listen(self, child: subprocess.Popen[bytes], said: IO[bytes]) -> None:

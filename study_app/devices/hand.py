@@ -208,7 +208,6 @@ class HandOrders:
 
     @property
     def held(self) -> bool:
-        """Whether the hand holds the handle."""
         return bool(self.state.handle.held)
 
     @held.setter
@@ -235,10 +234,7 @@ class HandOrders:
     def follow(self, t_s: Any, position_m: Any) -> None:
         """Move along the straight lines between given places from the next tick on, and stay at the last.
 
-        Parameters
-        ----------
-        t_s : (n,) array [s], increasing; only differences count
-        position_m : (n, 3) array [m], hand frame
+        Of the times (n,) [s], which increase, only differences count; places (n, 3) are in the hand frame [m].
 
         Raises
         ------
@@ -284,7 +280,6 @@ class HandOrders:
 
     @property
     def moving(self) -> bool:
-        """Whether the last order is still being carried out."""
         hand = self.state.hand
         return bool(hand.moving) or bool(hand.serial != hand.taken)
 

@@ -28,7 +28,6 @@ class Rig:
 
     @property
     def described(self) -> dict[str, Any]:
-        """The record of device and servo for the receipt."""
         return self.device.describe() | self.servo.describe()
 
     def reconnect(self) -> dict[str, Any]:

@@ -79,12 +79,10 @@ class Marker:
 
     @property
     def byte(self) -> int | None:
-        """The trigger code; None of an event without one."""
         return CODES.get(self.event)
 
     @property
     def text(self) -> str:
-        """Return the marker as one line of JSON."""
         line = {"event": self.event, **dict(self.said), "t_s": round(self.t_s, 6)}
         if self.byte is not None:
             line["trigger"] = self.byte
@@ -113,19 +111,13 @@ class Sink(Protocol):
     """A sink of markers. One thread calls `send` and `close`, which may block; others read the properties."""
 
     @property
-    def title(self) -> str:
-        """Its name for the operator."""
-        ...
+    def title(self) -> str: ...
 
     @property
-    def described(self) -> Mapping[str, Any]:
-        """Its record in the receipt."""
-        ...
+    def described(self) -> Mapping[str, Any]: ...
 
     @property
-    def listens(self) -> bool | None:
-        """Whether a program receives the markers; None if unknown."""
-        ...
+    def listens(self) -> bool | None: ...
 
     def send(self, marker: Marker) -> None:
         """Send a marker.
@@ -137,9 +129,7 @@ class Sink(Protocol):
         """
         ...
 
-    def close(self) -> None:
-        """Close it."""
-        ...
+    def close(self) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +181,6 @@ class SinkThread:
                 self._changed.notify_all()
 
     def close(self, patience_s: float = PATIENCE_S) -> None:
-        """Send waiting markers within the time limit, and close the sink; a hanging one is left to its thread."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()
@@ -231,22 +220,16 @@ class TriggerPort(Protocol):
     """A port of eight lines that are written together."""
 
     @property
-    def title(self) -> str:
-        """Its name for the operator."""
-        ...
+    def title(self) -> str: ...
 
     @property
-    def address(self) -> str:
-        """Its address, such as ``serial:/dev/ttyUSB0``."""
-        ...
+    def address(self) -> str: ...
 
     def write(self, byte: int) -> None:
         """Write a byte to the lines; returns when the port has it (OutletError: it does not accept it)."""
         ...
 
-    def close(self) -> None:
-        """Close the port."""
-        ...
+    def close(self) -> None: ...
 
 
 class TriggerSink:
@@ -285,12 +268,10 @@ class TriggerSink:
 
     @property
     def title(self) -> str:
-        """What the operator calls it."""
         return self._port.title
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """Its record in the receipt."""
         return {"address": self._port.address, "high_ms": 1e3 * HIGH_S, "codes": dict(CODES)}
 
     def send(self, marker: Marker) -> None:
@@ -305,5 +286,4 @@ class TriggerSink:
         self._clear = time.monotonic() + LOW_S
 
     def close(self) -> None:
-        """Let go of the port."""
         self._port.close()

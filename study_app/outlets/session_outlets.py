@@ -23,7 +23,7 @@ class SampledServo(Protocol):
     rate_hz: float
     telemetry: Any
 
-    def now_ns(self) -> int: ...  # noqa: D102
+    def now_ns(self) -> int: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,6 @@ class Outlets:
 
     @property
     def described(self) -> dict[str, Any]:
-        """The records of the outlets in the receipt, by title."""
         there = {one.title: dict(one.described) for one in self._open()}
         return there | {title: {"failed": reason} for title, reason in self._failed.items()}
 
@@ -117,7 +116,6 @@ class Outlets:
         return self._failed | failed
 
     def statuses(self) -> tuple[OutletStatus, ...]:
-        """Return the present state of each outlet."""
         lost = self.lost
         found = [
             OutletStatus(
@@ -134,7 +132,6 @@ class Outlets:
         return tuple(found)
 
     def mark(self, marker: Marker) -> None:
-        """Pass an event to every sink."""
         for thread in self._threads:
             thread.mark(marker)
 

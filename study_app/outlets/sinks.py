@@ -42,22 +42,18 @@ class MarkerStream:
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """Its record in the receipt."""
         return {"stream": MARKERS, "clock_uncertainty_us": round(1e6 * self.mapping.uncertainty_s, 3)}
 
     @property
     def listens(self) -> bool:
-        """Whether a program receives the stream."""
         outlet = self._outlet  # its thread may release it meanwhile
         return bool(outlet is not None and outlet.have_consumers())
 
     def send(self, marker: Marker) -> None:
-        """Send a marker with the time of its event."""
         self.mapping.measure_if_due()
         self._outlet.push_sample([marker.text], 1e-9 * marker.time_ns + self.mapping.offset_s)
 
     def close(self) -> None:
-        """End the stream."""
         outlet, self._outlet = self._outlet, None
         close_outlet(outlet)
 
@@ -95,7 +91,6 @@ class ParallelPort:
             self._call(PPWCONTROL, bytes((0,)))
 
     def close(self) -> None:
-        """Release the port and close it."""
         try:
             self._call(PPRELEASE)
         finally:
@@ -151,7 +146,6 @@ class SerialPort:
             raise OutletError(f"{self.address} failed: {_cause(error)}") from error
 
     def close(self) -> None:
-        """Close the port."""
         self._port.close()
 
 

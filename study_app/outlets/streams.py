@@ -88,7 +88,6 @@ class ClockMapping:
         self.measure()
 
     def measure(self) -> None:
-        """Measure the offset again."""
         for _ in range(READINGS):
             before_ns = self._now_ns()
             other_s = self._other_s()
@@ -161,17 +160,14 @@ class SampleStream:
 
     @property
     def described(self) -> Mapping[str, Any]:
-        """The record of the stream in the receipt."""
         return {"stream": SAMPLES, "clock_uncertainty_us": round(1e6 * self.mapping.uncertainty_s, 3)}
 
     @property
     def listens(self) -> bool:
-        """Whether a program receives the stream."""
         outlet = self._outlet  # its thread may release it meanwhile
         return bool(outlet is not None and outlet.have_consumers())
 
     def close(self) -> None:
-        """Send the remaining samples, and end the stream."""
         self._ending.set()
         self._thread.join(PATIENCE_S)
 

@@ -44,8 +44,7 @@ class VideoFrame:
 class VideoSource(Protocol):
     """A source of frames; every method returns at once."""
 
-    def rewind(self) -> None:
-        """Prepare for a trial."""
+    def rewind(self) -> None: ...
 
     def begin(self, at_ns: int) -> None:
         """Set the start of the trial [ns, servo's clock], from which footage runs."""
@@ -59,8 +58,7 @@ class VideoSource(Protocol):
             The source failed.
         """
 
-    def fit(self, width: int, height: int) -> None:
-        """Scale later frames so that they fit into this many pixels."""
+    def fit(self, width: int, height: int) -> None: ...
 
 
 class VideoStatistics:
@@ -86,7 +84,6 @@ class VideoStatistics:
             self._ages_ns.append(video.age_ns)
 
     def columns(self) -> dict[str, Any]:
-        """Return the columns of the trial's row, None without a video."""
         seen = self._frames > 0
         ages_ns = self._ages_ns
         return {

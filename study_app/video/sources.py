@@ -94,7 +94,6 @@ class Camera:
 
     @property
     def works(self) -> bool:
-        """Whether it still receives frames."""
         return self.thread.is_alive() and not self._stalls
 
     @property
@@ -103,11 +102,9 @@ class Camera:
 
     @property
     def newest(self) -> VideoFrame:
-        """The last frame received."""
         return self._frames[-1]
 
     def fit(self, width: int, height: int) -> None:
-        """Scale later frames so that they fit into this many pixels."""
         self._fitted = (width, height)
 
     def rewind(self) -> None:
@@ -133,7 +130,6 @@ class Camera:
         return next((frame for frame in reversed(held) if frame.due_ns <= moment_ns), None)
 
     def close(self) -> None:
-        """Close the camera; a thread that still waits for its next frame ends by itself."""
         self._closed = True
         self.thread.join(ENDS_S)
 
@@ -248,20 +244,16 @@ class Footage:
 
     @property
     def works(self) -> bool:
-        """Whether it can still be read."""
         return self.thread.is_alive()
 
     @property
     def rate_hz(self) -> float:
-        """Frames per second."""
         return SECOND_NS / self._period_ns
 
     def fit(self, width: int, height: int) -> None:
-        """Scale later frames so that they fit into this many pixels."""
         self._scaler.size = (width, height)
 
     def rewind(self) -> None:
-        """Restart the footage; its first frame is stored, so that a trial need not wait for the decoder."""
         with self._changed:
             self._play += 1
             self._frames.clear()
@@ -269,7 +261,6 @@ class Footage:
             self._changed.notify_all()
 
     def begin(self, at_ns: int) -> None:
-        """Run from this time on [ns, servo's clock]; until then the first frame is shown."""
         self._began_ns = at_ns
 
     def frame_at(self, moment_ns: int) -> VideoFrame | None:
@@ -293,7 +284,6 @@ class Footage:
         return None if shown is None else replace(shown, due_ns=began_ns + shown.due_ns)
 
     def close(self) -> None:
-        """Close the file."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -402,11 +392,9 @@ class Videos:
             raise VideoError("a video of the study cannot be opened: check camera and files")
 
     def source(self, view: str) -> Camera | Footage:
-        """Return the open source of a condition's view."""
         return self._open[view]
 
     def fit(self, width: int, height: int) -> None:
-        """Scale later frames of all videos so that they fit into this many pixels."""
         for one in self._open.values():
             one.fit(width, height)
 
@@ -424,7 +412,6 @@ class Videos:
         return found
 
     def close(self) -> None:
-        """Close all, including those that another thread is still opening."""
         with self._changing:
             self._closed = True
             every = tuple(self._open.values())

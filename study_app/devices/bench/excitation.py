@@ -214,7 +214,6 @@ def _is_usable(bench: Any, position_m: Any, now_ns: int) -> bool:
 
 @kernel
 def _see(bench: Any, position_m: Any, now_ns: int) -> None:
-    """Update the velocity with a new position."""
     interval_s = (now_ns - bench.new_ns) * 1e-9
     weight = 1.0 - (1.0 - EWMA) ** (interval_s * 1e3)
     for axis in range(3):
@@ -231,7 +230,6 @@ def _see(bench: Any, position_m: Any, now_ns: int) -> None:
 
 @kernel
 def _judge(bench: Any, buttons: int) -> None:
-    """End the excitation in case of a fault."""
     if bench.ended != RUNNING or bench.armed == 0:
         return
     if buttons & BUTTON_STOP:
@@ -248,7 +246,6 @@ def _judge(bench: Any, buttons: int) -> None:
 
 @kernel
 def _excite(bench: Any, elapsed_s: float) -> None:
-    """Compute the force of the next write."""
     wave_n = 0.0
     if bench.wave_n > 0.0:
         bench.wave_s += elapsed_s

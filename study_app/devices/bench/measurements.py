@@ -72,18 +72,10 @@ class Gain(NamedTuple):
 
 
 def regularity(samples: Any, rate_hz: float) -> Regularity:
-    """Return the loop's timing.
+    """Return the loop's timing from samples (n,).
 
-    Parameters
-    ----------
-    samples : (n,) recarray
-        Of ``layout.SAMPLE``.
-
-    Returns
-    -------
-    Regularity
-        Lateness and duration of a tick (median, 99 %, greatest) [ms], share of ticks with a new position, longest time
-        between two new positions [ms], least and greatest delay [ticks].
+    Lateness and duration of a tick (median, 99 %, greatest) [ms], share of ticks with a new position, longest time
+    between two new positions [ms], least and greatest delay [ticks].
     """
     new_ns = samples.time_ns[samples.fresh == 1]
     return Regularity(
@@ -103,18 +95,10 @@ def _spread(values: Floats) -> tuple[float, float, float]:
 
 
 def noise(samples: Any) -> Noise:
-    """Return the noise of a handle that rests without force.
+    """Return the noise of a handle that rests without force, from samples (n,).
 
-    Parameters
-    ----------
-    samples : (n,) recarray
-        Of ``layout.SAMPLE``.
-
-    Returns
-    -------
-    Noise
-        Standard deviation and range of each axis about a straight line [µm], standard deviation of the EWMA velocity
-        (weight 0.1) over three axes [mm/s], and the handle's displacement from first to last [µm].
+    Standard deviation and range of each axis about a straight line [µm], standard deviation of the EWMA velocity
+    (weight 0.1) over three axes [mm/s], and the handle's displacement from first to last [µm].
     """
     t_s, position_m = _new(samples)
     line = np.column_stack([np.ones_like(t_s), t_s - t_s.mean()])
@@ -137,13 +121,8 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
     """Fit F(t − d) = m a + b v + f sgn v + k x + c to the forces that were sent along an axis.
 
     Positions, forces and sgn v are smoothed by the same Gaussian, whose derivatives give v and a; so smoothing biases
-    no term. The delay d minimises the residual. Segments with different forces distinguish friction from delay: the
-    phase lag of friction falls with the speed, that of a delay does not.
-
-    Parameters
-    ----------
-    stretches : sequence of (n,) recarray
-        Of ``layout.SAMPLE``, each without a gap, with the force of an excitation as ``device_force_n``.
+    no term. The delay d minimises the residual. ``stretches`` of samples, each without a gap, differ in force, which
+    distinguishes friction from delay: the phase lag of friction falls with the speed, that of a delay does not.
     """
     step_s = 1.0 / rate_hz
     prepared = [_prepared(samples, axis, step_s) for samples in stretches]

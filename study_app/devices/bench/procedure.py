@@ -64,22 +64,13 @@ _ENDED: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Durations:
-    """The duration of each part [s]; by default ten minutes in total with the operator's answers.
+    """The duration of each part [s]; by default ten minutes in total with the operator's answers."""
 
-    Attributes
-    ----------
-    rest_s : at rest, without force
-    come_s : for the spring to bring the handle to the middle
-    wave_s : force on each axis for mass and friction
-    push_s : until the force on the scale is steady
-    damping_s : until the damper has grown to `MOST_NSPM`, on each axis
-    """
-
-    rest_s: float = 120.0
-    come_s: float = 6.0
-    wave_s: float = 30.0
-    push_s: float = 4.0
-    damping_s: float = 60.0
+    rest_s: float = 120.0  # without force
+    come_s: float = 6.0  # for the spring to bring the handle to the middle
+    wave_s: float = 30.0  # force on each axis for mass and friction
+    push_s: float = 4.0  # until the force on the scale is steady
+    damping_s: float = 60.0  # until the damper has grown to `MOST_NSPM`, on each axis
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,7 +95,6 @@ class _Handle:
 
 
 def _check(code: int) -> None:
-    """Raise what pyusb raises for one of libusb's errors."""
     if code >= 0:
         return
     if code == constants.ERROR_NOT_SUPPORTED:
@@ -115,7 +114,6 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
     # The part of the interface that this program's transport needs besides pyusb.
 
     def c_calls(self, handle: _Handle) -> BulkCalls:
-        """Return an opened Falcon's interface for compiled code."""
         return handle.emulator.calls()
 
     def now_s(self) -> float:

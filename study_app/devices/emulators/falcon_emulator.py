@@ -147,7 +147,6 @@ def next_event_ns(e: Any) -> int:
 
 @kernel
 def _arrived_of(bridge: Any, waiting: int) -> int:
-    """Return how many bytes the next packet would carry."""
     held = 0
     while held < min(waiting, constants.CHUNK):
         if bridge.back_ns[(bridge.back_first + held) % falcon_bridge.BACK_RING] > bridge.now_ns:
@@ -355,7 +354,6 @@ class Emulator(HandOrders):
         return int(code), int(moved[0])
 
     def calls(self) -> BulkCalls:
-        """Return the bridge's interface for compiled code; the emulator must outlive it."""
         return BulkCalls(self._address, int(bulk().address))
 
     def compile(self) -> None:
@@ -385,7 +383,6 @@ class Emulator(HandOrders):
         return int(self._now_ns[0])
 
     def pause(self, seconds: float) -> None:
-        """Let emulated time pass, hand and handle move."""
         self._let_pass(self.state, round(seconds * 1e9))
 
     @cached_property
@@ -440,12 +437,10 @@ class Emulator(HandOrders):
 
     @property
     def highest_torque(self) -> int:
-        """The largest torque command so far [units]."""
         return int(self.state.run.highest)
 
     @property
     def highest_unhomed_torque(self) -> int:
-        """The largest torque command while an arm was not homed."""
         return int(self.state.run.highest_unhomed)
 
     @property
@@ -455,12 +450,10 @@ class Emulator(HandOrders):
 
     @property
     def packets(self) -> int:
-        """Well-formed packets received."""
         return int(self.state.run.packets)
 
     @property
     def refused(self) -> int:
-        """Bytes received that belong to no packet."""
         return int(self.state.run.refused)
 
     @property

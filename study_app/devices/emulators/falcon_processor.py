@@ -99,7 +99,6 @@ class Faults:
         state.delay_ns, state.stall_ns = 3_000_000, 20_000_000
 
     def chance(self, name: str, chance: float) -> None:
-        """Let it happen with this probability at each opportunity; 0: never."""
         if not 0.0 <= chance <= 1.0:
             raise DeviceError(f"the chance of fault '{name}' must be 0 to 1, not {chance}")
         self._state.chance[_place(name)] = chance
@@ -109,11 +108,9 @@ class Faults:
         self._state.due[_place(name)] = times
 
     def happened(self, name: str) -> int:
-        """Return the number of occurrences so far."""
         return int(self._state.happened[_place(name)])
 
     def on(self, name: str, on: bool = True) -> None:
-        """Switch it on, or off."""
         setattr(self._state, _switch(name), int(on))
         if name == "unplugged" and on:
             self._state.was_unplugged = 1

@@ -88,6 +88,7 @@ OF_STREAM: Final = (
     "too-long",  # a frame that says it is 2^63 - 1 bytes long, the most that RFC 6455 permits
 )
 FAULTS: Final = (*OF_OPENING, *OF_TIME, *OF_STREAM)
+STATUS_OF: Final = {"off": {"power_supply": False}, "uncalibrated": {"calibrated": False}, "in-use": {"in_use": True}}
 
 
 def config() -> dict[str, Any]:
@@ -254,38 +255,27 @@ class Service(HandOrders):
         """
         if fault not in FAULTS:
             raise DeviceError(f"fault '{fault}' is not known; choose of: {', '.join(FAULTS)}")
-        state = self.state
-        if fault in {"version-3.0", "version-3.1"}:
-            self.version = fault.partition("-")[2]
-        elif fault == "not-websocket":
-            self.version = "http"
-        elif fault == "no-device":
-            self.version = "empty"
-        elif fault in {"off", "uncalibrated", "in-use"}:
-            key = {"off": "power_supply", "uncalibrated": "calibrated", "in-use": "in_use"}[fault]
-            self.status[key] = fault == "in-use"
+        versions = {"version-3.0": "3.0", "version-3.1": "3.1", "not-websocket": "http", "no-device": "empty"}
+        self.version = versions.get(fault, self.version)
+        if fault in STATUS_OF:
+            self.status |= STATUS_OF[fault]
             self._refresh()
         elif fault == "gravity-off":
             self.config["gravity_compensation"]["enabled"] = False
         elif fault == "disobeys":
             self.obeys = False
-        elif fault == "force-scale":
-            self.force_scale = {"value": 2.0}
-        elif fault == "unknown-scale":
-            self.force_scale = None
-        elif fault == "late":
-            state.lag_ns = 30_000_000
-        elif fault == "slow":
-            state.lag_ns = 1_500_000
+        elif fault in {"force-scale", "unknown-scale"}:
+            self.force_scale = {"value": 2.0} if fault == "force-scale" else None
         elif fault == "torn":
-            state.portion = 300
-        else:
+            self.state.portion = 300
+        elif fault in OF_TIME:
+            self.state.lag_ns = 30_000_000 if fault == "late" else 1_500_000
+        elif fault in OF_STREAM:
             self._fault = (fault, after)
             if self._upgraded:
                 self._arm()
 
     def _arm(self) -> None:
-        """Begin the fault of the stream after its commands."""
         if self._fault is None:
             return
         (fault, after), state = self._fault, self.state
@@ -297,7 +287,6 @@ class Service(HandOrders):
         state.fault_at = state.commands + 1 + after
 
     def connected(self) -> None:
-        """Begin a connection."""
         state = self.state
         for name in ("in_size", "written", "visible", "read", "queue_first", "queue_next", "complex_size", "ended"):
             setattr(state, name, 0)
@@ -333,7 +322,6 @@ class Service(HandOrders):
         self.state.ended = 1
 
     def work(self) -> None:
-        """Answer what waits in the inbox."""
         inverse3_stream.take_frames(self.state)
         while self.state.complex_size:
             state = self.state
@@ -415,7 +403,6 @@ class Service(HandOrders):
         inverse3_stream.let_pass(self.state)
 
     def _refresh(self) -> None:
-        """Render the state's text anew."""
         text, slots = template(self._message())
         data = np.frombuffer(text, np.uint8)
         self.state.text[: data.size] = data

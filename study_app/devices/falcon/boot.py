@@ -226,12 +226,9 @@ def measure_round_trip(transport: Transport) -> float:
 
 
 def choose_event_character(transport: Transport) -> tuple[float, dict[str, Any]]:
-    """Measure the round trip with and without the bridge's event character, and use the faster setting.
+    """Use the bridge's event character if the round trip is shorter with it.
 
-    Returns
-    -------
-    round_trip_s : the shorter one [s]
-    described : what the receipt says of it
+    Return the shorter round trip [s], and what the receipt says of it.
     """
     taken_s = {}
     for on in (False, True):
@@ -356,6 +353,5 @@ def _set_line(transport: Transport, divisor: int) -> None:
 
 
 def _purge(transport: Transport) -> None:
-    """Clear the bridge's buffers in both directions."""
     transport.control(constants.REQUEST_RESET, constants.PURGE_RX)
     transport.control(constants.REQUEST_RESET, constants.PURGE_TX)

@@ -54,7 +54,6 @@ class Calibration:
     measured: str = ""
 
     def describe(self) -> dict[str, Any]:
-        """Return what the receipt says of it."""
         return {
             "units_per_nm": self.units_per_nm,
             "arm_offset_deg": math.degrees(self.arm_offset_rad),

@@ -391,7 +391,6 @@ def _locate(falcon: Any) -> bool:
 
 @kernel
 def _follow(falcon: Any) -> None:
-    """Update the grip's velocity with the new pose."""
     interval_s = (falcon.now_ns - falcon.posed_ns) * 1e-9
     known, weight = falcon.posed_ns != 0, interval_s / (interval_s + SMOOTHING_S)
     for axis in range(3):
@@ -414,7 +413,6 @@ def _open_gate(falcon: Any, elapsed_s: float) -> None:
 
 @kernel
 def _send(falcon: Any, context: int) -> bool:
-    """Send ``packet``; return whether it was sent completely."""
     falcon.transferred = 0
     code = _transfer(
         falcon.transfer,

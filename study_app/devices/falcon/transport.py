@@ -50,9 +50,7 @@ class Transport(Protocol):
         """Send a control request (``constants.REQUEST_*``) with its value."""
         ...
 
-    def write(self, data: bytes, timeout_s: float) -> None:
-        """Send all of ``data``."""
-        ...
+    def write(self, data: bytes, timeout_s: float) -> None: ...
 
     def read(self, size: int, timeout_s: float) -> bytes:
         """Return what one read of at most ``size`` bytes, a multiple of 64, gives, status bytes and all.
@@ -66,11 +64,9 @@ class Transport(Protocol):
         ...
 
     def now_s(self) -> float:
-        """Return the time on the clock that its time-outs run on [s]."""
         return time.monotonic()
 
     def pause(self, seconds: float) -> None:
-        """Let that clock pass."""
         time.sleep(seconds)
 
     def reopen(self) -> None:
@@ -463,13 +459,7 @@ def load_d2xx() -> Any:
 
 
 def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
-    """Return what libusb finds.
-
-    Parameters
-    ----------
-    usb : pyusb's backend; None: libusb
-    platform : as ``sys.platform`` says it
-    """
+    """Return what libusb, or another backend of pyusb, finds on a platform."""
     can = "force up to 8 N; needs firmware after it was turned on, and homing"
     by = f"libusb {_version()}"
     usb = usb if usb is not None else libusb_package.get_libusb1_backend()
@@ -487,13 +477,7 @@ def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
 
 
 def probe_ftdi(d2xx: Any = None, platform: str = sys.platform) -> Backend:
-    """Return whether FTDI's driver can be used.
-
-    Parameters
-    ----------
-    d2xx : FTDI's library; None: it is loaded
-    platform : as ``sys.platform`` says it
-    """
+    """Return whether FTDI's driver can be used on a platform, with its library or the one that loads."""
     can = "the same, where FTDI's or Novint's driver is bound to it; taken by itself where libusb may not open it"
     if platform != "win32":
         return Backend("falcon", "ftd2xx", NOT_AVAILABLE, can, "for Windows alone, where drivers keep libusb out")

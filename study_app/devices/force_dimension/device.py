@@ -20,13 +20,9 @@ class Functions(Protocol):
 
     id: int
 
-    def prepare(self, force_limit_n: float) -> dict[str, Any]:
-        """Check the device and enable its force; return what the receipt records."""
-        ...
+    def prepare(self, force_limit_n: float) -> dict[str, Any]: ...
 
-    def address(self, name: str) -> int:
-        """Return the address of a function, for compiled code."""
-        ...
+    def address(self, name: str) -> int: ...
 
     def close(self) -> bool:
         """End the force and close the device; return whether it accepted the end."""

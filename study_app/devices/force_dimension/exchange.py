@@ -236,7 +236,6 @@ def _put_quaternion(rotation: Any, out: Any) -> bool:
 
 @kernel
 def _send_force(device: Any, context: int, force_n: Any) -> int:
-    """Send a force [N, hand frame]."""
     if device.unguarded != 0:
         return _end(device, context, UNGUARDED)
     x_n, y_n, z_n = force_n[0], force_n[1], force_n[2]
@@ -264,7 +263,6 @@ def _push(device: Any, x_n: float, y_n: float, z_n: float) -> Any:
 
 @kernel
 def _end(device: Any, context: int, why: int) -> int:
-    """End the exchange with zero force."""
     finish(device, context)
     device.ended = why
     return c_functions.READ_LOST

@@ -114,18 +114,15 @@ class Library:
 
     @property
     def version(self) -> str:
-        """The version of the SDK."""
         numbers = [c_int() for _ in range(4)]
         self._functions.dhdGetSDKVersion(*numbers)
         return ".".join(str(number.value) for number in numbers)
 
     @property
     def devices(self) -> int:
-        """How many devices are connected."""
         return int(self._functions.dhdGetDeviceCount())
 
     def address(self, name: str) -> int:
-        """Return where a function is, for compiled code."""
         return int(ctypes.cast(getattr(self._functions, name), c_void_p).value or 0)
 
     def open(self, serial: str) -> Self:

@@ -82,12 +82,7 @@ def recorded(config: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def differing(config: Mapping[str, Any], required: Mapping[str, Any]) -> list[str]:
-    """Return which settings are not as required, in words; numbers that are equal as floats are equal.
-
-    Parameters
-    ----------
-    required : `SESSION_SCOPED` or `DEVICE_GLOBAL`
-    """
+    """Return which settings are not as required, in words; numbers that are equal as floats are equal."""
     return list(_differing("", config, required))
 
 
@@ -151,7 +146,6 @@ class Messages:
             raise FAILURES.failure("not-websocket", status.decode("latin-1"))
 
     def send(self, message: Mapping[str, Any]) -> None:
-        """Send a message as one text frame."""
         text = np.frombuffer(json.dumps(message, separators=(",", ":")).encode(), np.uint8)
         out = np.zeros(text.size + 8, np.uint8)
         size = build_frame(out, TEXT, text, text.size, secrets.randbits(32))
@@ -198,12 +192,7 @@ def _refuse(word: str) -> None:
 
 
 def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session:
-    """Choose the device, send the neutral settings with the first message, and confirm them.
-
-    Parameters
-    ----------
-    wanted_id : of the device; "": the first that the service lists
-    """
+    """Choose the device ("": the first), send the neutral settings with the first message, and confirm them."""
     entry = find_device(messages.receive(), wanted_id)
     device_id, config = entry["device_id"], entry["config"]
     check_status(entry.get("status", {}), at_opening=True)

@@ -50,9 +50,7 @@ class Link(Protocol):
         """Return what came, at least a byte; raise an ``DeviceFailure`` where nothing comes in time."""
         ...
 
-    def now_s(self) -> float:
-        """Return the time [s]."""
-        ...
+    def now_s(self) -> float: ...
 
     def close(self) -> None:
         """Close it; a second call does nothing."""
@@ -107,7 +105,6 @@ class SocketLink:
 
 
 def _addresses() -> tuple[int, int]:
-    """Return the addresses of the system's ``send`` and ``recv``."""
     library = ctypes.CDLL("ws2_32" if sys.platform == "win32" else None)
     send, receive = (ctypes.cast(function, ctypes.c_void_p).value or 0 for function in (library.send, library.recv))
     return send, receive

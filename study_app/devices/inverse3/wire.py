@@ -32,21 +32,10 @@ _MASKED = 0x80
 
 @kernel
 def parse_header(data: Any, begin: int, end: int, header: Any) -> int:
-    """Read the header of the frame that begins at ``begin``.
+    """Read the header of the frame that begins at ``begin`` in ``data``, whose bytes before ``end`` are valid.
 
-    Parameters
-    ----------
-    data : (n,) array
-        Bytes received, of which those before ``end`` are valid.
-    begin, end : int
-        Where the frame begins, and how far bytes were received.
-    header : (2,) array
-        Is given the opcode and the length of the payload [bytes].
-
-    Returns
-    -------
-    int
-        The length of the header [bytes], `INCOMPLETE` where more bytes are needed, or `VIOLATION`.
+    ``header`` (2,) is given the opcode and the length of the payload [bytes]. Return the length of the header [bytes],
+    `INCOMPLETE` where more bytes are needed, or `VIOLATION`.
     """
     if end - begin < 2:
         return INCOMPLETE
@@ -76,20 +65,9 @@ def parse_header(data: Any, begin: int, end: int, header: Any) -> int:
 
 @kernel
 def build_frame(out: Any, opcode: int, payload: Any, length: int, key: int) -> int:
-    """Write a masked frame into ``out`` and return its length [bytes].
+    """Write a masked frame of ``length`` bytes (less than 65,536) of ``payload`` into ``out``; return its length.
 
-    Parameters
-    ----------
-    out : (n,) array
-        Bytes; 8 more than the payload.
-    opcode : int
-        `TEXT`, `CLOSE` or `PONG`.
-    payload : (m,) array
-        Bytes, of which ``length`` are sent: less than 65,536.
-    length : int
-        Of the payload [bytes].
-    key : int
-        The masking key, 32 bits.
+    ``out`` needs 8 bytes more than the payload; ``key`` is the masking key, 32 bits.
     """
     out[0] = np.uint8(_FIN | opcode)
     size = 2
@@ -132,17 +110,7 @@ def put_text(out: Any, at: int, text: Any) -> int:
 
 @kernel
 def put_fixed(out: Any, at: int, value: float) -> int:
-    """Write a number with six decimals, as JSON takes it, from ``at`` on; return where it ends.
-
-    Parameters
-    ----------
-    out : (n,) array
-        Bytes.
-    at : int
-        Where to begin.
-    value : float
-        Less than 10^9 in size.
-    """
+    """Write a number below 10^9 with six decimals, as JSON takes it, from ``at`` on; return where it ends."""
     whole = int(abs(value) * _SCALE + 0.5)
     if value < 0.0 and whole > 0:
         out[at] = np.uint8(45)
@@ -230,16 +198,9 @@ _TENS = np.array([float(f"1e{power}") for power in range(309)] + [np.inf])
 
 @kernel
 def scan(data: Any, begin: int, end: int, found: Any) -> int:
-    """Read a message; return `UNDERSTOOD` or why it says nothing of the device.
+    """Read the message from ``begin`` to ``end``; return `UNDERSTOOD` or why it says nothing of the device.
 
-    Parameters
-    ----------
-    data : (n,) array
-        Bytes, of which the message is those from ``begin`` to ``end``.
-    begin, end : int
-        Where the message begins and ends.
-    found : Record
-        Of type ``SCAN``, whose ``own_id`` says which device is meant.
+    ``found`` is a record of `SCAN`, whose ``own_id`` says which device is meant.
     """
     found.known = found.found = found.infinite = found.seen = found.is_own = 0
     at, depth, path, value_due = _skip(data, begin, end), 0, _NOTHING, True

@@ -175,7 +175,6 @@ class PackageCacheLocator(UserProvidedCacheLocator):
         self._cache_path = str(Path(str(CACHE), *Path(py_file).resolve().relative_to(_PACKAGE).parent.parts))
 
     def get_source_stamp(self) -> str:
-        """Return the digest: the folder's name."""
         return Path(str(CACHE)).name
 
     @classmethod
@@ -241,7 +240,6 @@ class _Counter(event.Listener):
         """Do nothing: a function that starts to compile does not count yet."""
 
     def on_end(self, event: Any) -> None:
-        """Count a function, and report the share."""
         self.compiled += 1
         self._progress(min(0.99, self.compiled / EXPECTED))
 

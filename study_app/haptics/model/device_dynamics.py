@@ -37,7 +37,6 @@ class Dynamics(NamedTuple):
         return (*(("delay_s",) if self.delay_s is None else ()), *self.assumed)
 
     def describe(self) -> dict[str, Any]:
-        """Return the values for the receipt."""
         return {**self._asdict(), "assumed": list(self.assumed)}
 
 

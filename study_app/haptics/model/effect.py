@@ -65,11 +65,11 @@ class LiquidLike(Protocol):
     """The part of a ``liquid.Liquid`` that descriptors read; the class itself imports them for their tables."""
 
     @property
-    def density_kg_m3(self) -> float: ...  # noqa: D102
+    def density_kg_m3(self) -> float: ...
     @property
-    def viscosity_pa_s(self) -> float | None: ...  # noqa: D102
+    def viscosity_pa_s(self) -> float | None: ...
     @property
-    def region(self) -> Any: ...  # noqa: D102
+    def region(self) -> Any: ...
     def __getattr__(self, name: str) -> Any: ...  # an effect's table
 
 
@@ -77,63 +77,63 @@ class BodyLike(Protocol):
     """The part of a ``scene.Body`` that descriptors read."""
 
     @property
-    def diameter_m(self) -> float: ...  # noqa: D102
+    def diameter_m(self) -> float: ...
     @property
-    def drag_coefficient(self) -> float: ...  # noqa: D102
+    def drag_coefficient(self) -> float: ...
     @property
-    def volume_m3(self) -> float: ...  # noqa: D102
+    def volume_m3(self) -> float: ...
 
 
 class SceneLike(Protocol):
     """The part of a ``scene.Scene`` that descriptors read."""
 
     @property
-    def scale(self) -> float: ...  # noqa: D102
+    def scale(self) -> float: ...
     @property
-    def rate_hz(self) -> float: ...  # noqa: D102
+    def rate_hz(self) -> float: ...
     @property
-    def body(self) -> BodyLike: ...  # noqa: D102
+    def body(self) -> BodyLike: ...
     @property
-    def velocity(self) -> Any: ...  # noqa: D102
+    def velocity(self) -> Any: ...
     @property
-    def accuracy(self) -> Any: ...  # noqa: D102
+    def accuracy(self) -> Any: ...
 
 
 class ExtremesLike(Protocol):
     """The part of the ``bounds.Extremes`` of the motion in one liquid that descriptors read."""
 
     @property
-    def scene(self) -> SceneLike: ...  # noqa: D102
+    def scene(self) -> SceneLike: ...
     @property
-    def liquid(self) -> LiquidLike: ...  # noqa: D102
+    def liquid(self) -> LiquidLike: ...
     @property
-    def has_top(self) -> bool: ...  # noqa: D102
+    def has_top(self) -> bool: ...
     @property
-    def depth_m(self) -> tuple[float, float]: ...  # noqa: D102
+    def depth_m(self) -> tuple[float, float]: ...
     @property
-    def relative_mps(self) -> float: ...  # noqa: D102
+    def relative_mps(self) -> float: ...
     @property
-    def speed_mps(self) -> float: ...  # noqa: D102
+    def speed_mps(self) -> float: ...
     @property
-    def acceleration_mps2(self) -> float: ...  # noqa: D102
+    def acceleration_mps2(self) -> float: ...
     @property
-    def flow(self) -> Flow: ...  # noqa: D102
+    def flow(self) -> Flow: ...
     @property
-    def reynolds(self) -> float: ...  # noqa: D102
+    def reynolds(self) -> float: ...
     @property
-    def radius_m(self) -> float: ...  # noqa: D102
+    def radius_m(self) -> float: ...
     @property
-    def volume_m3(self) -> float: ...  # noqa: D102
+    def volume_m3(self) -> float: ...
     @property
-    def lift_n(self) -> float: ...  # noqa: D102
+    def lift_n(self) -> float: ...
     @property
-    def weight_n(self) -> float: ...  # noqa: D102
-    def drag_by_flow_n(self, flow_mps: float) -> float: ...  # noqa: D102
-    def inertial_n(self, accelerated_n: Callable[[Any, float, float], float]) -> float: ...  # noqa: D102
-    def sheared_n(self) -> float: ...  # noqa: D102
-    def total_n(self, extent: str) -> float: ...  # noqa: D102
-    def submerged(self, depth_m: float) -> float: ...  # noqa: D102
-    def doubtful_shares(self) -> tuple[float, float]: ...  # noqa: D102
+    def weight_n(self) -> float: ...
+    def drag_by_flow_n(self, flow_mps: float) -> float: ...
+    def inertial_n(self, accelerated_n: Callable[[Any, float, float], float]) -> float: ...
+    def sheared_n(self) -> float: ...
+    def total_n(self, extent: str) -> float: ...
+    def submerged(self, depth_m: float) -> float: ...
+    def doubtful_shares(self) -> tuple[float, float]: ...
 
 
 @dataclass(frozen=True, slots=True)

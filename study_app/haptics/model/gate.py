@@ -98,12 +98,10 @@ class Extremes:
 
     @property
     def radius_m(self) -> float:
-        """Of the body."""
         return self.scene.body.diameter_m / 2
 
     @property
     def volume_m3(self) -> float:
-        """Of the body."""
         return self.scene.body.volume_m3
 
     @property
@@ -113,7 +111,6 @@ class Extremes:
 
     @property
     def weight_n(self) -> float:
-        """The weight of the body."""
         return self.scene.body.density_kg_m3 * self.volume_m3 * GRAVITY_MPS2
 
     def drag_by_flow_n(self, flow_mps: float) -> float:

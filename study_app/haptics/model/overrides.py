@@ -76,13 +76,11 @@ def number_names(scene: Scene) -> tuple[str, ...]:
 
 
 def _shown(value: object) -> str:
-    """Return a value as messages show it."""
     text = str(value)
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
 
 
 def _reason(place: tuple[int | str, ...], message: str) -> str:
-    """Return the message of a scene's validation error."""
     name = ".".join(str(part) for part in place if part != "liquids" and not isinstance(part, int))
     said = message.removeprefix("Value error, ").split(", unable to parse")[0].replace("Input should be", "must be")
     if "valid dictionary" in said:

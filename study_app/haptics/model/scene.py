@@ -204,11 +204,9 @@ class ForceLink(Frozen):
 
     @property
     def acts(self) -> bool:
-        """Whether it changes the force."""
         return self.delay_s > 0 or self.jitter_s > 0 or self.loss > 0
 
     def ticks(self, rate_hz: float) -> tuple[int, int]:
-        """Return delay and jitter in whole ticks."""
         return round(self.delay_s * rate_hz), round(self.jitter_s * rate_hz)
 
     def mean_delay_s(self, rate_hz: float) -> float:
@@ -243,7 +241,6 @@ class Body(Frozen):
 
     @property
     def volume_m3(self) -> float:
-        """The volume of the ball."""
         return math.pi / 6 * self.diameter_m**3
 
 

@@ -262,7 +262,6 @@ def _by_delay(scene: Scene, dynamics: Dynamics, rules: ForceRules) -> Sequence[D
 
 
 def _fill(model: Model, scene: Scene, limits: Sequence[DampingLimits], dynamics: Dynamics, rules: ForceRules) -> None:
-    """Write constants and a fresh state."""
     for rows in (model.state, model.liquid_states):
         rows.view(np.uint8)[:] = 0
     _fill_constants(model, scene, limits, dynamics, rules)

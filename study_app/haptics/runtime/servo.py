@@ -183,7 +183,6 @@ class Servo:
 
     @property
     def overruns(self) -> int:
-        """The number of deadlines skipped because a tick took too long."""
         return int(self.loop.control[0].overruns)
 
     @property
@@ -201,22 +200,18 @@ class Servo:
             raise (DeviceLost if status == STATUS_DEVICE_LOST else ServoFault)(f"{fault}; the force is zero")
 
     def now_ns(self) -> int:
-        """Return the time on the servo's clock [ns], the clock of all samples."""
         return self.loop.clock.now_ns()
 
     @property
     def dynamics(self) -> Dynamics:
-        """The dynamics that the device measured when it was opened."""
         return self._device.dynamics
 
     @property
     def delay_ticks(self) -> int:
-        """The assumed delay of a force at present [ticks]."""
         return self.loop.delay_ticks
 
     @property
     def grant(self) -> Grant:
-        """The priority that the system granted to the servo's thread."""
         return self.loop.grant
 
     def describe(self) -> dict[str, Any]:

@@ -34,7 +34,6 @@ class Telemetry:
         self.written = np.zeros(1, np.int64)
 
     def reader(self) -> Reader:
-        """Return a reader of all samples from now on."""
         return Reader(self)
 
     def latest(self) -> Any | None:

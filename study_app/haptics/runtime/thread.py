@@ -172,7 +172,6 @@ class LoopThread:
 
     @property
     def delay_ticks(self) -> int:
-        """The assumed delay of a force at present [ticks]."""
         return int(self.safety[0].delay_ticks)
 
     @property
@@ -202,7 +201,6 @@ class LoopThread:
         self.hand_over(self._rest, 0)
 
     def _blocks(self) -> Blocks:
-        """Return the memory blocks of the loop."""
         models = (array for model in self.slots for array in model.arrays)
         arrays = (self.control, *models, self.safety, *self._exchanged, *self._output)
         return [(array.ctypes.data, array.nbytes) for array in arrays if array.nbytes]

@@ -67,15 +67,15 @@ class Tail(Protocol):
     """Common parameters of both wakes."""
 
     @property
-    def length(self) -> int: ...  # noqa: D102 - elements
+    def length(self) -> int: ...
     @property
-    def scaling(self) -> float: ...  # noqa: D102 - elements
+    def scaling(self) -> float: ...
     @property
-    def exponent(self) -> float: ...  # noqa: D102
+    def exponent(self) -> float: ...
     @property
-    def decay(self) -> float: ...  # noqa: D102 - a millisecond
+    def decay(self) -> float: ...
     @property
-    def axes(self) -> str: ...  # noqa: D102
+    def axes(self) -> str: ...
 
 
 W = TypeVar("W", bound=Tail)

@@ -40,9 +40,7 @@ class Clock(Protocol):
     context: int
     runs: bool
 
-    def now_ns(self) -> int:
-        """Return the time [ns]."""
-        ...
+    def now_ns(self) -> int: ...
 
     def suspended_ns(self) -> int:
         """Return how long this clock stopped during suspensions of the machine since its start [ns]."""
@@ -75,7 +73,6 @@ class SystemClock:
         self.context = int(self.memory.ctypes.data)
 
     def now_ns(self) -> int:
-        """Return the time [ns]."""
         return int(self.now.ctypes(self.context))
 
     def suspended_ns(self) -> int:
@@ -115,7 +112,6 @@ class VirtualClock:
         self.context = int(self.memory.ctypes.data)
 
     def now_ns(self) -> int:
-        """Return the time [ns]."""
         return int(self._now_ns[0])
 
     def suspended_ns(self) -> int:

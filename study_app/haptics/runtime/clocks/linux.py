@@ -32,15 +32,7 @@ _LONGEST = 1 << 20  # longest message of a real bus [bytes]
 
 
 def make_real_time(thread: int, address: str | None = None) -> int:
-    """Make a thread of this process real-time; return its new priority.
-
-    Parameters
-    ----------
-    thread : int
-        The system's id of the thread.
-    address : str, optional
-        Path of the bus' socket; by default the system bus.
-    """
+    """Make a thread of this process real-time by the service at a bus' ``address``; return its new priority."""
     import resource  # noqa: PLC0415 - of POSIX; this file is read on every system
 
     with _Bus(address or _system_bus()) as bus:
@@ -57,14 +49,7 @@ def make_real_time(thread: int, address: str | None = None) -> int:
 def make_high_priority(thread: int, nice: int, address: str | None = None) -> int:
     """Raise a thread of this process above ordinary ones without real-time priority; return its new nice level.
 
-    Parameters
-    ----------
-    thread : int
-        The system's id of the thread.
-    nice : int
-        The requested level, below 0.
-    address : str, optional
-        Path of the bus' socket; by default the system bus.
+    ``nice``, below 0, is the requested level; ``address`` the path of the bus' socket, by default the system bus.
 
     Raises
     ------
