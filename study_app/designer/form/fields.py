@@ -385,27 +385,13 @@ def _same(_row: FormRow) -> object:
 
 @dataclass(frozen=True, slots=True)
 class SpecialEditor:
-    """An editor of certain keys; bounds, faults, help and removal stay those of the row.
+    """An editor of certain keys; bounds, faults, help and removal stay those of the row."""
 
-    Attributes
-    ----------
-    keys : tuple of (str, str)
-        Title of the model in the JSON Schema, such as "Block", and the key.
-    make : callable
-        Makes the editor of a row.
-    wide : bool
-        Whether it takes the width of the form, with the label above it.
-    labelled : bool
-        Whether the label is shown; a screen reader says it in any case.
-    structure : callable
-        Returns what makes another editor necessary, beyond what does for every row.
-    facts : callable or None
-        Returns what it shows beyond the value of its row, of a study that may have faults: a frozen value.
-    """
-
-    keys: tuple[tuple[str, str], ...]
-    make: Callable[[FormRow], Field]
-    wide: bool = False
-    labelled: bool = True
+    keys: tuple[tuple[str, str], ...]  # title of the model in the JSON Schema, such as "Block", and the key
+    make: Callable[[FormRow], Field]  # makes the editor of a row
+    wide: bool = False  # whether it takes the width of the form, with the label above it
+    labelled: bool = True  # whether the label is shown; a screen reader says it in any case
+    # returns what makes another editor necessary, beyond what does for every row
     structure: Callable[[FormRow], object] = _same
+    # returns what it shows beyond the value of its row, of a study that may have faults: a frozen value
     facts: Callable[[Study, Row], Any] | None = None

@@ -41,47 +41,24 @@ class AxisLimit:
 
 @dataclass(frozen=True, slots=True)
 class LevelAxis:
-    """An axis of levels.
+    """An axis of levels."""
 
-    Attributes
-    ----------
-    low, high : float
-        The ends of the levels.
-    least, most : float
-        The ends of the axis.
-    logarithmic : bool
-        Whether levels are in ratio, not even.
-    levels : tuple of float
-        The levels between which a method chooses.
-    factor : float
-        What a level is multiplied by where it is written.
-    unit : str
-        The unit of a written level.
-    caption : str
-        What a level is, and how the levels are spaced.
-    standard : str
-        The highest standard in words, "" without one.
-    limits : mapping
-        Where the force limit ("norm") and the slope limit begin, if that is near the levels.
-    ticks : tuple of (float, str)
-        Levels at which the axis is written at.
-    sentence : str
-        The axis in a sentence.
-    """
-
+    # the ends of the levels
     low: float
     high: float
+    # the ends of the axis
     least: float
     most: float
-    logarithmic: bool
-    levels: tuple[float, ...]
-    factor: float
-    unit: str
-    caption: str
-    standard: str
+    logarithmic: bool  # whether levels are in ratio, not even
+    levels: tuple[float, ...]  # the levels between which a method chooses
+    factor: float  # what a level is multiplied by where it is written
+    unit: str  # the unit of a written level
+    caption: str  # what a level is, and how the levels are spaced
+    standard: str  # the highest standard in words, "" without one
+    # where the force limit ("norm") and the slope limit begin, if that is near the levels
     limits: Mapping[Limit, AxisLimit]
-    ticks: Ticks
-    sentence: str
+    ticks: Ticks  # levels at which the axis is written at
+    sentence: str  # the axis in a sentence
 
 
 def level_axis(study: Study, row: Row) -> LevelAxis | None:

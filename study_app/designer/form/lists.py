@@ -46,24 +46,12 @@ CAPTION: Final = f"force at {HAND_MPS:g} m/s of the hand"
 
 @dataclass(frozen=True, slots=True)
 class ConditionLine:
-    """One condition of a block.
+    """One condition of a block."""
 
-    Attributes
-    ----------
-    liquid : tuple of str or None
-        The place of its liquid, None where it has several or is not in the study.
-    note : str
-        Its liquid where it is named otherwise, and by how much the picture is late.
-    force : str
-        Its force with unit, "–" where it is not known.
-    clipped : bool
-        Whether a limit takes part of the force away.
-    """
-
-    liquid: Path | None
-    note: str
-    force: str
-    clipped: bool = False
+    liquid: Path | None  # the place of its liquid, None where it has several or is not in the study
+    note: str  # its liquid where it is named otherwise, and by how much the picture is late
+    force: str  # its force with unit, "–" where it is not known
+    clipped: bool = False  # whether a limit takes part of the force away
 
 
 def condition_lines(study: Study, row: Row) -> tuple[ConditionLine, ...]:

@@ -16,31 +16,16 @@ STATEMENT: Final = "statement"
 
 @dataclass(frozen=True, slots=True)
 class QuestionLine:
-    """One question.
+    """One question."""
 
-    Attributes
-    ----------
-    path : tuple of str or int
-        Its place.
-    number : int
-        Its place in the questionnaire, from 1.
-    kind, icon : str
-        Its kind, and the name of its icon.
-    texts : tuple of str
-        Its text in each language of the study, "" where it is missing.
-    note : str
-        When it is shown, "" where it always is.
-    faults : int
-        How many faults it has.
-    """
-
-    path: Path
-    number: int
+    path: Path  # its place
+    number: int  # its place in the questionnaire, from 1
+    # its kind, and the name of its icon
     kind: str
     icon: str
-    texts: tuple[str, ...]
-    note: str = ""
-    faults: int = 0
+    texts: tuple[str, ...]  # its text in each language of the study, "" where it is missing
+    note: str = ""  # when it is shown, "" where it always is
+    faults: int = 0  # how many faults it has
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,42 +93,19 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class FormRow:
-    """One row of the form.
+    """One row of the form."""
 
-    Attributes
-    ----------
-    row : Row
-        What is edited and how.
-    place : str
-        Its place in the file, such as ``blocks.liquids.order``, with its line.
-    faults : tuple of str
-        What is wrong with it, in the words of ``check``.
-    languages : tuple of (str, str)
-        Code and name of each language of the study, for texts.
-    entries : tuple of Entry
-        What a list holds, or what references name.
-    target : tuple of str or int or None
-        What a reference names.
-    notes : tuple of (str, str)
-        Elements that a reference can name, each with its `brief` fact.
-    number : int or None
-        Of alternatives ("either"), which one the value is.
-    instead : tuple of (str, str)
-        Keys of which exactly one is given, with their labels: this row's and the other one.
-    facts : object
-        What its special editor shows beyond the value; None where it has none.
-    """
-
-    row: Row
-    place: str
-    faults: tuple[str, ...] = ()
-    languages: tuple[tuple[str, str], ...] = ()
-    entries: tuple[Entry, ...] = ()
-    target: Path | None = None
-    notes: tuple[tuple[str, str], ...] = ()
-    number: int | None = None
+    row: Row  # what is edited and how
+    place: str  # its place in the file, such as ``blocks.liquids.order``, with its line
+    faults: tuple[str, ...] = ()  # what is wrong with it, in the words of ``check``
+    languages: tuple[tuple[str, str], ...] = ()  # code and name of each language of the study, for texts
+    entries: tuple[Entry, ...] = ()  # what a list holds, or what references name
+    target: Path | None = None  # what a reference names
+    notes: tuple[tuple[str, str], ...] = ()  # elements that a reference can name, each with its `brief` fact
+    number: int | None = None  # of alternatives ("either"), which one the value is
+    # keys of which exactly one is given, with their labels: this row's and the other one
     instead: tuple[tuple[str, str], ...] = ()
-    facts: Any = None
+    facts: Any = None  # what its special editor shows beyond the value; None where it has none
 
     @property
     def copied(self) -> tuple[str, ...]:
@@ -186,50 +148,28 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """The form of one element.
+    """The form of one element."""
 
-    Attributes
-    ----------
-    path : tuple of str or int
-        The element.
-    title, icon, kind : str
-        What it is called, the name of its icon, and what it is: "Block".
-    id : str or None
-        Its name in the file, None where it has none of its own.
-    sections : tuple of Section
-        Its rows.
-    faults, id_faults : tuple of str
-        What is wrong with it that belongs to no row, and what is wrong with its id.
-    position : tuple of int or None
-        Its place in the session or list and how many there are, from 1; None where it has no order.
-    questions : QuestionLines
-        The questions of the questionnaire that it is in, itself included; none where it is no question.
-    around : tuple of (path, str)
-        The section and the elements that it is in, with their titles, and itself.
-    feel : str
-        What the button says that opens the lab with its liquids, "" where it has none.
-    series : bool
-        Whether there can be a series of it: elements that differ in one of its numbers.
-    used : str
-        How many other elements use it (`used_by`); "" where that is not said.
-    unreadable : bool
-        Whether nothing can be edited but the text of the file, in which the study cannot be read.
-    """
-
-    path: Path
+    path: Path  # the element
+    # what it is called, the name of its icon, and what it is: "Block"
     title: str
     icon: str
     kind: str
-    id: str | None = None
-    sections: tuple[Section, ...] = ()
+    id: str | None = None  # its name in the file, None where it has none of its own
+    sections: tuple[Section, ...] = ()  # its rows
+    # what is wrong with it that belongs to no row, and what is wrong with its id
     faults: tuple[str, ...] = ()
     id_faults: tuple[str, ...] = ()
+    # its place in the session or list and how many there are, from 1; None where it has no order
     position: tuple[int, int] | None = None
+    # the questions of the questionnaire that it is in, itself included; none where it is no question
     questions: QuestionLines = NO_QUESTIONS
+    # the section and the elements that it is in, with their titles, and itself
     around: tuple[tuple[Path, str], ...] = ()
-    feel: str = ""
-    series: bool = False
-    used: str = ""
+    feel: str = ""  # what the button says that opens the lab with its liquids, "" where it has none
+    series: bool = False  # whether there can be a series of it: elements that differ in one of its numbers
+    used: str = ""  # how many other elements use it (`used_by`); "" where that is not said
+    # whether nothing can be edited but the text of the file, in which the study cannot be read
     unreadable: bool = False
 
     @property

@@ -27,21 +27,11 @@ TANK_MM: Final = (100.0, 60.0, 60.0)
 
 @dataclass(frozen=True, slots=True)
 class TargetsInTank:
-    """Targets in the hand frame [mm].
+    """Targets in the hand frame [mm]."""
 
-    Attributes
-    ----------
-    size_mm : tuple of float
-        Full size of the tank in x (right), y (up) and z (toward the participant).
-    radius_mm : float
-        Radius of a target.
-    points : tuple
-        Centre of each target; None where the file holds no point.
-    """
-
-    size_mm: Point
-    radius_mm: float
-    points: tuple[Point | None, ...]
+    size_mm: Point  # full size of the tank in x (right), y (up) and z (toward the participant)
+    radius_mm: float  # radius of a target
+    points: tuple[Point | None, ...]  # centre of each target; None where the file holds no point
 
     def within(self, point: Point) -> Point:
         """Return the nearest point, in whole millimetres, at which a target is inside the tank."""

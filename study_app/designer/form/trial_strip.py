@@ -30,28 +30,15 @@ PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """A phase of a trial.
+    """A phase of a trial."""
 
-    Attributes
-    ----------
-    kind : {"interval", "pause", "question", "feedback"}
-        What it is.
-    name, words : str
-        Its name, and what is written in its picture.
-    duration_s : float
-        How long it takes [s].
-    field : tuple of str or int
-        Where the file says so; () where the program does.
-    about : bool
-        Whether it takes about as long.
-    """
-
-    kind: PhaseKind
+    kind: PhaseKind  # what it is
+    # its name, and what is written in its picture
     name: str
     words: str
-    duration_s: float
-    field: Path = ()
-    about: bool = False
+    duration_s: float  # how long it takes [s]
+    field: Path = ()  # where the file says so; () where the program does
+    about: bool = False  # whether it takes about as long
 
     @property
     def opens(self) -> str:

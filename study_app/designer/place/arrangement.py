@@ -28,34 +28,18 @@ ASIDE_GAP = 24
 
 @dataclass(frozen=True)
 class PanePage:
-    """A page of the pane.
+    """A page of the pane."""
 
-    Attributes
-    ----------
-    name, words : str
-        Name of the tab, and what it says.
-    body : QWidget
-        What the tab shows; its focus proxy takes the keyboard.
-    aside : QWidget or None
-        Controls at the right of the tabs, while the page is shown.
-    with_facts : bool
-        Whether the facts stay below the page.
-    fit_aside : callable
-        Fits the controls into so much room beside the tabs [px].
-    most_px : callable
-        Returns how high the body is at most; the facts take the rest [px].
-    tip : str
-        The tip of its tab.
-    """
-
+    # name of the tab, and what it says
     name: str
     words: str
-    body: QWidget
-    aside: QWidget | None = None
-    with_facts: bool = True
-    fit_aside: Callable[[int], None] = lambda _room_px: None
+    body: QWidget  # what the tab shows; its focus proxy takes the keyboard
+    aside: QWidget | None = None  # controls at the right of the tabs, while the page is shown
+    with_facts: bool = True  # whether the facts stay below the page
+    fit_aside: Callable[[int], None] = lambda _room_px: None  # fits the controls into so much room beside the tabs [px]
+    # returns how high the body is at most; the facts take the rest [px]
     most_px: Callable[[], int] = lambda: QWIDGETSIZE_MAX
-    tip: str = ""
+    tip: str = ""  # the tip of its tab
 
 
 class RightPane(QWidget):

@@ -21,24 +21,16 @@ BannerAction: TypeAlias = Literal["copy", "keep", "take", "compare", "discard", 
 
 @dataclass(frozen=True, slots=True)
 class StudyChoice:
-    """A study that can be opened.
+    """A study that can be opened."""
 
-    Attributes
-    ----------
-    title, file, source : str
-        What it is called, the name of its file, and what it is opened by.
-    shipped, drafted : bool
-        Whether it ships with the program, and whether a draft of it was kept that is not saved.
-    original : str
-        The name of the study that it is a copy of; "" where it is not known to be one.
-    """
-
+    # what it is called, the name of its file, and what it is opened by
     title: str
     file: str
     source: str
+    # whether it ships with the program, and whether a draft of it was kept that is not saved
     shipped: bool = False
     drafted: bool = False
-    original: str = ""
+    original: str = ""  # the name of the study that it is a copy of; "" where it is not known to be one
 
     @property
     def words(self) -> str:
@@ -66,37 +58,18 @@ class Banner:
 
 @dataclass(frozen=True, slots=True)
 class HeaderState:
-    """The header.
+    """The header."""
 
-    Attributes
-    ----------
-    studies : tuple of StudyChoice
-        What can be opened.
-    chosen : str
-        What is open, by its source; "" where nothing is.
-    problems : tuple of (str, str, str)
-        Tone, icon and words of the chip.
-    draft : str
-        What is said of the draft, "" where nothing is.
-    undo, redo : str
-        What would be undone and redone; "" where nothing is.
-    can_save : bool
-        Whether the file differs and may be written.
-    read_only : bool
-        Whether the study cannot be changed.
-    version : VersionChip
-        The chip of the version, and what the button that saves says.
-    """
-
-    studies: tuple[StudyChoice, ...] = ()
-    chosen: str = ""
-    problems: tuple[Tone, str, str] = ("ok", "check", "No problems")
-    draft: str = ""
+    studies: tuple[StudyChoice, ...] = ()  # what can be opened
+    chosen: str = ""  # what is open, by its source; "" where nothing is
+    problems: tuple[Tone, str, str] = ("ok", "check", "No problems")  # tone, icon and words of the chip
+    draft: str = ""  # what is said of the draft, "" where nothing is
+    # what would be undone and redone; "" where nothing is
     undo: str = ""
     redo: str = ""
-    can_save: bool = False
-    read_only: bool = False
-    version: VersionChip = NO_VERSION
+    can_save: bool = False  # whether the file differs and may be written
+    read_only: bool = False  # whether the study cannot be changed
+    version: VersionChip = NO_VERSION  # the chip of the version, and what the button that saves says
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,30 +40,14 @@ DEFAULT_VERSION: Final = "1"
 
 @dataclass
 class OpenStudy:
-    """A study that is open in the designer.
+    """A study that is open in the designer."""
 
-    Attributes
-    ----------
-    file : Path
-        Where it is saved; the file need not exist yet.
-    history : History
-        The study with its steps.
-    base : str
-        Hash of the file's content that is edited; "" for a new file.
-    saved : str
-        The text of the file, "" for a new one.
-    read_only : str
-        Why it cannot be changed, "" where it can.
-    draft : Draft or None
-        The draft that was found when it was opened.
-    """
-
-    file: Path
-    history: History
-    base: str = ""
-    saved: str = ""
-    read_only: str = ""
-    draft: Draft | None = None
+    file: Path  # where it is saved; the file need not exist yet
+    history: History  # the study with its steps
+    base: str = ""  # hash of the file's content that is edited; "" for a new file
+    saved: str = ""  # the text of the file, "" for a new one
+    read_only: str = ""  # why it cannot be changed, "" where it can
+    draft: Draft | None = None  # the draft that was found when it was opened
     kept: datetime | None = None
     keeper: Keeper = field(init=False)
 

@@ -55,24 +55,12 @@ _ENDS: Final = re.compile("\r\n|\r|\u2029")
 
 @dataclass(frozen=True, slots=True)
 class FileText:
-    """The text of the pane; lines count from 0.
+    """The text of the pane; lines count from 0."""
 
-    Attributes
-    ----------
-    name : str
-        The name of the file.
-    text : str
-        Its text with line feeds alone.
-    selected : tuple of (int, int)
-        First and last line of each part of the selected element.
-    faulty : tuple of int
-        Lines with a fault.
-    """
-
-    name: str = ""
-    text: str = ""
-    selected: tuple[tuple[int, int], ...] = ()
-    faulty: tuple[int, ...] = ()
+    name: str = ""  # the name of the file
+    text: str = ""  # its text with line feeds alone
+    selected: tuple[tuple[int, int], ...] = ()  # first and last line of each part of the selected element
+    faulty: tuple[int, ...] = ()  # lines with a fault
 
 
 def file_text(study: Study, name: str, path: Path) -> FileText:

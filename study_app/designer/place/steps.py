@@ -74,30 +74,14 @@ from study_app.protocol.wording.languages import language_name
 
 @dataclass(frozen=True, slots=True)
 class DeletePrompt:
-    """What refers to an element that is to be deleted.
+    """What refers to an element that is to be deleted."""
 
-    Attributes
-    ----------
-    path : tuple of str or int
-        The element.
-    title : str
-        What it is called.
-    references : tuple of str
-        The places that name it, in words.
-    others : tuple of (str, str)
-        Id and title of what could be named in its place.
-    also : tuple of path
-        Others that are deleted with it.
-    together : tuple of str
-        Elements that cannot be without it, with kind and title.
-    """
-
-    path: Path
-    title: str
-    references: tuple[str, ...]
-    others: tuple[tuple[str, str], ...] = ()
-    also: tuple[Path, ...] = ()
-    together: tuple[str, ...] = ()
+    path: Path  # the element
+    title: str  # what it is called
+    references: tuple[str, ...]  # the places that name it, in words
+    others: tuple[tuple[str, str], ...] = ()  # id and title of what could be named in its place
+    also: tuple[Path, ...] = ()  # others that are deleted with it
+    together: tuple[str, ...] = ()  # elements that cannot be without it, with kind and title
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,36 +121,16 @@ def _in_words(row: Row) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step of a study.
+    """One step of a study."""
 
-    Attributes
-    ----------
-    words : str
-        What it does.
-    edits : tuple of Edit
-        Its edits.
-    select : tuple of str or int or None
-        What is selected after it; None stands for the same.
-    continues : object
-        What it may continue: typing in one field is one step.
-    text : str
-        The file's text that the edits are made in, "" for the text that there is.
-    several : tuple of path
-        Elements that are selected together after it.
-    said : str
-        What a screen reader says of it.
-    fresh : bool
-        Whether what is selected after it is new: its first text takes the keyboard.
-    """
-
-    words: str
-    edits: tuple[Edit, ...]
-    select: Path | None = None
-    continues: object = None
-    text: str = ""
-    several: tuple[Path, ...] = ()
-    said: str = ""
-    fresh: bool = False
+    words: str  # what it does
+    edits: tuple[Edit, ...]  # its edits
+    select: Path | None = None  # what is selected after it; None stands for the same
+    continues: object = None  # what it may continue: typing in one field is one step
+    text: str = ""  # the file's text that the edits are made in, "" for the text that there is
+    several: tuple[Path, ...] = ()  # elements that are selected together after it
+    said: str = ""  # what a screen reader says of it
+    fresh: bool = False  # whether what is selected after it is new: its first text takes the keyboard
 
 
 def add(study: Study, asked: AddElement, selected: Path) -> Step:

@@ -23,32 +23,18 @@ _NUMBERS: Final = re.compile(r"[-\u2212]?\d+(?:[.,\u2009]\d+)*")
 
 @dataclass(frozen=True, slots=True)
 class ProblemRow:
-    """One problem.
+    """One problem."""
 
-    Attributes
-    ----------
-    fault : Fault
-        What is wrong, by path.
-    element : tuple of str or int
-        The element whose form shows it; () where the file cannot be read.
-    name, icon : str
-        What element and field are called ("Block Liquids, Order"), and the name of the element's icon.
-    message, hint : str
-        The sentence of ``check``, and its hint.
-    line : int or None
-        The line in the file, from 1.
-    warning : bool
-        Whether ``check`` only warns of it.
-    """
-
-    fault: Fault
-    element: Path
+    fault: Fault  # what is wrong, by path
+    element: Path  # the element whose form shows it; () where the file cannot be read
+    # what element and field are called ("Block Liquids, Order"), and the name of the element's icon
     name: str
     icon: str
+    # the sentence of ``check``, and its hint
     message: str
     hint: str
-    line: int | None
-    warning: bool = False
+    line: int | None  # the line in the file, from 1
+    warning: bool = False  # whether ``check`` only warns of it
 
     @property
     def place(self) -> str:
