@@ -25,8 +25,15 @@ from study_app.gui.home.dialogs import WorkspaceDialog
 from study_app.gui.home.main_window import MainWindow, bug_words
 from study_app.gui.home.study_facts import DraftWords
 from study_app.gui.home.view import HomePlace
-from study_app.gui.kit.devices import DeviceShown, benches_shown, device_named, devices_shown
-from study_app.gui.kit.workstation import screen_number, settings_here, theme_named
+from study_app.gui.kit.devices import (
+    DeviceShown,
+    benches_shown,
+    device_named,
+    devices_shown,
+    screen_number,
+    settings_here,
+    theme_named,
+)
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.widgets.background import Background, wait_for_jobs
 from study_app.session.start import NewSession
@@ -83,7 +90,7 @@ class WorkstationController(QObject):
         place = self.place = MachinePlace()
         place.changed.connect(self.change)
         place.offset_measured.connect(self.measured)
-        place.undo_asked.connect(self.undo)
+        place.undo.clicked.connect(self.undo)
         self._show()
         return place
 
@@ -479,7 +486,7 @@ class MainController(QObject):
 
     def _machine(self) -> MachinePlace:
         made = self.machine.make_place()
-        made.check_asked.connect(self.check_computer)
+        made.check.clicked.connect(self.check_computer)
         return made
 
     def _home(self) -> HomePlace:
@@ -489,7 +496,7 @@ class MainController(QObject):
         made.protocol_opened.connect(self.machine.remember_protocol)
         made.edit_asked.connect(self.lab_and_designer.open_designer)
         made.new_asked.connect(self.lab_and_designer.begin_study)
-        made.device.display_asked.connect(self._test_display)
+        made.device.display.clicked.connect(self._test_display)
         made.show_machine(self.machine.settings, self.devices.preferred)
         self._home_place = made
         return made

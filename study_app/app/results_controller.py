@@ -34,7 +34,7 @@ from study_app.analysis.worker_messages import (
     start_analysis_worker,
 )
 from study_app.gui.application import open_here
-from study_app.gui.results.results_state import FigureShown, Going, LeftOut, Opened, ResultsView, StudyChoice, Trouble
+from study_app.gui.results.figures import FigureShown, Going, LeftOut, Opened, ResultsView, StudyChoice, Trouble
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.sessions.session_facts import session_facts
 from study_app.store.exclusions import Exclusion

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QMainWindow
 from study_app.app.main_controller import MainController, WorkstationController
 from study_app.app.session.live_session import LiveSession
 from study_app.devices.descriptor import READY, Backend
-from study_app.gui.kit.workstation import described, settings_here, text_scale_on
+from study_app.gui.kit.devices import described, settings_here, text_scale_on
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.dialogs import Notice
 from study_app.session.start import NewSession

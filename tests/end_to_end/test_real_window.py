@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.main_controller import MainController
 from study_app.gui.home.cards import StudyCard
-from study_app.gui.operator.header import Strip
+from study_app.gui.operator.session_panels import Strip
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT

@@ -261,7 +261,7 @@ HOME: Actions = {
     "device": of_home(lambda home: home.show_machine(MachineSettings(device="falcon"), devices_shown(FOUND)[1])),
     "small": lambda window: window.resize(1024, 640),
     "says something": lambda window: window.show_message("The studies could not be read", "The folder is gone."),
-    "dark": lambda window: window.rail.theme_asked.emit(),
+    "dark": lambda window: window.rail.switch.click(),
 }
 
 

@@ -22,7 +22,7 @@ from study_app.gui.kit.devices import devices_shown
 from study_app.gui.lab.view import LabPlace
 from study_app.gui.preflight.window import LEAST as LEAST_PREFLIGHT
 from study_app.gui.preflight.window import PreflightView, PreflightWindow, preflight_view
-from study_app.gui.results.results_state import Opened
+from study_app.gui.results.figures import Opened
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.settings import view as settings_view
 from study_app.gui.settings.display_test import DisplayTest

@@ -120,7 +120,7 @@ class PicturedSession:
         operator = self._bridge.operator
         for theme in (DARK, LIGHT):
             if operator.theme is not theme:
-                operator.header.theme_asked.emit()
+                operator.header.theme_button.click()
             self._camera.take(operator, f"{name}-{theme.name}", COCKPIT)
 
     def end(self) -> None:

@@ -22,10 +22,9 @@ from study_app.app.session.timing import FrameBudget, ThreadPriority, freeze_gar
 from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError, DisplayError, ServoFault, StudyError, VideoError
-from study_app.gui.display.frame_clock import Frames
-from study_app.gui.display.screens import has_card, place
-from study_app.gui.operator.header import Strip
+from study_app.gui.display.screens import Frames, has_card, place
 from study_app.gui.operator.operator_view import OperatorView, Session, stages
+from study_app.gui.operator.session_panels import Strip
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.model import Protocol
@@ -141,7 +140,7 @@ class SessionBridge(QObject):
         participant.event.connect(self._event)
         participant.left.connect(operator.come_forward)
         if self.strip is not None:
-            self.strip.operator_asked.connect(operator.come_forward)
+            self.strip.operator.clicked.connect(operator.come_forward)
             operator.header.page.show()
             operator.page_asked.connect(participant.come_forward)
         participant.painted.connect(self._painted)

@@ -26,7 +26,7 @@ from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.errors import SessionError, StoreError, StudyError
 from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.home.startup_window import OpeningWindow
-from study_app.gui.kit.workstation import described, screen_number, settings_here, text_scale_on
+from study_app.gui.kit.devices import described, screen_number, settings_here, text_scale_on
 from study_app.gui.theme.theme import Theme
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.dialogs import Notice

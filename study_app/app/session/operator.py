@@ -10,10 +10,10 @@ from PySide6.QtCore import QObject, Signal
 
 from study_app.app.failures import guarded_session_slot
 from study_app.errors import StudyError
-from study_app.gui.operator.header import Strip
 from study_app.gui.operator.operator_view import OperatorView, Session, operator_view
 from study_app.gui.operator.plots import ForceCard
 from study_app.gui.operator.servo_health import Forces, ServoHealth
+from study_app.gui.operator.session_panels import Strip
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.widgets.background import Background
@@ -229,7 +229,7 @@ class OperatorRequests(QObject):
         operator.mark_set.connect(self._mark)
         operator.exclude_asked.connect(self._exclude)
         if strip is not None:
-            strip.stop_asked.connect(self._stop_force)
+            strip.stop.pressed.connect(self._stop_force)
 
     def fail(self, error: BaseException) -> None:
         self._fail(error)

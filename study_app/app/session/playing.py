@@ -29,8 +29,7 @@ from study_app.designer.place.controller import DesignerController
 from study_app.designer.problems.problems import problem_rows
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError, StudyError
-from study_app.gui.kit.devices import device_choices
-from study_app.gui.kit.workstation import settings_here
+from study_app.gui.kit.devices import device_choices, settings_here
 from study_app.gui.widgets.background import Background
 from study_app.session.simulated.answers_only import begin_at
 from study_app.session.start import NewSession, resumed
@@ -64,9 +63,9 @@ class PlayedSession(LiveSession):
         participant, runner = self.bridge.participant, self.bridge.runner
         participant.installEventFilter(self)
         participant.event.connect(self._hear)
-        for stop in (self.bridge.operator, self.bridge.strip):
-            if stop is not None:
-                stop.stop_asked.connect(self._stop_later)
+        self.bridge.operator.stop_asked.connect(self._stop_later)
+        if self.bridge.strip is not None:
+            self.bridge.strip.stop.pressed.connect(self._stop_later)
         runner.on_change(self._follow)
         self._follow(runner.state)
         if runner.state.phase is Phase.PAUSED and runner.state.held is None:

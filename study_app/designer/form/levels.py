@@ -21,7 +21,7 @@ from study_app.designer.measures.measures_view import focus_of
 from study_app.designer.measures.number_cards import LIMIT_NAMES, Limit, Ticks
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.sliders import Range
+from study_app.gui.widgets.numbers import Range
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import Stimulus
 

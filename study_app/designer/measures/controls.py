@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from study_app.designer.measures.number_cards import ControlValues
 from study_app.gui.widgets.boxes import STRETCH, hbox
 from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.number_field import NumberField
+from study_app.gui.widgets.numbers import NumberField
 
 FIELD_PX = 48
 

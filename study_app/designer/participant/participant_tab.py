@@ -16,7 +16,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
 from study_app.gui.widgets.controls import Cap, Choice, IconButton
 from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.number_field import NumberField
+from study_app.gui.widgets.numbers import NumberField
 from study_app.session.trial import TankView
 
 MOST_IN_ROW: Final = 2

@@ -26,7 +26,7 @@ from study_app.designer.place.editing import Editing
 from study_app.designer.place.view import DesignerPlace
 from study_app.gui.display.screens import choose_screens
 from study_app.gui.kit.commands import add_commands, tip
-from study_app.gui.kit.workstation import screen_number, settings_here, text_scale_on
+from study_app.gui.kit.devices import screen_number, settings_here, text_scale_on
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial

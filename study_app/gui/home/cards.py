@@ -30,9 +30,6 @@ WAKE_POINTS = 48
 class DeviceCard(Card):
     """What sessions begin with, whether it can be felt with now, and the screens."""
 
-    devices_asked = Signal()
-    display_asked = Signal()
-
     def __init__(self) -> None:
         super().__init__(padding=20, gap=8)
         self.icon = Icon("device", "text2", 22)
@@ -45,8 +42,6 @@ class DeviceCard(Card):
             self.column.addWidget(line)
         self.devices = ActionButton("", "Devices", height=38)
         self.display = ActionButton("", "Display test", height=38)
-        self.devices.clicked.connect(self.devices_asked)
-        self.display.clicked.connect(self.display_asked)
         add_parts(self.column, 4, hbox((self.devices, 1), (self.display, 1), spacing=12))
 
     def show_device(self, shown: DeviceShown) -> None:
@@ -65,8 +60,6 @@ class DeviceCard(Card):
 class LabCard(Card):
     """The way into the liquid lab, under a picture of a ball and its wake, which is lower in a low window."""
 
-    lab_asked = Signal()
-
     def __init__(self) -> None:
         super().__init__(padding=20, gap=6)
         self._picture = QSpacerItem(0, PICTURE - INSET, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Maximum)
@@ -77,7 +70,6 @@ class LabCard(Card):
         about.setFont(font("label", weight=400))
         self.open = ActionButton("", "Open", height=38)
         self.open.setAccessibleName("Open the liquid lab")
-        self.open.clicked.connect(self.lab_asked)
         add_layout(self.column, hbox((vbox(label("Liquid lab", "card"), about, spacing=4), 1), self.open))
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -182,7 +174,6 @@ class SessionsCard(Card):
     ``all_asked`` is for all results, ``open_asked`` carries the `SessionFacts` of a session.
     """
 
-    all_asked = Signal()
     open_asked = Signal(object)
 
     def __init__(self) -> None:
@@ -198,7 +189,6 @@ class SessionsCard(Card):
         self.kind.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToContents)
         self.details = ActionButton("file", "Details", role="plain", height=34)
         self.all = ActionButton("chevron", "All results", role="plain", height=34)
-        self.all.clicked.connect(self.all_asked)
         parts = (label("Sessions", "card"), self.kind, (self.where, 1), self.details, self.all)
         self.rows = SessionsTable(COLUMNS, NONE[""])
         add_parts(self.column, hbox(*parts, spacing=12, margins=(12, 0, 12, 0)), (self.rows, 1))

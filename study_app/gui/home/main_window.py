@@ -136,14 +136,12 @@ class Rail(Themed, QWidget):
     """
 
     go_asked = Signal(str)
-    theme_asked = Signal()
 
     def __init__(self, names: Iterable[str]) -> None:
         super().__init__()
         names = set(names)
         self.name = label("Liquid Study", "card")
         self.switch = RailButton("moon", "Dark theme", "Dark")
-        self.switch.clicked.connect(self.theme_asked)
         self._head = hbox(Logo(), self.name, STRETCH, spacing=10)
         self.buttons = {place.name: self._button(place) for place in DESTINATIONS if place.name in names}
         self._column = vbox(self._head, 22, *self.buttons.values(), STRETCH, self.switch, spacing=6, parent=self)
@@ -223,7 +221,7 @@ class MainWindow(QMainWindow):
         hbox(self.rail, (self.stack, 1), spacing=0, margins=0, parent=whole)
         self.setCentralWidget(whole)
         whole.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-        self.rail.theme_asked.connect(self._change_theme)
+        self.rail.switch.clicked.connect(self._change_theme)
         self.rail.go_asked.connect(self.go)
         QShortcut(QKeySequence("Ctrl+Q"), self, self.close)  # not every window has a frame whose keys close it
         apply_theme(self, theme)

@@ -115,11 +115,11 @@ class HomePlace(Place):
         self.open_protocol.clicked.connect(self._open_protocol)
         self.new_study.clicked.connect(lambda: self.new_asked.emit(""))
         self.banner.resume_asked.connect(self._resume)
-        self.sessions.all_asked.connect(lambda: self.go_asked.emit("results"))
+        self.sessions.all.clicked.connect(lambda: self.go_asked.emit("results"))
         self.sessions.open_asked.connect(self._open_session)
-        self.device.devices_asked.connect(lambda: self.go_asked.emit("devices"))
-        self.device.display_asked.connect(lambda: self.go_asked.emit("machine"))
-        self.lab.lab_asked.connect(lambda: self.go_asked.emit("lab"))
+        self.device.devices.clicked.connect(lambda: self.go_asked.emit("devices"))
+        self.device.display.clicked.connect(lambda: self.go_asked.emit("machine"))
+        self.lab.open.clicked.connect(lambda: self.go_asked.emit("lab"))
         self.show_machine(DEFAULTS, looking(DEFAULTS.device))
 
     def show_machine(self, settings: MachineSettings, device: DeviceShown) -> None:

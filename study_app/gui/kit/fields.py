@@ -13,7 +13,7 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number, Toggle
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.gui.widgets.number_field import read_number, write_number
+from study_app.gui.widgets.numbers import read_number, write_number
 from study_app.session.start import MAX_SEED
 
 LEAST_WORDS = 280  # narrower, wrapped words would ask for room that they do not need

@@ -29,10 +29,10 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 
 from study_app.gui.lab.lab_state import Floats, LabView, Point
-from study_app.gui.participant.pointer_capture import PointerCapture
-from study_app.gui.participant.tank import sprites
-from study_app.gui.participant.tank.backdrop import Backdrop, backdrop
+from study_app.gui.participant.tank import layers as sprites
 from study_app.gui.participant.tank.frame import BallPlace, BallPlacer, Box, Camera
+from study_app.gui.participant.tank.layers import Backdrop, backdrop
+from study_app.gui.participant.window import PointerCapture
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, TANK, font
 from study_app.gui.theme.themed import Themed
@@ -493,9 +493,6 @@ EDGE, FOOT = 16, 56
 class TankNote(Card):
     """One sentence and one button; nothing while all is well. Waiting is shown only after 300 ms."""
 
-    cancel_asked = Signal()
-    fade_in_asked = Signal()
-
     def __init__(self, parent: QWidget) -> None:
         super().__init__(padding=12, gap=8)
         self.setParent(parent)
@@ -512,8 +509,6 @@ class TankNote(Card):
         self.bar.setFixedHeight(6)
         row = hbox(self.sign, (self.words, 1), self.cancel, self.fade_in, self.dismiss, spacing=10)
         add_parts(self.column, row, self.bar)
-        self.cancel.clicked.connect(self.cancel_asked)
-        self.fade_in.clicked.connect(self.fade_in_asked)
         self.dismiss.clicked.connect(self._put_away)
         self._wait = QTimer(self)
         self._wait.setSingleShot(True)

@@ -9,17 +9,14 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGridLayout
 
-from study_app.gui.lab.cards import CostCard, ErrorCard, EstimateCard, FlowCurveRow, LimiterCard
-from study_app.gui.lab.header import KEY, LabHeader
-from study_app.gui.lab.lab_plots import ForceCard, SpeedCard
+from study_app.gui.lab.cards import CostCard, ErrorCard, EstimateCard, FlowCurveRow, ForceCard, LimiterCard, SpeedCard
 from study_app.gui.lab.lab_state import FILE, LabView
 from study_app.gui.lab.lab_tank import LabTank, TankNote
-from study_app.gui.lab.parameters import FormPanel
+from study_app.gui.lab.parameters import KEY, FormPanel, LabHeader
 from study_app.gui.theme.theme import SPACE
 from study_app.gui.widgets.boxes import add_layout, vbox
 from study_app.gui.widgets.cards import SHADOW, scrolled
-from study_app.gui.widgets.escape_key import EscapeKey
-from study_app.gui.widgets.main_view import Place
+from study_app.gui.widgets.main_view import EscapeKey, Place
 from study_app.lab.ab_comparison import Setting
 from study_app.workspace import workspace
 
@@ -142,33 +139,30 @@ class LabPlace(Place):
     def _connect(self) -> None:
         header, form = self.header, self.form
         for mine, part in (
-            (self.switched, header.switched),
+            (self.switched, header.sides.switched),
             (self.blind_asked, header.blind_asked),
             (self.device_chosen, header.device_chosen),
             (self.path_chosen, header.path_chosen),
-            (self.undo_asked, header.undo_asked),
-            (self.redo_asked, header.redo_asked),
-            (self.stop_asked, header.stop_asked),
+            (self.undo_asked, header.undo.clicked),
+            (self.redo_asked, header.redo.clicked),
+            (self.stop_asked, header.stop.pressed),
             (self.changed, form.changed),
             (self.liquid_chosen, form.liquid_chosen),
-            (self.copied, form.copied),
-            (self.fade_in_asked, self.note.fade_in_asked),
-            (self.cancel_asked, self.note.cancel_asked),
+            (self.copied, form.copy.clicked),
+            (self.fade_in_asked, self.note.fade_in.clicked),
+            (self.cancel_asked, self.note.cancel.clicked),
             (self.hand_moved, self.tank.moved),
             (self.hand_pressed, self.tank.pressed),
-        ):
-            part.connect(mine)
-        for mine, part in (
             (self.estimate_parameters_chosen, self.estimate.parameters_chosen),
-            (self.estimate_apply_asked, self.estimate.apply_asked),
+            (self.estimate_apply_asked, self.estimate.apply.clicked),
             (self.estimate_follow_asked, self.estimate.follow_asked),
         ):
             part.connect(mine)
         self.estimate.source_chosen.connect(self._choose_source)
-        header.save_asked.connect(self.ask_where_to_save)
-        form.open_asked.connect(self.ask_which_to_open)
-        form.use_asked.connect(self.ask_which_study)
-        form.put_back_asked.connect(self.put_back)
+        header.save.clicked.connect(self.ask_where_to_save)
+        form.open.clicked.connect(self.ask_which_to_open)
+        form.use.clicked.connect(self.ask_which_study)
+        form.back.clicked.connect(self.put_back)
         self._escape.held.connect(self._stop)
 
     def _shortcuts(self) -> None:

@@ -36,10 +36,6 @@ class Actions(Card):
 
     pause_asked = Signal()
     resume_asked = Signal()
-    repeat_asked = Signal()
-    exclude_asked = Signal()
-    end_asked = Signal()
-    close_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__(padding=14)
@@ -58,10 +54,6 @@ class Actions(Card):
         self.close_session.hide()
         add_parts(self.column, row, self.hint)
         self.pause.clicked.connect(self._pause_or_resume)
-        self.repeat.clicked.connect(self.repeat_asked)
-        self.exclude.clicked.connect(self.exclude_asked)
-        self.end.clicked.connect(self.end_asked)
-        self.close_session.clicked.connect(self.close_asked)
 
     def narrow(self, yes: bool) -> None:
         """Do without the buttons' signs where there is no room for them."""
@@ -185,7 +177,6 @@ class NotesCard(Card):
     """The last notes and marks, a field for the next, and two buttons."""
 
     note_written = Signal(str)
-    mark_set = Signal()
 
     def __init__(self) -> None:
         super().__init__(padding=16, gap=10)
@@ -206,7 +197,6 @@ class NotesCard(Card):
         add_parts(self.column, self._head, self._list, (self.field, 1), self.hint, buttons)
         self.field.entered.connect(self._keep)
         self.add.clicked.connect(self._add)
-        self.mark.clicked.connect(self.mark_set)
 
     def show_lines(self, most: int) -> None:
         """Show so many notes at most; heading and hint go with the first that is left out."""
@@ -301,9 +291,6 @@ class StopPanel(Card):
     Of a device that exerts none (``felt``) the line says so.
     """
 
-    stop_asked = Signal()
-    fade_in_asked = Signal()
-
     def __init__(self, *, felt: bool = True) -> None:
         super().__init__(padding=12, gap=10)
         self._felt = felt
@@ -311,9 +298,6 @@ class StopPanel(Card):
         self.word = label("", "strong")
         self.fade_in = ActionButton("", "Fade in again", height=36)
         self.stop = StopButton()
-        # Pressed, not clicked: the force goes with the finger's first touch.
-        self.stop.pressed.connect(self.stop_asked)
-        self.fade_in.clicked.connect(self.fade_in_asked)
         row = hbox(self.sign, self.word, STRETCH, self.fade_in, spacing=10, margins=(6, 0, 0, 0))
         keep = self.fade_in.sizePolicy()
         keep.setRetainSizeWhenHidden(True)
@@ -341,9 +325,7 @@ ALL_ROWS = 99
 
 
 class DeviceCard(Card):
-    """Name, state and rows; ``diagnose_asked`` when the operator wants to know what is wrong with it."""
-
-    diagnose_asked = Signal()
+    """Name, state and rows of the device."""
 
     def __init__(self) -> None:
         super().__init__(padding=16, gap=10)
@@ -352,7 +334,6 @@ class DeviceCard(Card):
         self.chip = Chip("neutral", "ring", "Waiting", small=True)
         self.diagnose = ActionButton("pulse", "Diagnose …", key="D", height=36)
         self.diagnose.setToolTip("Turns the force off and pauses first")
-        self.diagnose.clicked.connect(self.diagnose_asked)
         self._most = ALL_ROWS
         self._view: DeviceView | None = None
         row = hbox(self.icon, self.name, STRETCH, self.chip, spacing=10)

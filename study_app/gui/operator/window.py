@@ -4,7 +4,6 @@ It draws an ``OperatorView`` and two plots, and says what the operator asks for;
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
@@ -13,19 +12,18 @@ from PySide6.QtGui import QCloseEvent, QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QMainWindow, QWidget
 
 from study_app.gui.operator.controls import ALL_ROWS, Actions, DeviceCard, NotesCard, ReasonQuestion, StopPanel
-from study_app.gui.operator.header import Banner, Header
 from study_app.gui.operator.operator_view import NOTES_SHOWN, OperatorView
 from study_app.gui.operator.plots import ForceCard, HiddenForceCard, LatenessCard, PositionCard, Tiles
 from study_app.gui.operator.servo_health import Forces, ServoHealth
-from study_app.gui.operator.steps import NARROW, SLIM, WIDTH, Rail
+from study_app.gui.operator.session_panels import NARROW, SLIM, WIDTH, Banner, Header, Rail
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import add_layout, vbox
 from study_app.gui.widgets.cards import Card, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Notice
-from study_app.gui.widgets.escape_key import EscapeKey
 from study_app.gui.widgets.failed_panel import Panels
+from study_app.gui.widgets.main_view import EscapeKey
 
 Width = Literal["wide", "narrow", "slim"]
 Height = Literal["high", "low", "lower", "least"]
@@ -44,32 +42,15 @@ SIGNS_FROM = 690  # so wide a row of buttons has room for their signs
 GAP = 10
 
 
-@dataclass(frozen=True, slots=True)
-class Pieces:
-    """The cockpit's parts."""
-
-    header: Header
-    banner: Banner
-    rail: Rail
-    tiles: Tiles
-    lateness: Card
-    force: Card
-    position: Card
-    device: DeviceCard
-    notes: NotesCard
-    stop: StopPanel
-    buttons: Actions
-
-
 class Arrangement(QWidget):
     """The window's whole content: header, rail, middle and side."""
 
-    def __init__(self, pieces: Pieces) -> None:
+    def __init__(self, window: "OperatorWindow") -> None:
         super().__init__()
         self.setProperty("role", "window")
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.setAccessibleName("Operator's window")
-        self._pieces = p = pieces
+        self._parts = p = window
         self._arranged: tuple[object, ...] = ()
         self.now = Card(padding=14, gap=10)
         self._middle = QGridLayout()
@@ -107,12 +88,12 @@ class Arrangement(QWidget):
         self._arranged = (width, height, across, signs)
         self._set_width(width)
         self._set_height(height)
-        self._pieces.buttons.narrow(not signs)
-        self._pieces.buttons.hint.setVisible(width == "wide")
+        self._parts.buttons.narrow(not signs)
+        self._parts.buttons.hint.setVisible(width == "wide")
         self._fill_middle(across=across)
 
     def _set_width(self, width: Width) -> None:
-        rail, slim = self._pieces.rail, width == "slim"
+        rail, slim = self._parts.rail, width == "slim"
         if slim:
             rail.give_away()
             self.now.column.addWidget(rail.now)
@@ -126,15 +107,15 @@ class Arrangement(QWidget):
         self._body.setHorizontalSpacing(GAPS[width])
         self._body.addWidget(rail, 0, 0, 1 if slim else 2, 1)
         self._body.addWidget(self.middle_area, 0, 1)
-        self._body.addWidget(self._pieces.buttons, 1, 0 if slim else 1, 1, 2 if slim else 1)
+        self._body.addWidget(self._parts.buttons, 1, 0 if slim else 1, 1, 2 if slim else 1)
 
     def _set_height(self, height: Height) -> None:
-        self._pieces.stop.setFixedSize(SIDE, STOPS[height])
-        self._pieces.notes.show_lines(NOTES[height])
-        self._pieces.device.show_rows(DEVICE_ROWS[height])
+        self._parts.stop.setFixedSize(SIDE, STOPS[height])
+        self._parts.notes.show_lines(NOTES[height])
+        self._parts.device.show_rows(DEVICE_ROWS[height])
 
     def _fill_middle(self, *, across: bool) -> None:
-        p, span = self._pieces, 1 if across else 2
+        p, span = self._parts, 1 if across else 2
         for card, least in ((p.lateness, 210), (p.force, 210), (p.position, 170)):
             card.setMinimumHeight(least)
         p.tiles.narrow(not across)
@@ -226,21 +207,7 @@ class OperatorWindow(QMainWindow):
         )
         self.question: ReasonQuestion | None = None
         self.escape = EscapeKey(self, anywhere=True)
-        self.arrangement = Arrangement(
-            Pieces(
-                header=self.header,
-                banner=self.banner,
-                rail=self.rail,
-                tiles=self.tiles,
-                lateness=self.lateness,
-                force=self.force,
-                position=self.position,
-                device=self.device,
-                notes=self.notes,
-                stop=self.stop,
-                buttons=self.buttons,
-            )
-        )
+        self.arrangement = Arrangement(self)
         self.setCentralWidget(self.arrangement)
         self.arrangement.setFocus()
         self._connect()
@@ -248,21 +215,22 @@ class OperatorWindow(QMainWindow):
         apply_theme(self, theme)
 
     def _connect(self) -> None:
-        self.header.theme_asked.connect(self._change_theme)
-        self.header.page_asked.connect(self.page_asked)
-        self.stop.stop_asked.connect(self.stop_asked)
-        self.stop.fade_in_asked.connect(self.fade_in_asked)
+        self.header.theme_button.clicked.connect(self._change_theme)
+        self.header.page.clicked.connect(self.page_asked)
+        # Pressed, not clicked: the force goes with the finger's first touch.
+        self.stop.stop.pressed.connect(self.stop_asked)
+        self.stop.fade_in.clicked.connect(self.fade_in_asked)
         self.escape.held.connect(self.stop_asked)
         self.buttons.pause_asked.connect(self.pause_asked)
         self.buttons.resume_asked.connect(self.resume_asked)
-        self.buttons.repeat_asked.connect(self.ask_to_repeat)
-        self.buttons.exclude_asked.connect(self.ask_to_exclude)
-        self.buttons.end_asked.connect(self.ask_to_end)
-        self.buttons.close_asked.connect(self.close)
+        self.buttons.repeat.clicked.connect(self.ask_to_repeat)
+        self.buttons.exclude.clicked.connect(self.ask_to_exclude)
+        self.buttons.end.clicked.connect(self.ask_to_end)
+        self.buttons.close_session.clicked.connect(self.close)
         self.notes.note_written.connect(self.note_written)
-        self.notes.mark_set.connect(self.mark_set)
-        self.device.diagnose_asked.connect(self.diagnose_asked)
-        self.banner.reconnect_asked.connect(self.reconnect_asked)
+        self.notes.mark.clicked.connect(self.mark_set)
+        self.device.diagnose.clicked.connect(self.diagnose_asked)
+        self.banner.reconnect.clicked.connect(self.reconnect_asked)
 
     def show_view(self, view: OperatorView) -> None:
         """Show everything but the plots; trouble first, for it may be that one of the parts cannot be shown."""

@@ -25,7 +25,7 @@ from study_app.gui.participant.pages.page_widget import DigitPad, page_painter, 
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
-from study_app.gui.widgets.number_field import read_number, write_number
+from study_app.gui.widgets.numbers import read_number, write_number
 from study_app.protocol.questions import (
     ChoiceView,
     ItemView,

@@ -17,8 +17,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.gui.participant.intervals.answer_page import SettingControls
 from study_app.gui.participant.pages.page_widget import page_painter
-from study_app.gui.participant.tank import sprites
-from study_app.gui.participant.tank.backdrop import Backdrop, backdrop
+from study_app.gui.participant.tank import layers as sprites
 from study_app.gui.participant.tank.captions import Captions
 from study_app.gui.participant.tank.frame import (
     DEPTH_STEPS,
@@ -35,7 +34,15 @@ from study_app.gui.participant.tank.frame import (
     paint_marks,
     target_place,
 )
-from study_app.gui.participant.tank.layers import OnsetPatch, VideoLayer, paint_patch, patch_place, video_place
+from study_app.gui.participant.tank.layers import (
+    Backdrop,
+    OnsetPatch,
+    VideoLayer,
+    backdrop,
+    paint_patch,
+    patch_place,
+    video_place,
+)
 from study_app.gui.theme.theme import TANK
 from study_app.gui.widgets.accessible import say
 from study_app.protocol.model import Explore, Follow, Reach

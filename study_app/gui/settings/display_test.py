@@ -14,7 +14,7 @@ from PySide6.QtCore import QRect, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QImage, QKeyEvent, QPainter, QPaintEvent, QScreen
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QSizePolicy, QWidget
 
-from study_app.gui.display.frame_clock import Frames
+from study_app.gui.display.screens import Frames
 from study_app.gui.kit.fields import LEAST_WORDS
 from study_app.gui.participant.tank.layers import paint_patch, patch_place
 from study_app.gui.theme.theme import PARTICIPANT, font
@@ -23,7 +23,7 @@ from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import figures, label
-from study_app.gui.widgets.number_field import NumberField, read_number, write_number
+from study_app.gui.widgets.numbers import NumberField, read_number, write_number
 from study_app.store.workstation import OFFSET_MS, SPREAD_MS, DisplayOffset
 
 LEAST_S: Final = 2.0

@@ -1,9 +1,78 @@
-"""The interface of a place of the main window: it fills the window, is entered and left, and has its own shortcuts."""
+"""What places and windows have in common: Esc that stops the force, the interface of a place."""
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QWindow
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.theme.themed import Themed
+
+HOLD_MS = 600
+
+
+class EscapeKey(QObject):
+    """An event filter that sees Esc go down and up, whichever part of a window has the keyboard.
+
+    ``held`` comes once it has been down for 600 ms, whatever is shown meanwhile, ``tapped`` where it came up before.
+    The keyboard's own repetition counts for neither. A window that is left ends a hold without either.
+
+    Parameters
+    ----------
+    anywhere
+        Whether it listens by itself to the window of the program that has the keyboard, later ones too. A question
+        closes when Esc goes down, and a page may take the keyboard while it is down: then only the release ends a hold,
+        in whatever window that is. A hold that began in the window it was left to (``leave_to``) is that window's, as
+        long as no other one of the program has got the keyboard since.
+    """
+
+    held = Signal()
+    tapped = Signal()
+
+    def __init__(self, parent: QObject, *, anywhere: bool = False) -> None:
+        super().__init__(parent)
+        self._anywhere = anywhere
+        self._aside: QWidget | None = None
+        self._began_aside = False
+        self._watched: QWindow | None = None
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(HOLD_MS)
+        self._timer.timeout.connect(self._fire)
+        application = QGuiApplication.instance()
+        if anywhere and isinstance(application, QGuiApplication):
+            application.focusWindowChanged.connect(self._watch)
+            self._watch(QGuiApplication.focusWindow())
+
+    def leave_to(self, window: QWidget) -> None:
+        self._aside = window
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        kind = event.type()
+        if kind == QEvent.Type.WindowDeactivate and not self._anywhere:
+            self._timer.stop()
+        if not isinstance(event, QKeyEvent) or event.key() != Qt.Key.Key_Escape or event.isAutoRepeat():
+            return False
+        if kind == QEvent.Type.KeyPress and not self._timer.isActive():
+            self._began_aside = self._is_aside(watched)
+            self._timer.start()
+        elif kind == QEvent.Type.KeyRelease and self._timer.isActive():
+            self._timer.stop()
+            self.tapped.emit()
+        return False
+
+    def _watch(self, window: QWindow | None) -> None:
+        """Listen to the window that has the keyboard now: no other one receives keys."""
+        if window is not None and window is not self._watched:
+            window.removeEventFilter(self)  # one that comes back is listened to once
+            window.installEventFilter(self)
+        self._watched = window
+
+    def _is_aside(self, window: QObject | None) -> bool:
+        return window is not None and self._aside is not None and window is self._aside.windowHandle()
+
+    def _fire(self) -> None:
+        now = QGuiApplication.focusWindow()
+        if not (self._began_aside and (now is None or self._is_aside(now))):
+            self.held.emit()
 
 
 class Place(Themed, QWidget):

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.operator.header import Strip
+from study_app.gui.operator.session_panels import Strip
 from study_app.gui.widgets.dialogs import Notice
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
 from study_app.session.pages import EndPage, PausePage, TaskPage, TroublePage

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
 from study_app.errors import DeviceNotFound, ServoFault, StoreError, VideoError
-from study_app.gui.operator.header import Strip
+from study_app.gui.operator.session_panels import Strip
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
 from study_app.session.transitions.events import Continue, ForceStopped
 from tests.app.world import World

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialog, QLineEdit, QVBoxLayout, QWidget
 
 from study_app.app.session.bridge import SessionBridge
-from study_app.gui.widgets import escape_key
+from study_app.gui.widgets import main_view as escape_key
 from study_app.session.pages import PausePage, TaskPage
 from study_app.session.transitions.events import Continue
 from tests.app.world import World, begin_trial

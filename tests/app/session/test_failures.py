@@ -10,7 +10,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.widgets.dialogs import Notice
-from study_app.gui.widgets.escape_key import EscapeKey
+from study_app.gui.widgets.main_view import EscapeKey
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.session.transitions.events import EndRequested
 from tests.app.world import begin_trial
@@ -115,8 +115,8 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
         ("operator.controls.NoteField", "toPlainText", write_note, "Notes"),
         ("operator.plots.PositionCard", "show_health", lambda bridge: bridge.show_traces(), "Position"),
         ("widgets.live_plots.Plot", "paintEvent", lambda it: it.operator.position.plot.viewport().update(), "Position"),
-        ("operator.steps.Rail", "paintEvent", lambda bridge: bridge.operator.rail.update(), "Session"),
-        ("operator.steps.Tally", "show_view", lambda bridge: bridge.operator.mark_set.emit(), "Counts"),
+        ("operator.session_panels.Rail", "paintEvent", lambda bridge: bridge.operator.rail.update(), "Session"),
+        ("operator.session_panels.Tally", "show_view", lambda bridge: bridge.operator.mark_set.emit(), "Counts"),
     ],
 )
 def test_a_panel_that_fails_is_replaced_by_a_line_and_the_session_goes_on(

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.app.session import live_session
 from study_app.app.session.live_session import BUG, LiveSession
 from study_app.errors import SessionError, StoreError
-from study_app.gui.display.frame_clock import Frames
+from study_app.gui.display.screens import Frames
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import LIGHT

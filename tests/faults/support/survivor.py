@@ -19,7 +19,7 @@ from study_app import app
 from study_app.app.session import live_session
 from study_app.devices.rig import Rig
 from study_app.gui.application import application_here
-from study_app.gui.operator.steps import StepLine
+from study_app.gui.operator.session_panels import StepLine
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.widgets.dialogs import Notice

@@ -10,7 +10,7 @@ from PySide6.QtCore import QTimer
 from study_app import app
 from study_app.errors import DisplayError
 from study_app.gui.display.display_check import check_display, missing_library
-from study_app.gui.display.frame_clock import LEAD_NS, STALE_REFRESHES, Frames
+from study_app.gui.display.screens import LEAD_NS, STALE_REFRESHES, Frames
 
 MS = 1_000_000
 

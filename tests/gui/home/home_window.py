@@ -2,6 +2,7 @@
 
 from PySide6.QtCore import Qt
 
+from study_app.designer.versions import draft_words
 from study_app.gui.home.cards import StudyCard
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.view import HomePlace
@@ -24,7 +25,7 @@ def hold(folder, participant, *, simulated=False):
 
 def open_home(qtbot, results, size=None):
     others = dict.fromkeys(("designer", "lab", "results", "devices", "machine", "help"), Place)
-    window = MainWindow({"home": lambda: HomePlace(results), **others})
+    window = MainWindow({"home": lambda: HomePlace(results, lambda: draft_words), **others})
     qtbot.addWidget(window)
     if size is not None:
         window.resize(size)

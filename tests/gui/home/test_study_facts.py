@@ -28,7 +28,7 @@ from study_app.gui.sessions.session_facts import (
     status_chip,
     validity_chip,
 )
-from study_app.gui.sessions.session_record import read_record
+from study_app.gui.sessions.session_page import read_record
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.session.resume import REHEARSED_SCREENS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QFileDialog
 
-from study_app.gui.lab.lab_plots import thinned
+from study_app.gui.lab.cards import thinned
 from study_app.gui.lab.lab_state import LSL, SOURCES, EstimateRow, EstimateShown, LabView
 from tests.gui.lab.sample import heard
 

@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 
 from study_app.gui.lab.lab_state import LabView
 from study_app.gui.lab.parameters import OFF, NumberRow
-from study_app.gui.widgets.escape_key import HOLD_MS, EscapeKey
+from study_app.gui.widgets.main_view import HOLD_MS, EscapeKey
 from tests.gui.lab.sample import blind, heard
 from tests.gui.walk import settle
 

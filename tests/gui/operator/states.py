@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from study_app.gui.operator.header import Strip
 from study_app.gui.operator.servo_health import Forces
+from study_app.gui.operator.session_panels import Strip
 from study_app.gui.operator.window import OperatorWindow
 from study_app.haptics.model.layout import LIMITER_NORM, SAMPLE, records
 from tests.gui.operator.session import measured_health, new_session

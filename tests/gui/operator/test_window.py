@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.operator.window import OperatorWindow
-from study_app.gui.widgets.escape_key import HOLD_MS
+from study_app.gui.widgets.main_view import HOLD_MS
 
 pytestmark = pytest.mark.slow
 

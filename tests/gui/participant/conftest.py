@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtGui import QPointingDevice
 from PySide6.QtTest import QTest
 
-from study_app.gui.participant.pointer_capture import PointerCapture
 from study_app.gui.participant.tank_widget import TankWidget
+from study_app.gui.participant.window import PointerCapture
 from study_app.protocol.wording.languages import words
 from tests.gui.participant.driver import Participant
 from tests.gui.small import task_page

@@ -14,7 +14,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, QWidget
 
 from study_app.gui.participant.intervals.answer_page import STEP_MS
-from study_app.gui.participant.pointer_capture import PointerCapture
+from study_app.gui.participant.window import PointerCapture
 from study_app.protocol.questions import ChoiceView, NumberView
 from study_app.protocol.trials.tasks import lasting
 from study_app.protocol.wording.languages import LANGUAGES, words

@@ -16,7 +16,7 @@ import json, os, sys
 import numpy as np
 from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
-from study_app.gui.display.frame_clock import Frames
+from study_app.gui.display.screens import Frames
 from study_app.gui.display.screens import has_card, renderer
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.protocol.wording.languages import words

@@ -15,7 +15,7 @@ import json, subprocess, time
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication, QWidget
-from study_app.gui.participant.pointer_capture import PointerCapture
+from study_app.gui.participant.window import PointerCapture
 
 app = QApplication([])
 window = QWidget()

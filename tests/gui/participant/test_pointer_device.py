@@ -8,7 +8,7 @@ from PySide6.QtGui import QCursor, QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.participant.pointer_capture import NOTCHES, SHARE_OF_SCREEN, PointerCapture
+from study_app.gui.participant.window import NOTCHES, SHARE_OF_SCREEN, PointerCapture
 from study_app.session.pages import Page
 from study_app.session.transitions.events import PauseRequested
 from tests.gui.participant.driver import Participant

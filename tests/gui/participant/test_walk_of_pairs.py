@@ -18,7 +18,7 @@ pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missi
 from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QWidget
 
-from study_app.gui.operator.header import Strip
+from study_app.gui.operator.session_panels import Strip
 from study_app.gui.participant.forms.questions_page import FormWidget
 from study_app.gui.participant.intervals.answer_page import ChoiceWidget, NumberWidget
 from study_app.gui.participant.window import ParticipantWindow

@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
 from study_app.gui.participant.window import LEAST_SIZE
-from study_app.gui.widgets.escape_key import HOLD_MS, EscapeKey
+from study_app.gui.widgets.main_view import HOLD_MS, EscapeKey
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import EndPage, FeedbackPage, Page, PausePage, TroublePage
 from study_app.session.transitions.events import Chosen, Continue, ForceStopped, PauseRequested, ResumeRequested

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from study_app.gui.results.results_state import FigureShown, LeftOut, ResultsView, StudyChoice
+from study_app.gui.results.figures import FigureShown, LeftOut, ResultsView, StudyChoice
 from study_app.gui.sessions.session_facts import SessionFacts
 
 COLOURS = {"text": "#13202c", "accent": "#0b65a3", "grid": "#e6ebef", "band": "#c8dded"}

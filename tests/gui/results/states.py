@@ -10,9 +10,8 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from study_app.errors import StoreError
-from study_app.gui.results.results_state import FigureShown, Going, Opened, Trouble
-from study_app.gui.sessions.session_page import SessionPage
-from study_app.gui.sessions.session_record import MOTION_HIDDEN, SessionRecord, TrialRecord
+from study_app.gui.results.figures import FigureShown, Going, Opened, Trouble
+from study_app.gui.sessions.session_page import MOTION_HIDDEN, SessionPage, SessionRecord, TrialRecord
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
 from study_app.store.exclusions import Exclusion

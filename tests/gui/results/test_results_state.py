@@ -3,8 +3,7 @@
 import pytest
 from PySide6.QtCore import QSize
 
-from study_app.gui.results.figures import drawn, themed_svg
-from study_app.gui.results.results_state import in_figures
+from study_app.gui.results.figures import drawn, in_figures, themed_svg
 from study_app.gui.sessions.session_facts import matching, states_of
 from study_app.gui.theme.theme import DARK, LIGHT
 from tests.gui.results.sample import COLOURS, SVG, facts

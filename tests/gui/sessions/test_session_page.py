@@ -9,8 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 
 from study_app.gui.sessions.session_facts import sessions
-from study_app.gui.sessions.session_page import SessionPage
-from study_app.gui.sessions.session_record import MOTION_HIDDEN, read_record
+from study_app.gui.sessions.session_page import MOTION_HIDDEN, SessionPage, read_record
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load, source_bytes
 from study_app.session.simulated.rehearsal import rehearse

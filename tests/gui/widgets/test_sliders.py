@@ -10,8 +10,7 @@ from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from study_app.gui.widgets.number_field import NumberField, read_number, write_number
-from study_app.gui.widgets.sliders import Range
+from study_app.gui.widgets.numbers import NumberField, Range, read_number, write_number
 
 SPANS = [
     Range(0.0, 1.0),

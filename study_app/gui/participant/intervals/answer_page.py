@@ -14,7 +14,7 @@ from study_app.gui.participant.pages.text_page import Badge
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import HeadingLabel, say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.number_field import read_number
+from study_app.gui.widgets.numbers import read_number
 from study_app.protocol.questions import Value, plain_number
 from study_app.protocol.wording.languages import Words
 from study_app.session.device_buttons import STEP_S
