@@ -1,20 +1,14 @@
-"""Exactly what scheduling needs to know of a study: no conditions, no texts, no tasks.
-
-It comes from a protocol, or from the protocol without its conditions that a session's receipt holds; both give the same
-value, so that an order can be made again without opening the key.
-"""
+"""Exactly what scheduling needs to know of a study: no conditions, no texts, no tasks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict
 
-from study_app.errors import StudyError
 from study_app.protocol.blocks import Block, Order, Phase
-from study_app.protocol.groups import Group, every_step, numbered_parts, sessions_differ, steps_of
+from study_app.protocol.groups import Group, every_step
 from study_app.protocol.model import Protocol, Questionnaire
-from study_app.protocol.orders.sequences import Constraint
 from study_app.protocol.trials.methods import TrackOrder
 from study_app.protocol.trials.tracks import method_of, tracks_of
 
@@ -22,33 +16,26 @@ CodeOrder: TypeAlias = Literal[Order, TrackOrder]
 """How the codes of a block are ordered: conditions, or the tracks of a design."""
 
 
-class _Kept(BaseModel):
-    """The base of what is read from a receipt, which holds more than is asked for here."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
-
-
-class BlockOrder(_Kept):
+@dataclass(frozen=True, slots=True)
+class BlockOrder:
     """A block as scheduling sees it: its codes, how they are ordered, and the ids of what is asked.
 
-    ``slots`` says per code how long its track is; empty in a block without a design. ``questionnaire`` is where a
-    receipt has the ids of what is asked.
+    ``slots`` says per code how long its track is; empty in a block without a design.
     """
 
-    id: str = ""
+    id: str
     phase: Phase
     part: int | None
-    codes: tuple[str, ...] = Field(min_length=1)
+    codes: tuple[str, ...]
     order: CodeOrder
-    max_repeats: int | None = Field(default=None, ge=1)
-    min_distance: int | None = Field(default=None, ge=1)
-    repetitions: int = Field(ge=1)
-    break_every: int | None = Field(default=None, ge=1)
+    repetitions: int
+    max_repeats: int | None = None
+    min_distance: int | None = None
+    break_every: int | None = None
     break_page: str | None = None
     items: tuple[str, ...] = ()
     item_order: Literal["fixed", "shuffled"] = "fixed"
-    slots: tuple[Annotated[int, Field(ge=1)], ...] = ()
-    questionnaire: str | None = None
+    slots: tuple[int, ...] = ()
 
     @property
     def trials(self) -> int:
@@ -120,29 +107,11 @@ def order_of(protocol: Protocol, block: Block) -> BlockOrder:
     return BlockOrder(id=block.id, codes=codes, order=order, slots=slots, **about)
 
 
-class _KeptItem(_Kept):
-    id: str
-
-
-class _KeptQuestionnaire(_Kept):
-    items: tuple[_KeptItem, ...]
-    item_order: Literal["fixed", "shuffled"]
-
-
-class _KeptStudy(_Kept):
-    name: str
-
-
-class _KeptSteps(_Kept):
+class _KeptSteps(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
     sequence: tuple[str, ...] = ()
     sequences: tuple[tuple[str, ...], ...] = ()
     groups: dict[str, Group] = {}
-
-
-class _KeptProtocol(_KeptSteps):
-    study: _KeptStudy
-    blocks: dict[str, BlockOrder]
-    questionnaires: dict[str, _KeptQuestionnaire]
 
 
 def every_step_of(protocol: Mapping[str, Any]) -> tuple[str, ...]:
@@ -150,57 +119,8 @@ def every_step_of(protocol: Mapping[str, Any]) -> tuple[str, ...]:
     return every_step(_KeptSteps.model_validate(protocol))
 
 
-def orders_of_receipt(protocol: Mapping[str, Any], *, group: str | None = None, session: int = 1) -> Orders:
-    """Return what scheduling needs of the protocol in a receipt: without conditions, blocks with their codes.
-
-    StudyError says that it does not state the orders, since it was changed or is of a version that this one does not
-    know, or that the participant, of ``group`` in a study with groups, has fewer sessions.
-    """
-    try:
-        kept = _KeptProtocol.model_validate(protocol)
-        if group is not None and group not in kept.groups:
-            raise _incomplete("groups", f'there is no group "{group}"')
-        shown = steps_of(kept, group, session)
-        if sessions_differ(kept):
-            numbers = numbered_parts(shown, {name: block.part for name, block in kept.blocks.items()})
-            own = {
-                name: block.model_copy(update={"part": numbers.get(name, block.part)})
-                for name, block in kept.blocks.items()
-            }
-            kept = kept.model_copy(update={"blocks": own})
-        forms = kept.questionnaires
-        blocks = {}
-        for name, block in kept.blocks.items():
-            questions = _items(None if block.questionnaire is None else forms[block.questionnaire])
-            blocks[name] = block.model_copy(update={"id": name, "questionnaire": None, **questions})
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise _incomplete(".".join(str(step) for step in first["loc"]), first["msg"]) from error
-    except KeyError as error:
-        raise _incomplete("questionnaires", f"there is no {error}") from error
-    for block in blocks.values():
-        if block.order != "constrained":
-            continue
-        constraint = Constraint(block.max_repeats, block.min_distance)
-        if (impossible := constraint.impossible(len(block.codes), block.repetitions)) is not None:
-            key, sentence = impossible
-            raise _incomplete(f"blocks.{block.id}.{key}", sentence)
-    steps: dict[str, BlockOrder | FormOrder] = {
-        name: FormOrder(name, **_items(form)) for name, form in kept.questionnaires.items()
-    }
-    steps |= blocks
-    return Orders(kept.study.name, tuple(steps.get(step, step) for step in shown))
-
-
-def _items(questions: Questionnaire | _KeptQuestionnaire | None) -> dict[str, Any]:
+def _items(questions: Questionnaire | None) -> dict[str, Any]:
     """Return the ids of what is asked, and their order."""
     if questions is None:
         return {"items": (), "item_order": "fixed"}
     return {"items": tuple(item.id for item in questions.items), "item_order": questions.item_order}
-
-
-def _incomplete(place: str, what: str) -> StudyError:
-    return StudyError(
-        f"the receipt's protocol does not state the orders ({place}: {what}): it was changed, or written by another "
-        "version of the program; restore it from a copy"
-    )

@@ -1,7 +1,7 @@
 """What comes when: protocol, participant and seed give the session's steps, the same on every machine.
 
 Orders are orders of codes; what a code stands for is drawn once per study by :func:`draw_key` and sealed. So a schedule
-gives nothing away, and a receipt, which holds no conditions, is enough to make it again (see `block_orders`).
+gives nothing away.
 
 ==============  ========================================================================================================
 order           the codes of a block
@@ -20,20 +20,13 @@ williams latin  a row of a square, assigned by the number in the participant's i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import (
-    BlockOrder,
-    FormOrder,
-    Orders,
-    block_codes,
-    orders_of,
-    orders_of_receipt,
-)
+from study_app.protocol.orders.block_orders import BlockOrder, FormOrder, Orders, block_codes, orders_of
 from study_app.protocol.orders.sequences import Constraint, arrange, assigned_row, row, row_count
 from study_app.protocol.streams import Draw, shuffle, stream
 from study_app.protocol.trials.tracks import tracks_of
@@ -204,30 +197,26 @@ class RecordedTrial:
 
 
 def reproduce(
-    protocol: Mapping[str, Any],
+    protocol: Protocol,
     seed: int,
     participant: str,
     recorded: Iterable[RecordedTrial | int],
     *,
     complete: bool,
-    group: str | None = None,
-    session: int = 1,
     row_of: str | None = None,
 ) -> tuple[str, ...]:
-    """Return how the trials that were run differ from those that receipt, seed and participant give.
+    """Return how the trials that were run differ from those that protocol, seed and participant give.
 
-    ``protocol`` is that of the receipt (see `orders_of_receipt`, whose StudyError it raises); ``recorded`` is what was
-    run, in the order of time. A ``complete`` session went to its end, so that no trial may be missing. ``row_of`` is
-    the id whose rows of squares the session took, None the participant's own.
+    ``protocol`` is that of the session; ``recorded`` is what was run, in the order of time. A ``complete`` session went
+    to its end, so that no trial may be missing. ``row_of`` is the id whose rows of squares the session took, None the
+    participant's own.
     """
-    orders = orders_of_receipt(protocol, group=group, session=session)
-    planned = {trial.number: trial for trial in build_schedule(orders, participant, seed, row_of).trials}
+    planned = {trial.number: trial for trial in build_schedule(protocol, participant, seed, row_of).trials}
     attempts = tuple(recorded)
     run = [trial for trial in attempts if isinstance(trial, RecordedTrial)]
     found = [sentence for trial in run for sentence in _against(planned.get(trial.number), trial)]
     numbers = [trial if isinstance(trial, int) else trial.number for trial in attempts]
-    blocks = protocol["study"].get("resume") == "block"
-    found += _progress(numbers, planned, complete=complete, blocks=blocks)
+    found += _progress(numbers, planned, complete=complete, blocks=protocol.study.resume == "block")
     return tuple(dict.fromkeys(found))
 
 

@@ -1,27 +1,26 @@
 """A session's orders and levels made again and compared with its journal.
 
-Orders follow from the receipt; the key stays sealed, but for the group in a study with groups. Levels are opened with
-the key, in memory alone, and compared with those that follow from the answers before them, these taken at the levels
-presented, so that a difference does not propagate. No level is printed.
+Receipt and key, opened in memory alone, give the session's protocol. Levels are compared with those that follow from
+the answers before them, these taken at the levels presented, so that a difference does not propagate. No level is
+printed.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from study_app.errors import StoreError
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import orders_of_receipt
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import RecordedTrial, Schedule, build_schedule, reproduce
 from study_app.protocol.streams import Key, group_of
 from study_app.protocol.trials.presentation import arrangement_text, next_level
 from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store import receipt
+from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import opened, read_key, whole_protocol
-from study_app.store.folders import StudyFolder, locate
+from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.progress import trial_results
@@ -41,49 +40,39 @@ def reproduced(session_folder: Path) -> Reproduced:
     Raises
     ------
     StoreError
-        It is not a session folder, or its receipt or journal cannot be read.
+        It is not a session folder, or its receipt or journal, or the study's key, cannot be read.
     """
     study, folder = locate(session_folder)
-    ran, lines = receipt.read(folder.receipt), journal.read(folder.journal)
+    ran, lines, key = receipt.read(folder.receipt), journal.read(folder.journal), read_key(study.path)
+    if key.hash != ran["key_hash"]:
+        raise StoreError(f"{study.key} is not the key that {folder.path} ran under: restore it from a copy")
+    if lacking := [name for name in receipt.FIELDS if name not in ran]:
+        raise StoreError(f"{folder.receipt} lacks {', '.join(lacking)}: restore it from a copy")
+    seed, participant, row_of = ran["seed"], ran["participant"], ran.get("row_of")
+    complete = ran["status"] == "completed"
     try:
-        complete = ran["status"] == "completed"
+        protocol = own_protocol(whole_protocol(ran["protocol"], key), _group(lines, key), ran["session"])
+        schedule = build_schedule(protocol, participant, seed, row_of)
         recorded = recorded_trials(lines)
-        differences = reproduce(
-            ran["protocol"],
-            ran["seed"],
-            ran["participant"],
-            recorded,
-            complete=complete,
-            group=_group(study, lines),
-            session=ran["session"],
-            row_of=ran.get("row_of"),
-        )
-    except (KeyError, TypeError) as error:
-        raise StoreError(f"{folder.path}: receipt or journal lack {error}: verify the study's folder") from error
-    found = Reproduced([*differences])
+    except (KeyError, TypeError, AttributeError, ValueError):  # the reason could reveal a condition
+        raise StoreError(
+            f"{folder.path}: receipt, key and journal do not give the session: verify the study's folder"
+        ) from None
+    found = Reproduced([*reproduce(protocol, seed, participant, recorded, complete=complete, row_of=row_of)])
     if lines and events.start_of(lines).intervals:
-        _levels(study, ran, lines, found)
+        _levels(_Compared(protocol, Key(key.codes, key.nonce), schedule), lines, key, found)
     return found
 
 
-def _levels(study: StudyFolder, ran: Mapping[str, Any], lines: list[events.Event], found: Reproduced) -> None:
+def _levels(compared: "_Compared", lines: list[events.Event], key: blinding.Key, found: Reproduced) -> None:
     """Compare what each trial of intervals presented with what was due."""
     try:
-        key = read_key(study.path)
         lines = opened(lines, key)
+        for index, line in enumerate(lines):
+            compared.take(line, lines[:index])
     except StoreError as error:
         found.differences.append(f"levels cannot be compared: {error}")
         return
-    if key.hash != ran["key_hash"]:
-        found.differences.append("levels cannot be compared: the key is not the one that the session ran under")
-        return
-    try:
-        protocol = own_protocol(whole_protocol(ran["protocol"], key), _group(study, lines), ran["session"])
-        orders = orders_of_receipt(ran["protocol"], group=_group(study, lines), session=ran["session"])
-        schedule = build_schedule(orders, ran["participant"], ran["seed"], ran.get("row_of"))
-        compared = _Compared(protocol, Key(key.codes, key.nonce), schedule)
-        for index, line in enumerate(lines):
-            compared.take(line, lines[:index])
     except (KeyError, TypeError, AttributeError, ValueError, StopIteration):  # the reason could reveal a level
         found.differences.append("levels cannot be compared: receipt, key and journal do not give the levels")
         return
@@ -164,13 +153,10 @@ class _Compared:
         of_block[trial] = follows and of_block.get(trial, True)
 
 
-def _group(study: StudyFolder, lines: Sequence[events.Event]) -> str | None:
+def _group(lines: Sequence[events.Event], key: blinding.Key) -> str | None:
     """Return the group that the participant's entry gives, None in a study without groups."""
     entry = events.start_of(lines).entry
-    if entry is None:
-        return None
-    key = read_key(study.path)
-    return group_of(key.groups, key.nonce, entry)
+    return None if entry is None else group_of(key.groups, key.nonce, entry)
 
 
 def recorded_trials(lines: Iterable[events.Event]) -> tuple[RecordedTrial | int, ...]:
