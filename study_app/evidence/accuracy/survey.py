@@ -145,7 +145,7 @@ def evidence(found: tuple[Surveyed, ...]) -> Evidence:
         values = [f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured(reynolds))]
         laws.append((f"{reynolds:,g}", *values, _percent(spread(reynolds))))
     tables = (
-        Table(_HEADINGS, liquids, left=3),
+        Table(_HEADINGS, liquids, left=(0, 2)),
         Table(("Re", *PUBLISHED, "unsteady drag", "experiments", "spread"), laws),
     )
     text = f"{tables[0].markdown()}\n\n{_WHAT.format(highest)}\n\n{tables[1].markdown()}\n"

@@ -69,7 +69,7 @@ COMMANDS: Final = {
     "stability --delayed": Compared("stability --delayed out/delayed.csv"),
     "stability --delivered": Compared("stability --delivered"),
     "stability --estimation": Compared("stability --estimation 4"),
-    "stability --only": Compared("stability --cases 2 --only driver --to out", SECONDS),
+    "stability --only": Compared("stability --cases 2 --only driver", SECONDS),
     "stability --table": Compared("stability --table out/limits.csv"),
     "stability --velocity": Compared("stability --velocity", columns=("line", "foaw", "lead"), lines="^cost"),
     "stability --withheld": Compared("stability --withheld"),
@@ -148,7 +148,7 @@ def _compared_lines(compared: Compared, file: Path) -> Iterator[str]:
             continue
         kept = re.sub("-+", "-", line.replace(" ", "")) if re.fullmatch(r"\|[-:| ]+\|", line) else line
         if compared.columns:
-            cells = _cells(line, file.suffix)
+            cells = _cells(kept, file.suffix)
             dropped = [k for k, cell in enumerate(cells) if cell in compared.columns] or dropped
             if len(cells) > 1:
                 kept = " | ".join(cell for k, cell in enumerate(cells) if k not in dropped)
