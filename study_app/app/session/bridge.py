@@ -37,10 +37,16 @@ from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
 from study_app.session.resume import FIRST, Start, resume_at
 from study_app.session.runner import Runner
-from study_app.session.simulated.observers import Hand
-from study_app.session.transitions.events import Begin, Continue, Event, ForceStopped, PauseRequested, Reconnected, broken
 from study_app.session.simulated.observers import Hand, hand_for, rest
-from study_app.session.transitions.events import Begin, Continue, Event, ForceStopped, PauseAsked, Reconnected, broken
+from study_app.session.transitions.events import (
+    Begin,
+    Continue,
+    Event,
+    ForceStopped,
+    PauseRequested,
+    Reconnected,
+    broken,
+)
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.blinding import opened
 from study_app.store.exclusions import exclude

@@ -29,8 +29,7 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.tasks import Stroke
-from study_app.session.preflight import Measurements, checks
-from study_app.session.preflight import Check, Facts, Screen, checks
+from study_app.session.preflight import Check, Measurements, Screen, checks
 from study_app.session.start import NewSession, Ready, measured
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.folders import StudyFolder, locate

@@ -9,10 +9,9 @@ from typing import Any, Final
 from study_app.designer.document.fields import Row, counted_elements, label_of, refused_at, row_at, rows, singular
 from study_app.designer.document.names import ITEMS, named_at, uses
 from study_app.designer.document.study import Study
-from study_app.number_text import counted
+from study_app.number_text import counted, exact_duration
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, entries, has, value_at
-from study_app.viewmodels.number_words import exact_duration
 
 TITLES: Final = ("title", "short", "text")
 """Keys of texts that an element is called by, the first that it has."""

@@ -23,7 +23,7 @@ from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedSente
 from study_app.designer.place.requests import AddElement, AddEntry, RemoveKey, Request, SetValue, Several
 from study_app.designer.place.segments import Segments
 from study_app.gui.kit.commands import with_key
-from study_app.gui.theme.theme import TypeRole, font
+from study_app.gui.theme.theme import Tone, TypeRole, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
@@ -32,7 +32,6 @@ from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.protocol.orders.sequences import borders_even, row_count
 from study_app.protocol.source.document import entries, value_at
 from study_app.protocol.wording.languages import language_name
-from study_app.viewmodels.tones import Tone
 
 ROUNDS: Final = 3
 SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "williams", "latin": "latin"}

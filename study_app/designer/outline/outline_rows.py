@@ -4,16 +4,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
 
-from study_app.designer.document.edited_study import Study
-from study_app.designer.document.elements import Element, found, outline, title_of
-from study_app.designer.document.initial_values import singular
-from study_app.designer.form.element_facts import brief
-from study_app.designer.problems.finding import LABEL, FoundField, found_in_elements
-from study_app.number_text import counted, duration
-from study_app.designer.document.elements import FIRST, LABEL, Element, FoundField, brief, found, found_in_elements, outline, title_of
+from study_app.designer.document.elements import (
+    FIRST,
+    LABEL,
+    Element,
+    FoundField,
+    brief,
+    found,
+    found_in_elements,
+    outline,
+    title_of,
+)
 from study_app.designer.document.fields import singular
 from study_app.designer.document.study import Study
-from study_app.number_text import counted
+from study_app.number_text import counted, duration
 from study_app.protocol.source.document import Path, entries, names, value_at
 
 ICONS: Final = {
