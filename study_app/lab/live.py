@@ -95,12 +95,7 @@ class Reading:
 
 
 class Live:
-    """One device's servo in the lab.
-
-    Parameters
-    ----------
-    rig : an opened device and its servo, whose ``rate_hz`` is the rate of all scenes here
-    """
+    """An opened device and its servo in the lab; the servo's ``rate_hz`` is the rate of all scenes here."""
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig

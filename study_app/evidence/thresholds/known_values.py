@@ -38,7 +38,7 @@ from study_app.haptics.model.overrides import override
 from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.simulated import OBSERVER, Observer, simulate_study
+from study_app.protocol.simulated import OBSERVER, Observer, as_requested, simulate_study
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
 from study_app.psychophysics.precision import ESTIMATE_NOISE
@@ -128,11 +128,12 @@ class KnownValue(ABC):
         errors = [self.error([one.value for own in found.own[:people] for one in own]) for found in studies]
         return float(np.std(errors, ddof=1))
 
-    def _simulated(self, observers: Sequence[Observer], seed: int, number: int, felt: Any = None) -> pd.DataFrame:
-        """Return the answers in the block; ``felt`` is what reaches the hand in place of what is presented."""
+    def _simulated(
+        self, observers: Sequence[Observer], seed: int, number: int, sense: Callable[[Any], float] = as_requested
+    ) -> pd.DataFrame:
+        """Return the answers in the block; ``sense`` returns what observers attend to in an interval."""
         who = {f"P{at:03d}": observer for at, observer in enumerate(observers, start=1)}
-        reached = () if felt is None else (felt,)
-        rows = pd.DataFrame(simulate_study(self.protocol, who, seed, f"validate/{self.name}/{number}", *reached))
+        rows = pd.DataFrame(simulate_study(self.protocol, who, seed, f"validate/{self.name}/{number}", sense))
         return rows[rows["block"] == self.block.id]
 
     def _coverage(self, studies: Sequence[StudyFound], truth: float) -> Verdict:
