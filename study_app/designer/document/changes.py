@@ -127,7 +127,7 @@ def filled_in(study: Study, code: str) -> tuple[Edit, ...]:
     found: list[Edit] = []
     for path, text in texts_of(study):
         if isinstance(text, Mapping) and code not in text and first in text:
-            found.append(Set((*path, code), _plain(text[first])))
+            found.append(Set((*path, code), (list(text[first]) if isinstance(text[first], tuple) else text[first])))
         elif isinstance(text, str):
             found.append(Set(path, {first: text, code: text}))
     return tuple(found)
@@ -146,10 +146,6 @@ def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:
     """Yield every text that is in the languages of a study, labels of scales included, with its place."""
     for pattern in TEXTS:
         yield from entries(study.document, pattern)
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
 
 
 def moved(study: Study, entries: Sequence[Path], to: int) -> tuple[tuple[Edit, ...], tuple[Path, ...]]:

@@ -21,28 +21,15 @@ FIRST: Final = ("study",)
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """One line of the outline.
+    """One line of the outline."""
 
-    Attributes
-    ----------
-    path : tuple of str or int
-        Where it is.
-    title, id : str
-        What it is called, and its name in the file.
-    depth : int
-        How far it is indented.
-    faults : int
-        How many faults are within it.
-    step : tuple of str or int
-        Its entry in the list that orders it: the session's or a questionnaire's; () without an order.
-    """
-
-    path: Path
+    path: Path  # where it is
+    # what it is called, and its name in the file
     title: str
     id: str
-    depth: int = 0
-    faults: int = 0
-    step: Path = ()
+    depth: int = 0  # how far it is indented
+    faults: int = 0  # how many faults are within it
+    step: Path = ()  # its entry in the list that orders it: the session's or a questionnaire's; () without an order
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,18 +207,15 @@ def used_by(document: Mapping[str, Any], path: Path) -> str:
     """
     if len(path) != 2 or path[0] not in USED:
         return ""
-    users = {_user(place) for place, used in uses(document) if used == path} - {path}
+    users = {(place[:4] if place[2:3] == (ITEMS,) else place[:2]) for place, used in uses(document) if used == path} - {
+        path
+    }
     counts = Counter(user[-2] for user in users)
     words = (
         counted(count, "step") if section == "sequence" else counted_elements(count, section)
         for section, count in sorted(counts.items())
     )
     return f"used by {', '.join(words)}" if counts else "not used"
-
-
-def _user(place: Path) -> Path:
-    """Return the element that a place belongs to: a question, a table of a section or a step."""
-    return place[:4] if place[2:3] == (ITEMS,) else place[:2]
 
 
 SHORTEST: Final = 3
@@ -242,23 +226,16 @@ _DEEPEST: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class FoundField:
-    """A field that was found.
+    """A field that was found."""
 
-    Attributes
-    ----------
-    element, field : tuple of str or int
-        The element, and the field in it.
-    label, choice, help : str
-        Its label, what is chosen in it where that was looked for, and what it is for.
-    rank : int
-        What was found: 0 its label, 1 what is chosen in it, 2 another choice, 3 only the sentence of a choice.
-    """
-
+    # the element, and the field in it
     element: Path
     field: Path
+    # its label, what is chosen in it where that was looked for, and what it is for
     label: str
     choice: str = ""
     help: str = ""
+    # what was found: 0 its label, 1 what is chosen in it, 2 another choice, 3 only the sentence of a choice
     rank: int = LABEL
 
 

@@ -163,53 +163,24 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row of a form.
+    """One row of a form."""
 
-    Attributes
-    ----------
-    path : tuple of str or int
-        The place in the document that it edits.
-    kind : str
-        How it is edited, see `Kind`.
-    label, unit, help : str
-        Its texts, "" if there are none.
-    value : object
-        The value in the file, None if the key is omitted.
-    default : object
-        The value if the key is omitted; None if there is no default.
-    required : bool
-        Whether the key cannot be omitted.
-    bounds : tuple of str
-        The permitted values as in messages: "at least 0", "at most 8".
-    reason : str
-        The reason of the bounds, "" if the model has none.
-    choices : tuple of Choice
-        The values that can be chosen, or named.
-    either : tuple of Row
-        Its alternatives, only of kind "either".
-    instead : str
-        The alternative key, exactly one of the two being given; "" if there is none.
-    model : str
-        The title of the model whose key it is, such as "Block".
-    sections : tuple of str
-        The sections whose tables are named, only of references.
-    """
-
-    path: Path
-    kind: Kind
+    path: Path  # the place in the document that it edits
+    kind: Kind  # how it is edited, see `Kind`
+    # its texts, "" if there are none
     label: str
     unit: str = ""
     help: str = ""
-    value: Any = None
-    default: Any = None
-    required: bool = False
-    bounds: tuple[str, ...] = ()
-    reason: str = ""
-    choices: tuple[Choice, ...] = ()
-    either: tuple[Row, ...] = ()
-    instead: str = ""
-    model: str = ""
-    sections: tuple[str, ...] = ()
+    value: Any = None  # the value in the file, None if the key is omitted
+    default: Any = None  # the value if the key is omitted; None if there is no default
+    required: bool = False  # whether the key cannot be omitted
+    bounds: tuple[str, ...] = ()  # the permitted values as in messages: "at least 0", "at most 8"
+    reason: str = ""  # the reason of the bounds, "" if the model has none
+    choices: tuple[Choice, ...] = ()  # the values that can be chosen, or named
+    either: tuple[Row, ...] = ()  # its alternatives, only of kind "either"
+    instead: str = ""  # the alternative key, exactly one of the two being given; "" if there is none
+    model: str = ""  # the title of the model whose key it is, such as "Block"
+    sections: tuple[str, ...] = ()  # the sections whose tables are named, only of references
 
 
 def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
@@ -252,7 +223,10 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
         return None
     key, named = tags(siblings)
     if key and key == path[-1]:
-        options = tuple(Choice(tag, _first_sentence(node)) for tag, node in named.items())
+        options = tuple(
+            Choice(tag, (" ".join(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0].split())))
+            for tag, node in named.items()
+        )
         part = around.get("properties", {}).get(key, {})
         default = part.get("default", None if None in named else part.get("const"))
         required = key in around.get("required", ())
@@ -273,7 +247,7 @@ def _row(document: Mapping[str, Any], path: Path, nodes: tuple[Node, ...], value
     first = nodes[0]
     common: dict[str, Any] = {
         "label": label_of(path[-1]),
-        "unit": unit_of(_last_key(path)),
+        "unit": unit_of(next((step for step in reversed(path) if isinstance(step, str)), "")),
         "help": first.get("description", ""),
         "value": value,
         "default": first.get("default", first.get("const")),
@@ -370,14 +344,6 @@ def unit_of(key: str) -> str:
 
 def _suffix(key: str) -> str:
     return max((suffix for suffix in UNITS if key.endswith(f"_{suffix}")), key=len, default="")
-
-
-def _last_key(path: Path) -> str:
-    return next((step for step in reversed(path) if isinstance(step, str)), "")
-
-
-def _first_sentence(node: Node) -> str:
-    return " ".join(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0].split())
 
 
 def _sentences(description: str) -> dict[str, str]:

@@ -121,7 +121,7 @@ def taken_beside(document: Document, thing: Path) -> set[str]:
     """Return the names that a table or item cannot have, since others have them."""
     if _item_id(document, thing) is None:
         return {*_siblings(document, thing)} - {str(thing[-1])}
-    return {str(other["id"]) for path, other in _items(document) if _in_same(thing, path) and path != thing}
+    return {str(other["id"]) for path, other in _items(document) if (thing[:2] == path[:2]) and path != thing}
 
 
 def replaced(document: Document, thing: Path, other: str) -> tuple[Edit, ...]:
@@ -167,7 +167,14 @@ def deletions(paths: Iterable[Path]) -> tuple[Edit, ...]:
     """Return the edits that remove all of these paths: later entries of an array first, nothing twice."""
     every = set(paths)
     outer = [path for path in every if not any(path[:length] in every for length in range(1, len(path)))]
-    return tuple(Unset(path) for path in sorted(outer, key=_sortable, reverse=True))
+    return tuple(
+        Unset(path)
+        for path in sorted(
+            outer,
+            key=lambda path: tuple((step, 0) if isinstance(step, str) else ("", step) for step in path),
+            reverse=True,
+        )
+    )
 
 
 def check_id(name: str, free: str = "") -> None:
@@ -260,10 +267,6 @@ def _in_reach(place: Path, item: Path) -> bool:
     return place[0] != item[0] or place[1] == item[1]
 
 
-def _in_same(one: Path, other: Path) -> bool:
-    return one[:2] == other[:2]
-
-
 def _siblings(document: Document, thing: Path) -> Iterable[str]:
     node: Any = document
     for step in thing[:-1]:
@@ -274,7 +277,3 @@ def _siblings(document: Document, thing: Path) -> Iterable[str]:
 def _matches(place: Path, pattern: str) -> bool:
     steps = pattern.split(".")
     return len(steps) == len(place) and all(step in {"*", str(one)} for step, one in zip(steps, place, strict=True))
-
-
-def _sortable(path: Path) -> tuple[tuple[str, int], ...]:
-    return tuple((step, 0) if isinstance(step, str) else ("", step) for step in path)

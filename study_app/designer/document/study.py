@@ -22,20 +22,11 @@ _NOT_TOML: Final = "the file cannot be read: correct its text first"
 
 @dataclass(frozen=True)
 class Study:
-    """A study's text, from which all else is computed.
+    """A study's text, from which all else is computed."""
 
-    Attributes
-    ----------
-    text : str
-        The file's text, with its own line breaks.
-    folder : Path
-        Where the liquid files are that it names.
-    before : mapping
-        The document of the last text that was valid TOML, used while this one is not.
-    """
-
-    text: str
-    folder: File = File()
+    text: str  # the file's text, with its own line breaks
+    folder: File = File()  # where the liquid files are that it names
+    # the document of the last text that was valid TOML, used while this one is not
     before: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @cached_property

@@ -17,34 +17,20 @@ MOST_PARTICIPANTS: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What a study is, in numbers: those that depend on a broken element are not known.
+    """What a study is, in numbers: those that depend on a broken element are not known."""
 
-    Attributes
-    ----------
-    expected_s : float or None
-        How long a session will take [s].
-    range_s : tuple of float or None
-        How long the shortest and the longest session will take [s].
-    steps_s : dict of str to float
-        How long each page, form and block will take [s], by its id.
-    trials, answers, breaks : int or None
-        How many a complete session has at most, practice included.
-    forces_n : dict of str to float
-        Force of each liquid [N] against a hand at 0.1 m/s.
-    missing : dict of str to int
-        How many texts each language lacks; none where it lacks none.
-    warnings : tuple of str
-        The warnings of ``check``, but those that take simulated observers, and what is to be translated.
-    """
-
-    expected_s: float | None = None
-    range_s: tuple[float, float] | None = None
+    expected_s: float | None = None  # how long a session will take [s]
+    range_s: tuple[float, float] | None = None  # how long the shortest and the longest session will take [s]
+    # how long each page, form and block will take [s], by its id
     steps_s: dict[str, float] = field(default_factory=dict)
+    # how many a complete session has at most, practice included
     trials: int | None = None
     answers: int | None = None
     breaks: int | None = None
-    forces_n: dict[str, float] = field(default_factory=dict)
+    forces_n: dict[str, float] = field(default_factory=dict)  # force of each liquid [N] against a hand at 0.1 m/s
+    # how many texts each language lacks; none where it lacks none
     missing: dict[str, int] = field(default_factory=dict)
+    # the warnings of ``check``, but those that take simulated observers, and what is to be translated
     warnings: tuple[str, ...] = ()
 
 

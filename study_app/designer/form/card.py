@@ -610,7 +610,6 @@ class FormCard(Card):
         self.show_help()
 
     def show_help(self) -> None:
-        """Show the help of the focused field, or of the first one."""
         row = self._focused if self._focused in self._made else next(iter(self._made), None)
         if row is None:
             self.foot.show_help("", "", "")

@@ -107,7 +107,6 @@ class LineField(Field):
         self._take(self.line.text())
 
     def show_value(self) -> None:
-        """Show the value, or what counts without one in grey."""
         value = self.row.row.value
         self.line.setPlaceholderText(self.placeholder())
         if not self.refusal:
@@ -150,7 +149,6 @@ class SwitchField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        """Show the value, or what counts without one."""
         row = self.row.row
         self.toggle.setChecked(bool(row.default if row.value is None else row.value))
 
@@ -213,7 +211,6 @@ class ChoiceField(Field):
         self.arrow.setEnabled(self.row.target is not None)
 
     def words(self, choice: Any) -> str:
-        """Return what a choice is called in the list."""
         return choice_words(choice, self.row.row.default)
 
     def _pick(self, at: int) -> None:
@@ -379,10 +376,6 @@ def stacked(row: FormRow) -> bool:
     return len(row.languages) > 2 or row.row.kind == "paragraphs"
 
 
-def _same(_row: FormRow) -> object:
-    return None
-
-
 @dataclass(frozen=True, slots=True)
 class SpecialEditor:
     """An editor of certain keys; bounds, faults, help and removal stay those of the row."""
@@ -392,6 +385,6 @@ class SpecialEditor:
     wide: bool = False  # whether it takes the width of the form, with the label above it
     labelled: bool = True  # whether the label is shown; a screen reader says it in any case
     # returns what makes another editor necessary, beyond what does for every row
-    structure: Callable[[FormRow], object] = _same
+    structure: Callable[[FormRow], object] = lambda _row: None
     # returns what it shows beyond the value of its row, of a study that may have faults: a frozen value
     facts: Callable[[Study, Row], Any] | None = None

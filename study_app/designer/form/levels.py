@@ -212,7 +212,7 @@ class AxisView(Themed, QWidget):
         span = self._span
         for end, level in zip(self.ends, (axis.low, axis.high), strict=True):
             end.show_level(span, level)
-            end.setAccessibleDescription(f"{_number(level * axis.factor)} {axis.unit}. {axis.sentence}")
+            end.setAccessibleDescription(f"{level * axis.factor:.4g} {axis.unit}. {axis.sentence}")
         self.setAccessibleName("Axis of the levels")
         self.setAccessibleDescription(axis.sentence)
         self._place()
@@ -300,10 +300,6 @@ class AxisView(Themed, QWidget):
             painter.drawText(room, Qt.AlignmentFlag.AlignRight, limit.words)
 
 
-def _number(value: float) -> str:
-    return f"{value:.4g}"
-
-
 class LevelsField(LineField):
     """Both ends as numbers, and the axis below them."""
 
@@ -317,7 +313,6 @@ class LevelsField(LineField):
         self.show_value()
 
     def show_value(self) -> None:
-        """Show both ends, and the axis where they make sense."""
         super().show_value()
         axis: LevelAxis | None = self.row.facts
         self.view.setVisible(axis is not None and self.box.indexOf(self.view) >= 0)

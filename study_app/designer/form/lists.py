@@ -103,7 +103,6 @@ class Rows(QListWidget):
         self.setFrameShape(QFrame.Shape.NoFrame)
 
     def event(self, event: QEvent) -> bool:
-        """Keep its keys from the place, which has the same ones for whole elements."""
         if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and self._own(event):
             event.accept()
             return True
@@ -367,7 +366,6 @@ class ConditionsField(EntriesField):
         self.lines.append((note, force, liquid))
 
     def show_value(self) -> None:
-        """Show what is known of each condition."""
         for (note, force, liquid), line in zip(self.lines, self.row.facts, strict=True):
             note.show_text(line.note)
             force.setText(f"{line.force}, clipped" if line.clipped else line.force)
@@ -395,7 +393,6 @@ class LinesField(EntryList):
         self.show_value()
 
     def show_value(self) -> None:
-        """Show each entry."""
         for line, value in zip(self.lines, self.row.row.value or (), strict=False):
             if not line.property("state"):
                 line.show_text(written(value))

@@ -69,12 +69,10 @@ class EitherField(Field):
         self.show_value()
 
     def show_row(self, row: FormRow) -> None:
-        """Show the value in the editor of its kind."""
         self.inner.show_row(self._chosen(row))
         super().show_row(row)
 
     def show_value(self) -> None:
-        """Show which kind the value is of."""
         values = [(at, KINDS.get(one.kind, one.kind)) for at, one in enumerate(self.row.row.either)]
         self.kinds.show_values(values, self.row.number)
 

@@ -283,7 +283,6 @@ class OrderField(ChoiceField):
         self.show_value()
 
     def show_value(self) -> None:
-        """Show what is chosen, and how balanced it is."""
         super().show_value()
         found: OrderBalance | None = self.row.facts
         self.chip.setVisible(found is not None and self.box.indexOf(self.chip) >= 0)
@@ -399,7 +398,6 @@ class KindField(ChoiceField):
         self._make_room()
 
     def words(self, choice: Any) -> str:
-        """Return what a kind is called."""
         return STATEMENT.capitalize() if choice.value is None else choice_words(choice, None)
 
     def show_value(self) -> None:

@@ -260,7 +260,6 @@ class DesignField(ChoiceField):
         self.show_value()
 
     def show_value(self) -> None:
-        """Show what is chosen, and one trial of it."""
         super().show_value()
         strip: TrialStrip | None = self.row.facts
         self.view.setVisible(strip is not None and self.view.parent() is not None)

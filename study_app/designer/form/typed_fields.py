@@ -83,7 +83,6 @@ class _Typed(_Base):
             self._before = self.words()
 
     def words(self) -> str:
-        """Return the text."""
         raise NotImplementedError
 
     def nothing_to_delete(self) -> bool:
@@ -133,7 +132,6 @@ class _Typed(_Base):
         return True
 
     def event(self, event: QEvent) -> bool:
-        """Leave to the place the keys that are its own."""
         return True if self.leaves_to_place(event) else super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -186,11 +184,9 @@ class TypedLine(_Typed, QLineEdit):
             super().keyPressEvent(event)
 
     def words(self) -> str:
-        """Return the text."""
         return self.text()
 
     def marked(self) -> tuple[int, int, int]:
-        """Return from where to where the text is marked, and its length."""
         at, length = self.cursorPosition(), len(self.text().encode("utf-16-le", "surrogatepass")) // 2
         return (self.selectionStart(), self.selectionEnd(), length) if self.hasSelectedText() else (at, at, length)
 
@@ -228,11 +224,9 @@ class TypedText(_Typed, QPlainTextEdit):
                 self.note()
 
     def words(self) -> str:
-        """Return the text."""
         return self.document().toRawText().replace("\u2029", "\n")
 
     def marked(self) -> tuple[int, int, int]:
-        """Return from where to where the text is marked, and its length."""
         at = self.textCursor()
         return at.selectionStart(), at.selectionEnd(), self.document().characterCount() - 1  # a separator ends it
 

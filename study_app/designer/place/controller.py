@@ -287,7 +287,6 @@ class DesignerController(QObject):
         self.show_outline()
 
     def show_outline(self) -> None:
-        """Show the elements as the study is now, and the warnings that changed."""
         if self.editing.opened is None:
             return
         study = self.editing.opened.study

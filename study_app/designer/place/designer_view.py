@@ -34,7 +34,6 @@ class StudyChoice:
 
     @property
     def words(self) -> str:
-        """Title, file and where it is from: titles are not unique."""
         origin = "shipped" if self.shipped else self.original and f"copy of {self.original}"
         return f"{self.title}{BETWEEN}{self.file}" + (f"{BEFORE_ORIGIN}{origin})" if origin else "")
 

@@ -317,7 +317,6 @@ class FileEditor(Themed, QPlainTextEdit):
         self.flush()
 
     def event(self, event: QEvent) -> bool:
-        """Leave undo, redo and Save to the place."""
         overrides = event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
         if overrides and any(event.matches(key) for key in KEYS_OF_PLACE):  # type: ignore[attr-defined]  # a key event
             self.flush()

@@ -122,7 +122,6 @@ class ChipButton(Themed, PressedByEnter):
 
     @property
     def words(self) -> str:
-        """What the chip says."""
         return self._state[2]
 
     def paintEvent(self, _event: QPaintEvent) -> None:

@@ -28,7 +28,6 @@ class _Segment(Themed, QAbstractButton):
             self.setAccessibleName(words)
 
     def event(self, event: QEvent) -> bool:
-        """Let the strip paint the ring around the part with the keyboard."""
         strip = self.parentWidget()
         if event.type() in (QEvent.Type.FocusIn, QEvent.Type.FocusOut) and strip is not None:
             strip.update()

@@ -179,7 +179,7 @@ def duplicate(study: Study, asked: DuplicateElement) -> Step:
     edits: tuple[Edit, ...] = ()
     copies: list[Path] = []
     now = study
-    for path in _last_first((asked.path, *asked.also)):
+    for path in sorted((asked.path, *asked.also), key=lambda path: -path[-1] if isinstance(path[-1], int) else 0):
         made, copy = _copied(now, path)
         made = beside(now, made, path, copy)
         copies = [*(_after_insert(one, copy) for one in copies), copy]
@@ -250,7 +250,7 @@ def move(study: Study, asked: MoveElement) -> Step:
 
 def move_to(study: Study, asked: MoveTo) -> Step:
     """Return the step that moves entries of a list to another place in it."""
-    things = tuple(_named(study, entry) for entry in asked.entries)
+    things = tuple((named_at(study.document, entry) or entry) for entry in asked.entries)
     return _moved(study, things, asked.entries, asked.to, f"Move {_titles(study, things)}")
 
 
@@ -262,11 +262,6 @@ def _moved(study: Study, things: Sequence[Path], entries: Sequence[Path], to: in
     count = len(value_at(study.document, entry[:-1]))
     said = f"{title_of(study.document, things[0])}, now {_index(entry) + 1} of {count}"
     return Step(words, edits, paths[0], several=paths, said=said)
-
-
-def _named(study: Study, entry: Path) -> Path:
-    """Return the element that an entry of the session stands for; the entry itself where it is the element."""
-    return named_at(study.document, entry) or entry
 
 
 def paste(study: Study, asked: Paste) -> Step:
@@ -333,11 +328,6 @@ def _titles(study: Study, paths: Sequence[Path]) -> str:
     if len(paths) == 1:
         return title_of(study.document, paths[0])
     return f"{len(paths)} elements"
-
-
-def _last_first(paths: Sequence[Path]) -> list[Path]:
-    """Return paths with later entries of a list before earlier ones, so that the places of the others stay."""
-    return sorted(paths, key=lambda path: -path[-1] if isinstance(path[-1], int) else 0)
 
 
 def _after_insert(path: Path, new: Path) -> Path:

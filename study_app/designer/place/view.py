@@ -115,7 +115,6 @@ class FocusAreas:
         (page.body.focusProxy() or pane.tabs).setFocus(SHORTCUT)
 
     def show_tab(self, name: str) -> None:
-        """Show a page of the right pane, and go to it."""
         self._parts.pane.show_tab(name)
         self._focus_page()
 
@@ -617,7 +616,6 @@ class DesignerPlace(Place):
             self.form.head.edit_id()
 
     def show_tab(self, name: str) -> None:
-        """Show a page of the right pane, and give it the keyboard."""
         self.areas.show_tab(name)
 
     def enter(self) -> None:
@@ -639,7 +637,6 @@ class DesignerPlace(Place):
             super().keyPressEvent(event)
 
     def wants_narrow_rail(self) -> bool:
-        """Return that form and file need the width."""
         return True
 
     def resizeEvent(self, event: QResizeEvent) -> None:

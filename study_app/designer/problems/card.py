@@ -69,11 +69,9 @@ class NameRefusal(QWidget):
         self.show_refusal("")
 
     def text(self) -> str:
-        """Return why the name is not taken, "" where it is."""
         return self.words.text()
 
     def show_refusal(self, sentence: str, free: str = "") -> None:
-        """Say why a name is not taken, "" for nothing, and offer one that is free."""
         self._free = free
         self.words.setText(f"{sentence[:1].upper()}{sentence[1:]}")
         words = f"{self._does} {free}"
