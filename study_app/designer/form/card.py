@@ -91,10 +91,9 @@ class FormHead(QWidget):
         self.series = ActionButton("bars", "Series …", height=34)
         self.series.setProperty("dense", "true")
         self.series.setFont(font("label"))
-        self.series.setToolTip(tip("series"))
-        self.up = IconButton("arrow_up", "Move up", tip("up"), size=34)
-        self.down = IconButton("arrow_down", "Move down", tip("down"), size=34)
-        self.copy = IconButton("copy", "Duplicate", tip("duplicate"), size=34)
+        self.up = IconButton("arrow_up", "Move up", size=34)
+        self.down = IconButton("arrow_down", "Move down", size=34)
+        self.copy = IconButton("copy", "Duplicate", size=34)
         self.delete = IconButton("trash", "Delete", f"{tip('delete')} in the outline", size=34, role="danger")
         words = vbox(self.title, hbox(self.kind, (self.followed, 1), spacing=8), spacing=0)
         grid = self._grid = QGridLayout(self)
@@ -284,14 +283,10 @@ class FormFoot(Themed, QWidget):
 class FormCard(Card):
     """Draws a `Form`.
 
-    Signals: ``asked`` (a request), ``open_asked`` (path), ``join_asked`` (path of a question that joins or leaves the
-    selection, and whether with all between), ``copy_asked`` (paths), ``repair_asked`` (problem, words).
+    Signals: ``asked`` (a request), ``repair_asked`` (problem, words).
     """
 
     asked = Signal(object)
-    copy_asked = Signal(object)
-    open_asked = Signal(object)
-    join_asked = Signal(object, bool)
     repair_asked = Signal(object, str)
 
     def __init__(self) -> None:
@@ -481,8 +476,7 @@ class FormCard(Card):
 
     def _others(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...]) -> QuestionRows:
         made = QuestionRows(lines, languages)
-        made.write_asked.connect(self.write)
-        made.join_asked.connect(self.join_asked)
+        made.asked.connect(self.asked)
         self.others += made.rows
         return made
 
@@ -490,11 +484,6 @@ class FormCard(Card):
         self._together = paths
         for row in self.others:
             row.show_chosen(row.line.path in paths)
-
-    def write(self, path: tuple[str | int, ...]) -> None:
-        """Select a question and give the keyboard to its text."""
-        self.open_asked.emit(path)
-        self.focus((*path, "text"))
 
     def _heading(self, section: Section, *, removable: bool) -> QHBoxLayout:
         heading = hbox(label(section.title, "strong"), STRETCH)
@@ -509,10 +498,6 @@ class FormCard(Card):
         made = RowWidget(row)
         made.field.asked.connect(self._ask)
         made.repair_asked.connect(self.repair_asked)
-        made.field.open_asked.connect(self.open_asked)
-        made.field.write_asked.connect(self.write)
-        made.field.join_asked.connect(self.join_asked)
-        made.field.copy_asked.connect(self.copy_asked)
         if isinstance(made.field, EntryList):
             made.field.changes.connect(lambda asked, after: self._change_entries(made.row.row.path, asked, after))
             if self._chosen is not None and self._chosen[0] == row.row.path:

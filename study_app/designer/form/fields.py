@@ -12,7 +12,7 @@ from study_app.designer.document.fields import Row
 from study_app.designer.document.study import Study
 from study_app.designer.form.rows import FormRow, choice_words, is_right_to_left, new_words
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.designer.place.requests import AddNamed, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
+from study_app.designer.place.requests import AddNamed, Do, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
 from study_app.designer.place.segments import Segments
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import font
@@ -28,17 +28,11 @@ NUMBER_PX = 96
 class Field(QWidget):
     """Edits the value of one row.
 
-    ``asked`` carries a request, ``open_asked`` the path of an element to select, ``copy_asked`` those to copy,
-    ``write_asked`` that of one whose text is to be written, ``join_asked`` that of one that joins or leaves the
-    selection, and whether with all between; ``came`` says that it is focused; ``caption`` stands above
-    an editor that takes the width of the form.
+    ``asked`` carries a request, ``came`` says that it is focused; ``caption`` stands above an editor that takes the
+    width of the form.
     """
 
     asked = Signal(object)
-    copy_asked = Signal(object)
-    open_asked = Signal(object)
-    write_asked = Signal(object)
-    join_asked = Signal(object, bool)
     came = Signal()
     caption = ""
 
@@ -178,7 +172,7 @@ class ChoiceField(Field):
         self._values: list[str | None] = []
         opens = f"Open what {row.row.label} names"
         self.arrow = IconButton("arrow_right", opens, with_key(f"{opens}; back", "back"), size=FIELD_PX)
-        self.arrow.clicked.connect(lambda: self.open_asked.emit(self.row.target))
+        self.arrow.clicked.connect(lambda: self.asked.emit(Do("select", (self.row.target,))))
         if row.row.kind == "reference":
             self.box.addWidget(self.arrow)
         self.setFocusProxy(self.segments or self.list or self.arrow)

@@ -22,8 +22,8 @@ from study_app.designer.place.requests import (
     AddElement,
     AddEntry,
     AddNamed,
-    AskSeries,
     ChangeLanguage,
+    Do,
     DuplicateEntries,
     MoveEntries,
     Paste,
@@ -226,7 +226,7 @@ class EntryList(Field):
     def open(self, at: int) -> None:
         """Open what an entry names."""
         if at < len(self.row.entries) and (target := self.row.entries[at].target):
-            self.open_asked.emit(target)
+            self.asked.emit(Do("select", (target,)))
 
     def _open_current(self) -> None:
         self.open(self.list.currentRow())
@@ -258,7 +258,7 @@ class EntryList(Field):
             self.changes.emit(DuplicateEntries(tuple(map(self.place, self.chosen))), after)
 
     def _copy(self) -> None:
-        self.copy_asked.emit(tuple(map(self.place, self.chosen)))
+        self.asked.emit(Do("copy", (tuple(map(self.place, self.chosen)),)))
 
     def _paste(self) -> None:
         if text := QGuiApplication.clipboard().text().strip():
@@ -352,7 +352,7 @@ class ConditionsField(EntriesField):
         """Ask for a series of the selected condition, or of the last one."""
         path = self.row.entries[self.chosen[0] if len(self.chosen) == 1 else -1].target
         if path:
-            self.asked.emit(AskSeries(path))
+            self.asked.emit(Do("series", (path,)))
 
     def fill(self, shown: EntryRow, at: int) -> None:
         """Show liquid and delay, force, and a button that opens the liquid."""
@@ -362,7 +362,7 @@ class ConditionsField(EntriesField):
             part.setAlignment(RIGHT)
             shown.line.addWidget(part)
         name = f"Open the liquid of {self.row.entries[at].title}"
-        liquid = shown.add_button("drop", name, lambda: self.open_asked.emit(self.row.facts[at].liquid))
+        liquid = shown.add_button("drop", name, lambda: self.asked.emit(Do("select", (self.row.facts[at].liquid,))))
         self.lines.append((note, force, liquid))
 
     def show_value(self) -> None:

@@ -59,8 +59,6 @@ class EitherField(Field):
         self.box.addWidget(self.kinds, 0, Qt.AlignmentFlag.AlignLeft)
         self.inner = field(self._chosen(row))
         self.inner.asked.connect(self.asked)
-        self.inner.open_asked.connect(self.open_asked)
-        self.inner.copy_asked.connect(self.copy_asked)
         if isinstance(self.inner, EntryList):
             self.inner.changes.connect(lambda asked, _after: self.asked.emit(asked))
         self.inner.came.connect(self.came)

@@ -20,7 +20,7 @@ from study_app.designer.form.rows import (
     question_lines,
 )
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedSentence
-from study_app.designer.place.requests import AddElement, AddEntry, RemoveKey, Request, SetValue, Several
+from study_app.designer.place.requests import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.place.segments import Segments
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import Tone, TypeRole, font
@@ -188,11 +188,10 @@ def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
 class QuestionRows(QWidget):
     """Questions above or below the one that is edited.
 
-    ``write_asked`` carries the path of one, ``join_asked`` also whether all between are selected with it.
+    ``asked`` carries a request: to write the text of one, or to select it with the others.
     """
 
-    write_asked = Signal(object)
-    join_asked = Signal(object, bool)
+    asked = Signal(object)
 
     def __init__(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...] = ()) -> None:
         super().__init__()
@@ -202,8 +201,8 @@ class QuestionRows(QWidget):
         self.rows: list[QuestionRow] = []
         for line in lines:
             made = QuestionRow(line)
-            made.opened.connect(lambda path=line.path: self.write_asked.emit(path))
-            made.joined.connect(lambda all_between, path=line.path: self.join_asked.emit(path, all_between))
+            made.opened.connect(lambda path=line.path: self.asked.emit(Do("write", (path,))))
+            made.joined.connect(lambda between, path=line.path: self.asked.emit(Do("join", (path, between))))
             add_parts(column, made, Rule())
             self.rows.append(made)
 
@@ -435,8 +434,7 @@ class QuestionsField(Field):
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.rows = QuestionRows(row.facts.lines, row.facts.languages)
-        self.rows.write_asked.connect(self.write_asked)
-        self.rows.join_asked.connect(self.join_asked)
+        self.rows.asked.connect(self.asked)
         self.add = add_button(f"Add to {row.row.label}", "Question")
         self.add.setToolTip(with_key("Add a question", "add"))
         self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.row.path)))

@@ -101,7 +101,7 @@ class MeasuresController(QObject):
         place.left.connect(self.leave)
         place.pane.facts.appeared.connect(self._idle.start)
         measures = place.measures
-        measures.repair_asked.connect(place.repair_asked)
+        measures.repair_asked.connect(lambda row, words: place.ask("repair", row, words))
         measures.controls.participants_asked.connect(self._take_participants)
         measures.controls.threshold_asked.connect(self._take_threshold)
         measures.controls.lapses_asked.connect(self._take_lapses)

@@ -12,7 +12,7 @@ from study_app.designer.document.fields import Row, label_of, node_at, row_at, r
 from study_app.designer.document.names import named_at
 from study_app.designer.document.study import Study
 from study_app.designer.outline.outline_rows import icon_of
-from study_app.designer.place.requests import AddElement, AddInstrument, AskSeries, ChangeLanguage, GoTo
+from study_app.designer.place.requests import AddElement, AddInstrument, ChangeLanguage, Do, GoTo
 from study_app.protocol.formats import TABLES, is_second
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.source.document import Path, names, value_at
@@ -31,7 +31,7 @@ class Addable:
 
     words: str
     icon: str
-    asks: AddElement | AddInstrument | ChangeLanguage | AskSeries | GoTo
+    asks: AddElement | AddInstrument | ChangeLanguage | Do | GoTo
     help: str = ""
 
 
@@ -88,7 +88,7 @@ def _series(study: Study, selected: Path) -> Iterator[Addable]:
     for path in dict.fromkeys((selected, *(one for one in listed if one is not None))):
         if numbers := number_rows(study.document, path):
             words, help_ = f"Series of {title_of(study.document, path)} …", ", ".join(row.label for row in numbers)
-            yield Addable(words, "bars", AskSeries(path), SERIES.format(help_))
+            yield Addable(words, "bars", Do("series", (path,)), SERIES.format(help_))
 
 
 def fields_to_go_to(study: Study, words: str, selected: Path) -> tuple[Addable, ...]:

@@ -3,12 +3,15 @@
 Each edit is shown in the form at once; the outline, the warnings and the repairs follow when the keyboard rests.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QObject, QTimer
+from PySide6.QtGui import QGuiApplication
 
-from study_app.designer.document.names import renamed
+from study_app.designer.document.fragments import copied
+from study_app.designer.document.names import named_at, renamed
 from study_app.designer.document.study import read
 from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_text import Refused, free_in
@@ -20,12 +23,11 @@ from study_app.designer.outline.addable import addable, fields_to_go_to
 from study_app.designer.outline.outline_rows import outline_rows
 from study_app.designer.participant.feeling import Feeling
 from study_app.designer.participant.preview import ParticipantPreview
-from study_app.designer.place.clipboard import Clipboard
 from study_app.designer.place.designer_view import DesignerView, HeaderState, StudyChoice
 from study_app.designer.place.editing import Editing, OpenStudy, open_file, open_new, open_unsaved
 from study_app.designer.place.file import file_text
-from study_app.designer.place.prompts import SeriesCard
-from study_app.designer.place.requests import AskSeries, DeleteElement, RenameElement, Request
+from study_app.designer.place.prompts import DeleteCard, SeriesCard
+from study_app.designer.place.requests import DeleteElement, Do, Paste, RenameElement, Request, Task
 from study_app.designer.place.saving import Saving
 from study_app.designer.place.steps import Step, delete_prompt, series_prompt, series_titles
 from study_app.designer.place.view import DesignerPlace
@@ -59,7 +61,6 @@ class DesignerController(QObject):
         self.saving = Saving(editing, place, self.runs)
         self.changes = ChangesController(editing, place, self.runs)
         self.feeling = Feeling(editing, place)
-        Clipboard(editing, place)
         Renaming(editing, place, self.runs)
         self._others: dict[Path, OpenStudy] = {}
         self._warnings: tuple[str, ...] = ()
@@ -72,22 +73,16 @@ class DesignerController(QObject):
         self._resting.timeout.connect(self.show_outline)
         place.destroyed.connect(self.deleteLater)  # else a timer or thread would show what is gone
         place.entered.connect(self.enter)
-        place.asked.connect(editing.ask)
-        place.selected.connect(editing.select)
-        place.back_asked.connect(editing.go_back)
-        place.undo_asked.connect(editing.undo)
-        place.redo_asked.connect(editing.redo)
-        place.study_asked.connect(self.open)
-        place.new_asked.connect(self.ask_for_new)
-        place.begin_asked.connect(self.begin)
+        self._does: dict[Task, Callable[..., object]] = {
+            "select": editing.select, "back": editing.go_back, "undo": editing.undo, "redo": editing.redo,
+            "save": self.saving.save, "banner": self.saving.answer_banner, "open": self.open, "new": self.ask_for_new,
+            "begin": self.begin, "find": self.find, "add": self._show_addable, "delete": self.ask_to_delete,
+            "series": self.ask_for_series, "copy": self.copy, "paste": self.paste, "judge id": self._judge_id,
+            "repair": self.repair, "repairs": self._repairs.show,
+        }  # fmt: skip
+        place.asked.connect(self.take)
         place.new_page.copy_asked.connect(self.ask_for_new)
-        place.delete_asked.connect(self.ask_to_delete)
-        place.series_asked.connect(self.ask_for_series)
-        place.repair_asked.connect(self.repair)
-        place.find_changed.connect(self.find)
-        place.add_asked.connect(self._show_addable)
         place.adding.typed.connect(self._offer_fields)
-        place.id_typed.connect(self._judge_id)
         editing.changed.connect(self.show)
         self.preview = ParticipantPreview(editing, place)
         editing.edited.connect(self._resting.start)
@@ -99,11 +94,17 @@ class DesignerController(QObject):
         self.saving.discarded.connect(self._close)
         self.saving.compare_asked.connect(self.changes.compare_with)
         self.runs.changed.connect(self._show_header)
-        self._repairs.found.connect(place.show_repairs)
-        place.problem_steps.repairs_wanted.connect(self._repairs.show)
+        self._repairs.found.connect(place.problem_steps.show_repairs)
         self.measures = MeasuresController(editing, place, self._repairs)
         self.measures.warned.connect(self._show_header)
         self.measures.warned.connect(self._show_warnings)
+
+    def take(self, asked: Request | Do) -> None:
+        """Make a step of the study as the place asks for it, or do another task."""
+        if isinstance(asked, Do):
+            self._does[asked.what](*asked.arguments)
+        else:
+            self.editing.ask(asked)
 
     # opening
 
@@ -146,7 +147,7 @@ class DesignerController(QObject):
                 study, copy_of = read(file.read_bytes(), file.parent), file.stem
             opened = open_new(answered(study, answers), name)
         except StudyError as error:
-            self.place.refuse_new(f"{error}.", free_in(error))
+            self.place.new_page.refuse(f"{error}.", free_in(error))
             return
         self.saving.leave()
         begin_settings(opened.file, copy_of)
@@ -190,6 +191,22 @@ class DesignerController(QObject):
         self.show()
         self.place.nothing.new.setFocus()
 
+    # the clipboard; copying works in read-only studies, too
+
+    def copy(self, paths: tuple[Place, ...]) -> None:
+        """Put elements on the clipboard as TOML; an entry of a list of names stands for what it names."""
+        opened = self.editing.opened
+        if opened is not None and opened.study.is_toml:
+            things = [named_at(opened.study.document, path) or path for path in paths]
+            if text := copied(opened.study, things):
+                QGuiApplication.clipboard().setText(text)
+                self.place.show_step((), "Copied", fresh=False)
+
+    def paste(self) -> None:
+        """Paste what is on the clipboard after the selected element."""
+        if (text := QGuiApplication.clipboard().text()).strip():
+            self.editing.ask(Paste(self.editing.selected, text))
+
     # steps that ask first
 
     def ask_to_delete(self, path: Place, also: tuple[Place, ...] = ()) -> None:
@@ -199,15 +216,17 @@ class DesignerController(QObject):
             return
         prompt = delete_prompt(opened.study, (path, *also))
         if prompt.references:
-            self.place.ask_to_delete(prompt)
+            card = DeleteCard(prompt)
+            card.answered.connect(self.editing.ask)
+            self.place.show_prompt(card, card.first)
         else:
             self.editing.ask(DeleteElement(path, also=also))
 
-    def ask_for_series(self, asked: AskSeries) -> None:
+    def ask_for_series(self, path: Place) -> None:
         """Ask for the values of a series, or say why there can be none."""
         if (opened := self.editing.opened) is None:
             return
-        prompt = series_prompt(opened.study, asked.path)
+        prompt = series_prompt(opened.study, path)
         if prompt is None or opened.read_only:
             why = opened.read_only or "This element has no numeric field."
             self.place.message.emit("There can be no series of this element", why)
@@ -232,7 +251,7 @@ class DesignerController(QObject):
         if isinstance(asked, RenameElement):
             self._judge_id(path, asked.name)
         else:
-            self.place.refuse(path, sentence)
+            self.place.form.refuse(path, sentence)
 
     def _show_addable(self) -> None:
         if (opened := self.editing.writable) is not None:
@@ -292,7 +311,7 @@ class DesignerController(QObject):
         study = self.editing.opened.study
         known = facts(study)
         rows = outline_rows(study, known.steps_s, self._find)
-        self.place.show_outline(rows, self.editing.selected)
+        self.place.outline.show_outline(rows, self.editing.selected)
         if known.warnings != self._warnings:
             self._warnings = known.warnings
             self._show_header()
@@ -315,4 +334,4 @@ class DesignerController(QObject):
         return header_state(opened, self._choices, warnings, self.runs.chip)
 
     def _show_header(self) -> None:
-        self.place.show_header(self._header())
+        self.place.header.show_state(self._header())

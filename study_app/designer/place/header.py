@@ -145,9 +145,6 @@ class DesignerHeader(QWidget):
     study_asked = Signal(str)
     new_asked = Signal()
     problems_asked = Signal()
-    undo_asked = Signal()
-    redo_asked = Signal()
-    save_asked = Signal()
     keyboard_left = Signal()
 
     def __init__(self) -> None:
@@ -169,7 +166,6 @@ class DesignerHeader(QWidget):
         self.undo = IconButton("undo", "Undo")
         self.redo = IconButton("redo", "Redo")
         self.save = ActionButton("save", "Save", role="primary")
-        self.save.setToolTip(tip("save"))
         self.play = PlayControls()
         self.strip = PlayStrip()
         self.strip.left.connect(self.play.play.setFocus)
@@ -181,9 +177,6 @@ class DesignerHeader(QWidget):
         add_parts(self._row, *left, STRETCH, self.keys, self.undo, self.redo, self.play, self.save)
         self.study.activated.connect(self._choose)
         self.problems.clicked.connect(self.problems_asked)
-        self.undo.clicked.connect(self.undo_asked)
-        self.redo.clicked.connect(self.redo_asked)
-        self.save.clicked.connect(self.save_asked)
         self.show_state(self.state)
 
     def show_state(self, state: HeaderState) -> None:

@@ -198,11 +198,18 @@ class Several:
     requests: tuple[Request, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class AskSeries:
-    """Ask for the values of a series of an element; a step of the place, not of the study."""
+Task: TypeAlias = Literal[
+    "select", "join", "write", "back", "find", "undo", "redo", "save", "open", "new", "begin", "banner", "add", "copy", "paste",
+    "delete", "series", "judge id", "repair", "repairs",
+]  # fmt: skip
 
-    path: Path
+
+@dataclass(frozen=True, slots=True)
+class Do:
+    """A task that is no step of the study, and what it takes: ``Do("select", (path,))``."""
+
+    what: Task
+    arguments: tuple[Any, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,8 +61,6 @@ class Saving(QObject):
         editing.opened_other.connect(self._begin)
         editing.edited.connect(self._end_notice)
         place.left.connect(self.leave)
-        place.save_asked.connect(self.save)
-        place.banner_asked.connect(self.answer_banner)
 
     # the banner
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from PySide6.QtCore import QObject, Qt, Signal, SignalInstance
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
@@ -16,14 +16,14 @@ from study_app.designer.new_study.template_choices import TemplateChoice
 from study_app.designer.outline.add_list import AddList
 from study_app.designer.outline.addable import Addable
 from study_app.designer.outline.card import OutlineCard
-from study_app.designer.outline.outline_rows import ElementPath, OutlineRow
+from study_app.designer.outline.outline_rows import ElementPath
 from study_app.designer.place.arrangement import Arrangement, PanePage, RightPane
-from study_app.designer.place.designer_view import DesignerView, HeaderState
+from study_app.designer.place.designer_view import DesignerView
 from study_app.designer.place.file import FileCard
 from study_app.designer.place.header import BannerCard, DesignerHeader
-from study_app.designer.place.prompts import DeleteCard, KeysCard, Prompt
+from study_app.designer.place.prompts import KeysCard, Prompt
 from study_app.designer.place.requests import (
-    AskSeries,
+    Do,
     DuplicateElement,
     GoTo,
     LeaveText,
@@ -32,9 +32,9 @@ from study_app.designer.place.requests import (
     RetypeFile,
     SetText,
     SetValue,
+    Task,
     with_path,
 )
-from study_app.designer.place.steps import DeletePrompt
 from study_app.designer.place.tab_order import go_on, lead_by_tab
 from study_app.designer.problems.card import ProblemsCard, RepairButton
 from study_app.designer.problems.problems import ProblemRow
@@ -150,82 +150,18 @@ class FocusAreas:
         stops[(here + by) % len(stops)][1]()
 
 
-class SelectedElements(QObject):
-    """The element of the form, and those that the outline selects with it.
-
-    ``asked`` carries a request of `viewmodels.designer.requests`, ``delete_asked`` the element and the others; before
-    each request, ``typed`` asks to hand on what is being typed. ``selected`` carries another element.
-    """
-
-    typed = Signal()
-    asked = Signal(object)
-    delete_asked = Signal(object, object)
-    series_asked = Signal(object)
-    selected = Signal(object)
-
-    def __init__(self, outline: OutlineCard, form: FormCard, view: Callable[[], DesignerView]) -> None:
-        super().__init__()
-        self._outline, self._form, self._view = outline, form, view
-
-    def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
-        form = self._view().form
-        path = () if form is None else form.path
-        return path, tuple(one for one in self._outline.selected if one != path)
-
-    def join(self, path: ElementPath, all_between: bool) -> None:
-        """Select a question with the one of the form, or no longer; where none is edited, open it."""
-        form = self._view().form
-        if form is None or form.path[:-1] != path[:-1]:
-            self.selected.emit(path)
-        elif all_between:
-            first, last = sorted((int(form.path[-1]), int(path[-1])))
-            self._outline.select_several(tuple((*path[:-1], at) for at in range(first, last + 1)))
-        else:
-            self._outline.select_several((path,), selects=path not in self._outline.selected)
-
-    def duplicate(self) -> None:
-        """Ask for a copy of each."""
-        path, also = self._several()
-        if self._form.head.copy.isEnabled():
-            self.typed.emit()
-            self.asked.emit(DuplicateElement(path, also))
-
-    def make_series(self) -> None:
-        """Ask for copies of the form's element that differ in one number."""
-        form = self._view().form
-        if form is not None:
-            self.typed.emit()
-            self.series_asked.emit(AskSeries(form.path))
-
-    def delete(self) -> None:
-        """Ask to delete them."""
-        path, also = self._several()
-        if self._form.head.delete.isEnabled():
-            self.typed.emit()
-            self.delete_asked.emit(path, also)
-
-    def move_by(self, by: int) -> None:
-        """Ask to move them up (-1) or down (1)."""
-        path, also = self._several()
-        if path and not self._view().header.read_only:
-            self.typed.emit()
-            self.asked.emit(MoveElement(path, by, also))
-
-
 class ProblemSteps(QObject):
     """Opens problems at their fields and offers their repairs, at the field and in the list.
 
-    Signals: ``selected`` (path of an element), ``repair_asked`` (row, words), ``repairs_wanted`` (a row whose repairs
-    are to be shown at once).
+    ``ask`` selects an element ("select", path), makes a repair ("repair", row, words), or has the repairs of a problem
+    shown at once ("repairs", row).
     """
 
-    selected = Signal(object)
-    repair_asked = Signal(object, str)
-    repairs_wanted = Signal(object)
-
-    def __init__(self, card: ProblemsCard, form: FormCard, file: FileCard, areas: FocusAreas) -> None:
+    def __init__(
+        self, card: ProblemsCard, form: FormCard, file: FileCard, areas: FocusAreas, ask: Callable[..., None]
+    ) -> None:
         super().__init__(card)
-        self._card, self._form, self._file, self._areas = card, form, file, areas
+        self._card, self._form, self._file, self._areas, self._ask = card, form, file, areas, ask
         self._problems: tuple[ProblemRow, ...] = ()
         self._of_other_study: tuple[ProblemRow, ...] = ()
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
@@ -271,7 +207,7 @@ class ProblemSteps(QObject):
     def _open_repair(self, row: ProblemRow) -> None:
         """Go to the repair of a problem; where there is none, to its field."""
         self._card.open(row)
-        self.repairs_wanted.emit(row)
+        self._ask("repairs", row)
         for button in (self._form.repairs_of(row) or self._card.repairs_of(row))[:1]:
             button.setFocus(Qt.FocusReason.ShortcutFocusReason)
             for area in (self._form.area, self._card.area):
@@ -279,14 +215,14 @@ class ProblemSteps(QObject):
                     area.ensureWidgetVisible(button, 0, 8)  # its field stays in sight
 
     def _can_be_repaired(self, row: ProblemRow) -> bool:
-        self.repairs_wanted.emit(row)
+        self._ask("repairs", row)
         return bool(self._repairs.get(row))
 
     def _open(self, row: ProblemRow) -> None:
         """Go to the field of a problem; where there is none, to its line in the file."""
         self._card.show()
         if row.element:
-            self.selected.emit(row.element)
+            self._ask("select", row.element)
         in_form = bool(row.element) and self._areas.focus_row(row.fault.path)
         if row.line is not None and not in_form and not row.warning:
             self._areas.show_tab("file")
@@ -306,7 +242,7 @@ class ProblemSteps(QObject):
         here = self._card.window().focusWidget()
         by_keys = isinstance(here, RepairButton) and here.by_keys and here.problem == row
         self._card.set_current(row)
-        self.repair_asked.emit(row, words)
+        self._ask("repair", row, words)
         if row in self._problems:
             return
         coming = [one for one in self._card.coming if not one.warning]
@@ -317,34 +253,11 @@ class ProblemSteps(QObject):
 
 
 class DesignerPlace(Place):
-    """Draws a `DesignerView` and says what is asked for.
-
-    Signals: ``entered``, ``left``; ``asked`` (a request); ``selected`` (path) and ``back_asked``; ``study_asked``
-    (source), ``new_asked``, ``begin_asked`` (source, name, answers); ``undo_asked``, ``redo_asked``, ``save_asked``;
-    ``add_asked``, ``series_asked``, ``delete_asked`` (path, others); ``copy_asked`` (paths), ``paste_asked``;
-    ``repair_asked`` (row, words); ``find_changed``; ``banner_asked`` (action); ``id_typed`` (path, id).
-    """
+    """Draws a `DesignerView`; ``asked`` carries what is asked for: a step of the study, or what else to `Do`."""
 
     entered = Signal()
     left = Signal()
     asked = Signal(object)
-    selected = Signal(object)
-    back_asked = Signal()
-    study_asked = Signal(str)
-    new_asked = Signal()
-    begin_asked = Signal(str, str, object)
-    undo_asked = Signal()
-    redo_asked = Signal()
-    save_asked = Signal()
-    delete_asked = Signal(object, object)
-    add_asked = Signal()
-    series_asked = Signal(object)
-    copy_asked = Signal(object)
-    paste_asked = Signal()
-    repair_asked = Signal(object, str)
-    find_changed = Signal(str)
-    banner_asked = Signal(str)
-    id_typed = Signal(object, str)
 
     def __init__(self) -> None:
         super().__init__()
@@ -361,10 +274,8 @@ class DesignerPlace(Place):
         self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
         self.sides = self.parts.sides
         self.areas = FocusAreas(self.header, self.parts, self.file, self.problems)
-        self.problem_steps = ProblemSteps(self.problems, self.form, self.file, self.areas)
+        self.problem_steps = ProblemSteps(self.problems, self.form, self.file, self.areas, self._ask)
         self.adding, self.nothing, self.keys = AddList(self), NoStudyCard(), KeysCard(self)
-        self._steps = [partial(self._ask, asked) for asked in (self.undo_asked, self.redo_asked, self.save_asked)]
-        self.elements = SelectedElements(self.outline, self.form, lambda: self.view)
         self._lay_out()
         self._connect()
         self._take_keys()
@@ -384,84 +295,114 @@ class DesignerPlace(Place):
         vbox(self.stack, margins=(20, 14, 20, 14), parent=self)
 
     def _connect(self) -> None:
-        undo, redo, save = self._steps
         header, outline, form = self.header, self.outline, self.form
-        header.study_asked.connect(self.study_asked)
-        header.new_asked.connect(self.new_asked)
+        header.study_asked.connect(partial(self.ask, "open"))
+        header.new_asked.connect(partial(self.ask, "new"))
         header.problems_asked.connect(lambda: self.problems.setVisible(not self.problems.isVisible()))
-        header.undo_asked.connect(undo)
-        header.redo_asked.connect(redo)
-        header.save_asked.connect(save)
         header.strip.changed.connect(lambda shown: self.banner.make_room(other=shown))
-        self.nothing.new.clicked.connect(self.new_asked)
-        self.nothing.study_asked.connect(self.study_asked)
+        self.nothing.new.clicked.connect(lambda: self.ask("new"))
+        self.nothing.study_asked.connect(partial(self.ask, "open"))
         self.nothing.study_asked.connect(self.areas.focus_form)
-        self.banner.asked.connect(self.banner_asked)
+        self.banner.asked.connect(partial(self.ask, "banner"))
         self.banner.keyboard_left.connect(self.areas.return_keyboard)
-        outline.chosen.connect(self._select)
-        outline.find_changed.connect(self.find_changed)
+        outline.chosen.connect(partial(self._ask, "select"))
+        outline.find_changed.connect(partial(self.ask, "find"))
         outline.field_asked.connect(self.areas.focus_field)
         outline.form_asked.connect(self.areas.focus_form)
         outline.element_clicked.connect(self.areas.leave_drawer)
         outline.add_asked.connect(self.ask_to_add)
-        outline.duplicate_asked.connect(self.elements.duplicate)
-        outline.delete_asked.connect(self.elements.delete)
-        outline.copy_asked.connect(lambda: self.copy_asked.emit(outline.selected))
-        outline.paste_asked.connect(self.paste_asked)
+        outline.duplicate_asked.connect(self.duplicate)
+        outline.delete_asked.connect(self.delete)
+        outline.copy_asked.connect(lambda: self.ask("copy", outline.selected))
+        outline.paste_asked.connect(partial(self.ask, "paste"))
         outline.rename_asked.connect(self._rename)
-        outline.move_asked.connect(self.elements.move_by)
+        outline.move_asked.connect(self.move_by)
         outline.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
-        self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
-        self.parts.path.open_asked.connect(self._select)
-        form.asked.connect(self._take_asked)
-        form.open_asked.connect(self._select)
-        form.join_asked.connect(self.elements.join)
-        form.head.up.clicked.connect(lambda: self.elements.move_by(-1))
-        form.head.down.clicked.connect(lambda: self.elements.move_by(1))
-        form.head.copy.clicked.connect(self.elements.duplicate)
-        form.head.delete.clicked.connect(self.elements.delete)
-        form.head.series.clicked.connect(self.elements.make_series)
         outline.several_changed.connect(lambda: form.show_selected(outline.selected))
-        form.head.id_typed.connect(self.id_typed)
-        form.copy_asked.connect(self.copy_asked)
+        self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
+        self.parts.path.open_asked.connect(partial(self._ask, "select"))
+        form.asked.connect(self._take_asked)
+        form.head.id_typed.connect(partial(self.ask, "judge id"))
         self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
-        self.elements.typed.connect(self.flush)
-        self.elements.asked.connect(self.asked)
-        self.elements.delete_asked.connect(self.delete_asked)
-        self.elements.series_asked.connect(self.series_asked)
-        self.elements.selected.connect(self._select)
-        self.problem_steps.selected.connect(self._select)
-        self.problem_steps.repair_asked.connect(self._ask_for_repair)
         self.problems.close_asked.connect(self.areas.return_keyboard)  # first, else Qt hands it to the page
         self.problems.close_asked.connect(self.problems.hide)
-        self.new_page.begin_asked.connect(self.begin_asked)
+        self.new_page.begin_asked.connect(partial(self.ask, "begin"))
         self.new_page.given_up.connect(self.close_new)
 
     def _take_keys(self) -> None:
-        undo, redo, save = self._steps
-        areas = self.areas
+        areas, head = self.areas, self.form.head
         self.commands = add_commands(
             self,
             {
                 "outline": self.parts.focus_outline, "form": areas.focus_form, "views": areas.focus_pane,
                 "problems": areas.focus_problems, "header": areas.focus_header,
-                "next part": lambda: areas.cycle(1), "part before": lambda: areas.cycle(-1),
+                "next part": partial(areas.cycle, 1), "part before": partial(areas.cycle, -1),
                 "find": self.parts.focus_find, "next problem": self._next_problem, "file": areas.switch_to_file,
-                "back": self.back_asked.emit, "add": self.ask_to_add, "duplicate": self.elements.duplicate,
-                "series": self.elements.make_series, "rename": self._rename,
-                "up": lambda: self.elements.move_by(-1), "down": lambda: self.elements.move_by(1),
-                "new": lambda: None if self.stack.currentIndex() else self._ask(self.new_asked),
-                "open": self.header.open_file, "save": save, "undo": undo, "redo": redo, "keys": self.keys.switch,
+                "back": partial(self.ask, "back"), "add": self.ask_to_add, "duplicate": self.duplicate,
+                "series": self.make_series, "rename": self._rename,
+                "up": partial(self.move_by, -1), "down": partial(self.move_by, 1),
+                "new": lambda: None if self.stack.currentIndex() else self._ask("new"),
+                "open": self.header.open_file, "save": partial(self._ask, "save"),
+                "undo": partial(self._ask, "undo"), "redo": partial(self._ask, "redo"), "keys": self.keys.switch,
             },
         )  # fmt: skip
-        press(self.header.keys, self.commands["keys"])
+        for name, button in (
+            ("keys", self.header.keys), ("undo", self.header.undo), ("redo", self.header.redo),
+            ("save", self.header.save), ("up", head.up), ("down", head.down), ("duplicate", head.copy),
+            ("series", head.series),
+        ):  # fmt: skip
+            press(button, self.commands[name])
+        head.delete.clicked.connect(self.delete)
+
+    # the elements of the form and of the outline that are selected
+
+    def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
+        path = () if self.view.form is None else self.view.form.path
+        return path, tuple(one for one in self.outline.selected if one != path)
+
+    def _join(self, path: ElementPath, all_between: bool) -> None:
+        """Select a question with the one of the form, or no longer; where none is edited, open it."""
+        form = self.view.form
+        if form is None or form.path[:-1] != path[:-1]:
+            self._ask("select", path)
+        elif all_between:
+            first, last = sorted((int(form.path[-1]), int(path[-1])))
+            self.outline.select_several(tuple((*path[:-1], at) for at in range(first, last + 1)))
+        else:
+            self.outline.select_several((path,), selects=path not in self.outline.selected)
+
+    def duplicate(self) -> None:
+        """Ask for a copy of each."""
+        path, also = self._several()
+        if self.form.head.copy.isEnabled():
+            self.flush()
+            self.asked.emit(DuplicateElement(path, also))
+
+    def make_series(self) -> None:
+        """Ask for copies of the form's element that differ in one number."""
+        if self.view.form is not None:
+            self._ask("series", self.view.form.path)
+
+    def delete(self) -> None:
+        """Ask to delete them."""
+        path, also = self._several()
+        if self.form.head.delete.isEnabled():
+            self.flush()
+            self.ask("delete", path, also)
+
+    def move_by(self, by: int) -> None:
+        """Ask to move them up (-1) or down (1)."""
+        path, also = self._several()
+        if path and not self.view.header.read_only:
+            self.flush()
+            self.asked.emit(MoveElement(path, by, also))
 
     # what is shown
 
     def show_view(self, view: DesignerView) -> None:
         """Show a study; only what has changed is made anew."""
         before, self.view = self.view, view
-        self.show_header(view.header)
+        self.header.show_state(view.header)
         self.nothing.setVisible(view.form is None)
         self.parts.setVisible(view.form is not None)
         self.banner.show_banner(view.banner)
@@ -488,16 +429,6 @@ class DesignerPlace(Place):
         self.problem_steps.begin()
         self.measures.area.verticalScrollBar().setValue(0)
 
-    def show_header(self, state: HeaderState) -> None:
-        self.header.show_state(state)
-
-    def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
-        self.outline.show_outline(rows, selected)
-
-    def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
-        """Offer the repairs of a problem."""
-        self.problem_steps.show_repairs(row, words)
-
     def show_new(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
         self.new_page.card.questions.clear()
         self.new_page.show_choices(choices, chosen)
@@ -509,20 +440,6 @@ class DesignerPlace(Place):
         if self.stack.currentIndex():
             self.stack.setCurrentIndex(0)
             self.areas.focus_element()
-
-    def refuse_new(self, sentence: str, free: str = "") -> None:
-        """Say why a study cannot begin so, and offer a short name that is free."""
-        self.new_page.refuse(sentence, free)
-
-    def refuse(self, path: tuple[str | int, ...], sentence: str) -> None:
-        """Say at its field why something was not done."""
-        self.form.refuse(path, sentence)
-
-    def ask_to_delete(self, asked: DeletePrompt) -> None:
-        """Show what names an element, and ask what becomes of it."""
-        made = DeleteCard(asked)
-        made.answered.connect(self.asked)
-        self.show_prompt(made, made.first)
 
     def show_prompt(self, prompt: Prompt, first: QWidget) -> None:
         """Show a question in the place; ``first`` takes the keyboard."""
@@ -550,9 +467,13 @@ class DesignerPlace(Place):
         self.form.flush()
         self.file.editor.flush()
 
-    def _select(self, path: ElementPath) -> None:
-        """Select an element, after what is being typed."""
-        self.selected.emit(self._after_typing(path))
+    def ask(self, what: Task, *arguments: Any) -> None:
+        """Ask for what is no step of the study."""
+        self.asked.emit(Do(what, arguments))
+
+    def _ask(self, what: Task, *arguments: Any) -> None:
+        """Ask for it after what is being typed, with the id that the element of the form has then."""
+        self.asked.emit(self._after_typing(Do(what, arguments)))
 
     def _after_typing(self, asked: Any) -> Any:
         """Hand on what is being typed; return a path or request with the id that the form's element has then."""
@@ -561,15 +482,10 @@ class DesignerPlace(Place):
         after = () if self.form.form is None else self.form.form.path
         return asked if before == after else with_path(asked, before, after)
 
-    def _ask(self, asked: SignalInstance) -> None:
-        self.flush()
-        asked.emit()
-
     def ask_to_add(self) -> None:
         """Ask what can be added."""
         if self.view.form is not None and self.outline.add.isEnabled() and not self.stack.currentIndex():
-            self.flush()
-            self.add_asked.emit()
+            self._ask("add")
 
     def show_addable(self, every: tuple[Addable, ...]) -> None:
         button = self.outline.add if self.outline.add.isVisible() else self.header
@@ -579,17 +495,17 @@ class DesignerPlace(Place):
         """Hand on a request, after what is being typed; those of the place itself are done here."""
         if not (isinstance(asked, SetText | LeaveText) or (isinstance(asked, SetValue) and asked.typing)):
             asked = self._after_typing(asked)
-        if isinstance(asked, AskSeries):
-            self.series_asked.emit(asked)
-        elif isinstance(asked, GoTo):
-            self._go_to(asked.element, asked.field)
-        else:
-            self.asked.emit(asked)
-
-    def _go_to(self, element: ElementPath, field: ElementPath) -> None:
-        """Select an element and give the keyboard to one of its fields."""
-        self._select(element)
-        self.areas.focus_field(field)
+        match asked:
+            case Do("join", (path, all_between)):
+                self._join(path, all_between)
+            case Do("write", (path,)):
+                self.ask("select", path)
+                self.form.focus((*path, "text"))
+            case GoTo(element, field):
+                self.ask("select", element)
+                self.areas.focus_field(field)
+            case _:
+                self.asked.emit(asked)
 
     def show_step(self, several: tuple[ElementPath, ...], said: str, *, fresh: bool) -> None:
         """Select the elements of a step together, say what it did, and lead to the first text of a new one."""
@@ -601,10 +517,6 @@ class DesignerPlace(Place):
         if fresh and not (several and beside):  # after a copy in an open outline, the keyboard stays there
             self.parts.show_side("form")
             self.form.focus_first_text(filled=bool(several))  # a copy has its texts
-
-    def _ask_for_repair(self, row: ProblemRow, words: str) -> None:
-        self.flush()
-        self.repair_asked.emit(row, words)
 
     def _next_problem(self) -> None:
         if self.view.form is not None:

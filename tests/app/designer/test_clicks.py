@@ -100,7 +100,7 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
     assert listed(designer)[len(own) : len(own) + len(shipped_ones)] == sorted(shipped_ones, key=str.casefold)
     before = listed(designer)
     designer.open("beta")
-    designer.place.save_asked.emit()
+    designer.place.ask("save")
     designer.controller.enter()
     assert listed(designer) == before
     box = designer.place.header.study

@@ -188,7 +188,7 @@ def on_disk(record: Record) -> None:
     record.note("changed outside", designer.controller.enter, paints=True)
     record.note("save", designer.saving.save)
     for action in ("compare", "mine", "outside"):
-        record.note(f"banner {action}", lambda action=action: designer.place.banner_asked.emit(action))
+        record.note(f"banner {action}", lambda action=action: designer.place.ask("banner", action))
     designer.file.unlink()
     record.note("deleted outside", designer.controller.enter)
     record.note("open another", lambda: designer.controller.open("rek2024"))
