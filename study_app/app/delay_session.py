@@ -280,8 +280,7 @@ class WindowsThread(QObject):
         super().__init__()
         self._application = application_here() if paints else QCoreApplication.instance() or QCoreApplication([])
         self._painting = Painting() if paints else None
-        self._qt_timer = QTimer(self)
-        self._qt_timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._qt_timer = QTimer(self, timerType=Qt.TimerType.PreciseTimer)
         self._qt_timer.timeout.connect(self._fire)
         self._firing: _Firing | None = None
         self._working = False
@@ -422,8 +421,7 @@ class Painting(QObject):
             window.deleteLater()
 
     def _timer(self, interval_ms: int, slot: Callable[[], None]) -> QTimer:
-        timer = QTimer(self)
-        timer.setInterval(interval_ms)
+        timer = QTimer(self, interval=interval_ms)
         if interval_ms == FRAME_MS:
             timer.setTimerType(Qt.TimerType.PreciseTimer)
         timer.timeout.connect(slot)

@@ -165,9 +165,7 @@ class LabOpening(QObject):
         self._cancelled = threading.Event()
         self._thread: threading.Thread | None = None
         self._began_s = 0.0
-        self._start = QTimer(self)
-        self._start.setSingleShot(True)
-        self._start.setInterval(STARTS_AFTER_MS)
+        self._start = QTimer(self, singleShot=True, interval=STARTS_AFTER_MS)
         self._start.timeout.connect(self._begin)
         self._done.connect(self._end, Qt.ConnectionType.QueuedConnection)
 
@@ -540,10 +538,7 @@ class LabController(QObject):
         self._connect()
 
     def _timer(self, interval_ms: int, slot: Callable[[], None], *, once: bool = False) -> QTimer:
-        timer = QTimer(self)
-        timer.setInterval(interval_ms)
-        timer.setSingleShot(once)
-        timer.setTimerType(Qt.TimerType.PreciseTimer)
+        timer = QTimer(self, interval=interval_ms, singleShot=once, timerType=Qt.TimerType.PreciseTimer)
         timer.timeout.connect(slot)
         return timer
 

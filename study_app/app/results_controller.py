@@ -116,8 +116,7 @@ class ResultsController(QObject):
         self._going: Going | None = None
         self._redrawn: set[str] = set()
         self._blocks = 0
-        self._listening = QTimer(self)
-        self._listening.setInterval(LISTEN_MS)
+        self._listening = QTimer(self, interval=LISTEN_MS)
         self._listening.timeout.connect(self._listen)
         self._connect()
 

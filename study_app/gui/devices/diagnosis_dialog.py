@@ -41,11 +41,9 @@ class Paste(QWidget):
 
     def __init__(self, text: str) -> None:
         super().__init__()
-        self.field = QLineEdit(text)
-        self.field.setReadOnly(True)
+        self.field = QLineEdit(text, readOnly=True, cursorPosition=0)
         self.field.setFont(font("label", weight=400))
         self.field.setAccessibleName("Command for a terminal")
-        self.field.setCursorPosition(0)
         self.copy = ActionButton("copy", "Copy", height=38)
         self.copy.setAccessibleName("Copy command")
         self.copy.setAutoDefault(False)
@@ -189,9 +187,8 @@ class DiagnosisDialog(QDialog):
         self.note.setVisible(bool(note))
         self.seen = label("", "label", "text2", wraps=True)
         self.seen.setFont(font("label", weight=400, tabular=True))
-        self.bar = QProgressBar()
+        self.bar = QProgressBar(textVisible=False)
         self.bar.setRange(0, 0)
-        self.bar.setTextVisible(False)
         self.bar.setFixedHeight(8)
         self.sign = Icon("pulse", "accent", 26)
         self.again = ActionButton("repeat", "Run again")
@@ -205,8 +202,7 @@ class DiagnosisDialog(QDialog):
         room = self.screen().availableSize()
         self.resize(SIZE.boundedTo(QSize(room.width() - 40, room.height() - 60)))
         apply_theme(self, theme)
-        self._timer = QTimer(self)
-        self._timer.setInterval(LOOK_MS)
+        self._timer = QTimer(self, interval=LOOK_MS)
         self._timer.timeout.connect(self._look)
         self.examine()
 

@@ -175,9 +175,7 @@ class Frames(QObject):
         self._next_ns = 0
         self._drawn_ns = -NS_PER_S
         self._swapped_ns: int | None = None
-        self._timer = QTimer(self)
-        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
-        self._timer.setSingleShot(True)
+        self._timer = QTimer(self, timerType=Qt.TimerType.PreciseTimer, singleShot=True)
         self._timer.timeout.connect(self._draw)
 
     @property

@@ -199,9 +199,7 @@ class PageReader(Themed, QTextBrowser):
         return max(200, min(WIDEST_TEXT, self.viewport().width() - 2 * MARGIN))
 
     def _draw(self) -> None:
-        document = QTextDocument(self)
-        document.setDefaultFont(font("body", weight=400))
-        document.setDocumentMargin(MARGIN)
+        document = QTextDocument(self, defaultFont=font("body", weight=400), documentMargin=MARGIN)
         document.setMarkdown(text_of(self.page), QTextDocument.MarkdownFeature.MarkdownDialectGitHub)
         self._style_blocks(document)
         self._style_tables(document)
@@ -300,11 +298,9 @@ class HelpPlace(Place):
         super().__init__()
         self._before: list[str] = []
         self._came_from = ""
-        self.words = QLineEdit()
-        self.words.setPlaceholderText("Search the pages")
+        self.words = QLineEdit(placeholderText="Search the pages", clearButtonEnabled=True)
         self.words.setAccessibleName("Search the pages")
         self.words.setFont(font("label", weight=400))
-        self.words.setClearButtonEnabled(True)
         self.list = QListWidget()
         self.list.setAccessibleName("Pages")
         self.list.setFrameShape(QFrame.Shape.NoFrame)

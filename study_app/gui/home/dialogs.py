@@ -75,9 +75,8 @@ class RehearsalDialog(QDialog):
             "text2",
             wraps=True,
         )
-        self.progress = QProgressBar()
+        self.progress = QProgressBar(textVisible=False)
         self.progress.setRange(0, 0)
-        self.progress.setTextVisible(False)
         self.progress.setFixedHeight(8)
         self.progress.hide()
         self.start = ActionButton("fast_forward", "Rehearse", role="primary")
@@ -93,8 +92,7 @@ class RehearsalDialog(QDialog):
         apply_theme(self, theme)
         self.start.clicked.connect(self._start)
         self.cancel.clicked.connect(self.reject)
-        self._listening = QTimer(self)
-        self._listening.setInterval(LISTEN_MS)
+        self._listening = QTimer(self, interval=LISTEN_MS)
         self._listening.timeout.connect(self._listen)
 
     def _start(self) -> None:

@@ -43,10 +43,8 @@ class Command:
 
     def action(self, place: QWidget, run: Callable[[], object]) -> QAction:
         """Return its action, added to a widget: its keys act anywhere in the window while the widget is shown."""
-        made = QAction(self.words, place)
-        made.setToolTip(tip(self.id))
+        made = QAction(self.words, place, toolTip=tip(self.id), shortcutContext=Qt.ShortcutContext.WindowShortcut)
         made.setShortcuts([QKeySequence(keys) for keys in self.keys])
-        made.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
         made.triggered.connect(lambda _checked=False: run())
         place.addAction(made)
         return made

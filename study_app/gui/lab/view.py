@@ -173,8 +173,7 @@ class LabPlace(Place):
             ("Ctrl+Shift+Z", self.redo_asked),
             ("Ctrl+Y", self.redo_asked),
         ):
-            shortcut = QShortcut(QKeySequence(sequence), self)
-            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            shortcut = QShortcut(QKeySequence(sequence), self, context=Qt.ShortcutContext.WidgetWithChildrenShortcut)
             shortcut.activated.connect(signal)
 
     @property

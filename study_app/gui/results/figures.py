@@ -234,8 +234,7 @@ class FigureView(Themed, QWidget):
         self._wanted: tuple[object, ...] = ()
         self._drawing: threading.Thread | None = None
         self._made: queue.SimpleQueue[tuple[tuple[object, ...], QImage]] = queue.SimpleQueue()
-        self._look = QTimer(self)
-        self._look.setInterval(LOOK_MS)
+        self._look = QTimer(self, interval=LOOK_MS)
         self._look.timeout.connect(self._take)
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         policy.setHeightForWidth(True)

@@ -398,8 +398,7 @@ class TakeBackDialog(Decision):
 
 
 def _line(placeholder: str) -> QLineEdit:
-    made = QLineEdit()
-    made.setPlaceholderText(placeholder)
+    made = QLineEdit(placeholderText=placeholder)
     return made
 
 
@@ -610,8 +609,7 @@ class SessionPage(QDialog):
         files.column.addWidget(self.files)
         page = QWidget()
         vbox(out, notes, files, STRETCH, margins=0, parent=page)
-        area = QScrollArea()
-        area.setWidgetResizable(True)
+        area = QScrollArea(widgetResizable=True)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setFixedWidth(372)
         area.setWidget(page)

@@ -294,8 +294,7 @@ class DisplayTest(QWidget):
         apply_theme(self, PARTICIPANT)
         self.frames = Frames(self.times.refresh_hz, now_ns=now_ns, parent=self)
         self.frames.due.connect(self.frame)
-        self.report_timer = QTimer(self)
-        self.report_timer.setInterval(REPORT_MS)
+        self.report_timer = QTimer(self, interval=REPORT_MS)
         self.report_timer.timeout.connect(self.show_figures)
 
     def _lay_out(self, screen_words: str) -> None:

@@ -56,8 +56,7 @@ def scrolled(content: QWidget | QLayout) -> QScrollArea:
         inside.setLayout(content)
     else:
         inside = content
-    area = QScrollArea()
-    area.setWidgetResizable(True)
+    area = QScrollArea(widgetResizable=True)
     area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     area.setWidget(inside)

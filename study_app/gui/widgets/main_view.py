@@ -33,9 +33,7 @@ class EscapeKey(QObject):
         self._aside: QWidget | None = None
         self._began_aside = False
         self._watched: QWindow | None = None
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(HOLD_MS)
+        self._timer = QTimer(self, singleShot=True, interval=HOLD_MS)
         self._timer.timeout.connect(self._fire)
         application = QGuiApplication.instance()
         if anywhere and isinstance(application, QGuiApplication):

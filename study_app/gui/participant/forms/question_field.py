@@ -584,8 +584,7 @@ class OptionsField(QuestionField):
     def hold(self, options: Sequence[OptionLook]) -> None:
         """Take the options, in the order of their digits."""
         self.options = options
-        self._group = QButtonGroup(self)
-        self._group.setExclusive(not self.several)
+        self._group = QButtonGroup(self, exclusive=not self.several)
         # Not the methods themselves: Qt would forget the role of this widget (`give_role`).
         self._group.idClicked.connect(lambda place: self._click(place))  # noqa: PLW0108
         self._group.idToggled.connect(lambda place, on: self._toggle(place, on))  # noqa: PLW0108
@@ -768,9 +767,7 @@ class TypedField(QuestionField):
     def type_into(self, entry: QWidget, wait_ms: int, take: Callable[[], object]) -> None:
         """Give the keyboard to ``entry``; call ``take`` this time after the last key."""
         self.setFocusProxy(entry)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(wait_ms)
+        self._timer = QTimer(self, singleShot=True, interval=wait_ms)
         self._timer.timeout.connect(take)
 
     def typed(self) -> str:

@@ -203,9 +203,7 @@ class QuestionsPage(PageWidget):
         self.foot.button.clicked.connect(self.submit)
         self.tabs: list[QPushButton] = []
         self._lay_out_once()
-        self._sender = QTimer(self)
-        self._sender.setSingleShot(True)
-        self._sender.setInterval(0)
+        self._sender = QTimer(self, singleShot=True, interval=0)
         self._sender.timeout.connect(self._send_seen)
         chosen = dict(page.chosen)
         for field in self.fields:

@@ -41,9 +41,7 @@ class AnswerPage(PageWidget):
         self.page = page
         self._answered = False
         self._progress = ProgressLine(page.progress, words, ASKING, self)
-        self.question = QLabel(page.item.text, self)
-        self.question.setWordWrap(True)
-        self.question.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.question = QLabel(page.item.text, self, wordWrap=True, alignment=Qt.AlignmentFlag.AlignCenter)
         self.setAccessibleName(page.item.text)
         self._column = vbox(self._progress, (STRETCH, 2), self.question, 36, parent=self)
 
@@ -100,10 +98,9 @@ class ChoiceWidget(AnswerPage):
         self.buttons: list[QPushButton] = []
         self._values = [value for value, _ in page.item.options]
         for value, text in page.item.options:
-            button = QPushButton(text, self)
+            button = QPushButton(text, self, autoDefault=False)
             button.setAccessibleName(text)
             button.setAccessibleDescription(page.item.text)
-            button.setAutoDefault(False)
             button.pressed.connect(lambda value=value: self.answer(value))
             button.installEventFilter(self)
             self.buttons.append(button)
@@ -257,9 +254,7 @@ class NumberWidget(AnswerPage):
     ) -> None:
         super().__init__(page, words, clock, parent, text_scale=text_scale)
         self._permits = page.item.permits
-        self.field = QLineEdit(self)
-        self.field.setMaxLength(LONGEST)
-        self.field.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.field = QLineEdit(self, maxLength=LONGEST, alignment=Qt.AlignmentFlag.AlignCenter)
         self.field.setAccessibleName(page.item.text)
         self.field.setAccessibleDescription(words.number_wanted)
         self.wrong = QLabel("", self)
@@ -333,8 +328,7 @@ class SettingControls(QWidget):
         self._buttons = buttons
         self._held = 0
         self._turned = 0
-        self._timer = QTimer(self)
-        self._timer.setInterval(STEP_MS)
+        self._timer = QTimer(self, interval=STEP_MS)
         self._timer.timeout.connect(lambda: self._step(self._held))
         self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
         self.setCursor(Qt.CursorShape.ArrowCursor)

@@ -83,9 +83,7 @@ class Column(QWidget):
         self._badge = Badge(icon, colour)
         self._title = HeadingLabel(title)
         self._title.setWordWrap(True)
-        self._body = QLabel()
-        self._body.setWordWrap(True)
-        self._body.setTextFormat(Qt.TextFormat.RichText)
+        self._body = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
         badge = (self._badge, 0, Qt.AlignmentFlag.AlignLeading)
         self._layout = vbox(badge, self._title, self._body, (STRETCH, 1), margins=0, parent=self)
         for label, ink in ((self._title, PARTICIPANT.text), (self._body, PARTICIPANT.text2)):
@@ -252,8 +250,7 @@ class TextWidget(ReadingPage):
         self._stays_until_s = page.stays_until_s
         self.count_label = QLabel(self)
         self.count_label.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
-        self._ticker = QTimer(self)
-        self._ticker.setInterval(TICK_MS)
+        self._ticker = QTimer(self, interval=TICK_MS)
         self._ticker.timeout.connect(self.tick)
         self._stacked = False
         self.languages: LanguageSwitch | None = None
