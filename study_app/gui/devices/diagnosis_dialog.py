@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent
-from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QGridLayout, QLineEdit, QProgressBar, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLineEdit, QProgressBar, QWidget
 
 from study_app.devices.doctor import Finding, Report, State, lines
 from study_app.devices.doctor_worker import ExaminationClient, start_examination
@@ -14,7 +14,7 @@ from study_app.devices.registry import descriptor_of, doctor_of, title_of
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within
-from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label, set_ink
@@ -111,20 +111,17 @@ class FindingRow(Themed, QWidget):
 
     def _body(self, finding: Finding) -> QWidget:
         whole = QWidget()
-        grid = QGridLayout(whole)
-        grid.setContentsMargins(34, 0, 8, 6)
-        grid.setHorizontalSpacing(14)
-        grid.setVerticalSpacing(4)
-        grid.setColumnStretch(1, 1)
+        cells = grid(14, 4, margins=(34, 0, 8, 6), parent=whole)
+        cells.setColumnStretch(1, 1)
         rows = (("Cause", capital(finding.cause)), ("Cure", capital(finding.cure)), ("Detected by", finding.known_by))
         for row, (name, words) in enumerate((name, words) for name, words in rows if words):
             text = label(words, "label", "text", wraps=True)
             text.setFont(font("label", weight=600 if name == "Cure" and self.found else 400))
             text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-            grid.addWidget(label(name, "label", "text2"), row, 0, Qt.AlignmentFlag.AlignTop)
-            grid.addWidget(text, row, 1)
+            cells.addWidget(label(name, "label", "text2"), row, 0, Qt.AlignmentFlag.AlignTop)
+            cells.addWidget(text, row, 1)
         if finding.paste:
-            grid.addWidget(Paste(finding.paste), len(rows), 1)
+            cells.addWidget(Paste(finding.paste), len(rows), 1)
         return whole
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -185,8 +182,7 @@ class DiagnosisDialog(QDialog):
         self.step = label(PREPARING, "body", "text2", wraps=True)
         self.note = label(note, "label", "warn", wraps=True)
         self.note.setVisible(bool(note))
-        self.seen = label("", "label", "text2", wraps=True)
-        self.seen.setFont(font("label", weight=400, tabular=True))
+        self.seen = label("", "label", "text2", wraps=True, weight=400, tabular=True)
         self.bar = QProgressBar(textVisible=False)
         self.bar.setRange(0, 0)
         self.bar.setFixedHeight(8)

@@ -141,8 +141,7 @@ class OptionCard(Card):
     def __init__(self, option: DeviceOption) -> None:
         super().__init__(option.title, gap=8)
         self._option = option
-        about = label(option.about, "label", "text2", wraps=True)
-        about.setFont(font("label", weight=400))
+        about = label(option.about, "label", "text2", wraps=True, weight=400)
         about.setMinimumWidth(LEAST_WORDS)
         self.file = Elided("label", "text")
         self.choose = ActionButton("file", "Choose file …", height=38)
@@ -176,8 +175,7 @@ class HelpCard(Card):
             "“liquid-study devices calibrate” measures its force with a known weight.",
             "“liquid-study devices bench” measures any device with force in ten minutes; the result is shown here.",
         ):
-            line = label(words, "label", "text2", wraps=True)
-            line.setFont(font("label", weight=400))
+            line = label(words, "label", "text2", wraps=True, weight=400)
             line.setMinimumWidth(LEAST_WORDS)
             self.column.addWidget(line)
 

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPaintEvent, QPen, QRadialGradient
-from PySide6.QtWidgets import QGridLayout, QSizePolicy, QSpacerItem, QWidget
+from PySide6.QtWidgets import QSizePolicy, QSpacerItem, QWidget
 
 from study_app.gui.home.study_facts import BrokenFacts, DraftFacts, Interrupted, StudyFacts
 from study_app.gui.kit.devices import DeviceShown
@@ -17,7 +17,7 @@ from study_app.gui.sessions.session_facts import KINDS, Column, SessionFacts
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import RADIUS_CARD, TANK, font
 from study_app.gui.theme.themed import Themed, remove_widget
-from study_app.gui.widgets.boxes import add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Clamped, Elided, label, set_ink
@@ -347,9 +347,7 @@ class CardGrid(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.cards: list[QWidget] = []
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(0, 0, 0, 0)
-        self._grid.setSpacing(GAP)
+        self._grid = grid(GAP, GAP, margins=0, parent=self)
         self._across, self._least = 0, LEAST_WIDTH
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QDialog, QGridLayout, QLineEdit, QProgressBar, QWidget
+from PySide6.QtWidgets import QDialog, QLineEdit, QProgressBar, QWidget
 
 from study_app.devices.registry import descriptor_of, list_devices
 from study_app.errors import StoreError, StudyError
@@ -18,7 +18,7 @@ from study_app.gui.kit.fields import Editor, Field, choice, seed
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Question
@@ -323,15 +323,12 @@ class NewSessionDialog(QDialog):
             (e["row_of"],),
             *((e[option.name],) for option in window_options()),
         )
-        grid = QGridLayout(self._inside)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(16)
-        grid.setVerticalSpacing(12)
-        grid.setRowStretch(len(pairs), 1)
+        cells = grid(16, 12, margins=0, parent=self._inside)
+        cells.setRowStretch(len(pairs), 1)
         for row, pair in enumerate(pairs):
             for column, part in enumerate(pair):
-                grid.setColumnStretch(column, 1)
-                grid.addWidget(part, row, column, 1, 3 - len(pair))
+                cells.setColumnStretch(column, 1)
+                cells.addWidget(part, row, column, 1, 3 - len(pair))
         self._area = scrolled(self._inside)
         about = f"{self.facts.title}  ·  {self.facts.extent}  ·  {self.facts.duration}"
         head, told = label("New session", "title_dense"), label(about, "body", "text2", wraps=True)

@@ -26,7 +26,7 @@ from study_app.gui.lab.parameters import HIDDEN
 from study_app.gui.theme.theme import LIGHT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.accessible import describe_plot
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Icon, MaskedPanel, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_ink
@@ -327,10 +327,8 @@ class CostCard(ReadingCard):
         self.absent: list[AbsentLine] = []
         self._costs = vbox(spacing=0)
         self._absent = vbox(spacing=0)
-        self.sum_name = label("Sum", "label")
-        self.sum_name.setFont(font("label", weight=600))
-        self.sum = figures("", "label")
-        self.sum.setFont(font("label", weight=600, tabular=True))
+        self.sum_name = label("Sum", "label", weight=600)
+        self.sum = figures("", "label", weight=600)
         self.sum.setAlignment(Qt.AlignmentFlag.AlignRight)
         whole = hbox(self.sum_name, (self.sum, 1))
         add_parts(self.content, self._costs, Rule(), whole, self._absent, STRETCH)
@@ -517,9 +515,7 @@ class EstimateCard(ReadingCard):
         self.follow.setToolTip("Apply estimates as they come, slowly, within the slope and force limits")
         self._inside = QWidget()
         buttons = hbox(self.apply, self.follow, STRETCH, spacing=10)
-        inner = QGridLayout(self._inside)
-        inner.setContentsMargins(0, 0, 0, 0)
-        inner.setVerticalSpacing(6)
+        inner = grid(down=6, margins=0, parent=self._inside)
         inner.addWidget(self.parameters, 0, 0)
         add_layout(inner, self._grid, 1, 0)
         inner.addWidget(self.message, 2, 0)

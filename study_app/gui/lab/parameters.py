@@ -2,13 +2,13 @@
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractButton, QGridLayout, QHBoxLayout, QLabel, QSizePolicy, QStackedLayout, QWidget
+from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy, QStackedLayout, QWidget
 
 from study_app.gui.lab.lab_state import SIDES, Choices, FormRow, FormSection, LabView, form
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, CompactStop, IconButton, Toggle
 from study_app.gui.widgets.labels import Clamped, label
@@ -216,10 +216,7 @@ class LabHeader(Themed, QWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(24, 12, 24, 13)
-        self._grid.setHorizontalSpacing(16)
-        self._grid.setVerticalSpacing(8)
+        self._grid = grid(16, 8, margins=(24, 12, 24, 13), parent=self)
         self._left, self._middle, self._right = (_row() for _ in range(3))
         parts: dict[QHBoxLayout, tuple[QWidget, ...]] = {
             self._left: (self.title, self.sides),
@@ -515,19 +512,16 @@ class SectionBlock(QWidget):
         self.rows = {row.parameter.name: row_for(row.parameter) for row in section.rows}
         self.count = label("", "small", "text2")
         head = hbox(label(section.title, "strong", heading=True), STRETCH, self.count)
-        grid = QGridLayout()
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(8)
-        grid.setVerticalSpacing(2)
-        vbox(head, grid, spacing=4, margins=(0, 8, 0, 8), parent=self)
+        cells = grid(8, 2, margins=0)
+        vbox(head, cells, spacing=4, margins=(0, 8, 0, 8), parent=self)
         line, column = 0, 0
         for row in self.rows.values():
             if isinstance(row, SwitchRow):
-                grid.addWidget(row, line, column)
+                cells.addWidget(row, line, column)
                 line, column = (line + 1, 0) if column else (line, 1)
                 continue
             line, column = (line + 1, 0) if column else (line, 0)
-            grid.addWidget(row, line, 0, 1, 2)
+            cells.addWidget(row, line, 0, 1, 2)
             line += 1
 
     def show_section(self, section: FormSection) -> None:

@@ -14,7 +14,7 @@ from study_app.gui.lab.lab_state import FILE, LabView
 from study_app.gui.lab.lab_tank import LabTank, TankNote
 from study_app.gui.lab.parameters import KEY, FormPanel, LabHeader
 from study_app.gui.theme.theme import SPACE
-from study_app.gui.widgets.boxes import add_layout, vbox
+from study_app.gui.widgets.boxes import add_layout, grid, vbox
 from study_app.gui.widgets.cards import SHADOW, scrolled
 from study_app.gui.widgets.main_view import EscapeKey, Place
 from study_app.lab.ab_comparison import Setting
@@ -89,12 +89,8 @@ class LabPlace(Place):
         self._arrange(wide=True)
 
     def _lay_out(self) -> None:
-        self._side = QGridLayout()
-        self._side.setContentsMargins(0, 0, 0, 0)
-        self._side.setSpacing(GAP)
-        self._middle = QGridLayout()
-        self._middle.setContentsMargins(0, 0, 0, 0)
-        self._middle.setSpacing(GAP)
+        self._side = grid(GAP, GAP, margins=0)
+        self._middle = grid(GAP, GAP, margins=0)
         self._middle.setColumnStretch(0, 1)
         self._middle.setColumnStretch(1, 1)
         framed = vbox(self.tank, margins=(SHADOW, SHADOW - 1, SHADOW, SHADOW))  # as the neighbouring cards
@@ -107,9 +103,7 @@ class LabPlace(Place):
         self._middle.setRowStretch(1, PLOTS_STRETCH)
         self.area = scrolled(self._middle)
         self._side_area = scrolled(QGridLayout())
-        self._body = QGridLayout()
-        self._body.setContentsMargins(SPACE[4] - 3, GAP, SPACE[4] - 3, GAP)
-        self._body.setSpacing(GAP)
+        self._body = grid(GAP, GAP, margins=(SPACE[4] - 3, GAP, SPACE[4] - 3, GAP))
         self._body.addWidget(self.form, 0, 0)
         self._body.addWidget(self.area, 0, 1)
         self._body.addWidget(self._side_area, 0, 2)

@@ -7,7 +7,6 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
-    QGridLayout,
     QLabel,
     QLineEdit,
     QPlainTextEdit,
@@ -23,7 +22,7 @@ from study_app.gui.operator.operator_view import NOTES_SHOWN, DeviceView, Operat
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.dialogs import Question
@@ -41,8 +40,7 @@ class Actions(Card):
         super().__init__(padding=14)
         self.pause = ActionButton("pause", "Pause", key="P")
         self.repeat = ActionButton("repeat", "Repeat trial …", key="R")
-        self.hint = label("", "label", "text2", wraps=True)
-        self.hint.setFont(font("label", weight=400))
+        self.hint = label("", "label", "text2", wraps=True, weight=400)
         self.exclude = ActionButton("flag", "Exclude …", key="X")
         self.end = ActionButton("cross", "End session …", role="danger")
         self.close_session = ActionButton("check", "Close session", role="primary")
@@ -337,9 +335,7 @@ class DeviceCard(Card):
         self._view: DeviceView | None = None
         row = hbox(self.icon, self.name, STRETCH, self.chip, spacing=10)
         add_layout(self.column, row)
-        self._grid = QGridLayout()
-        self._grid.setVerticalSpacing(8)
-        self._grid.setHorizontalSpacing(12)
+        self._grid = grid(12, 8)
         self._grid.setColumnStretch(1, 1)
         add_parts(self.column, self._grid, self.diagnose)
         self.rows: list[tuple[QLabel, Elided]] = []

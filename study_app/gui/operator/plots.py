@@ -3,13 +3,13 @@
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSize, Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QGridLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.operator.operator_view import OperatorView
 from study_app.gui.operator.servo_health import TRACE_WINDOW_S, Forces, ServoHealth, Tile, Verdict
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.widgets.accessible import describe_plot
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, MaskedPanel
 from study_app.gui.widgets.labels import Elided, Ink, figures, label
 from study_app.gui.widgets.live_plots import (
@@ -263,9 +263,7 @@ class Tiles(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(0, 0, 0, 0)
-        self._grid.setSpacing(10)
+        self._grid = grid(10, 10, margins=0, parent=self)
         self.cards = [TileCard() for _ in range(4)]
         self.narrow(False)
 

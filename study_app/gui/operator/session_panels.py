@@ -2,14 +2,14 @@
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.kit.commands import key_cap
 from study_app.gui.operator.operator_view import OperatorView, State, StepRow
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, Tone, TypeRole, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Bar, Card, Chip, Icon, Logo, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, CompactStop
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
@@ -240,10 +240,7 @@ class Now(QWidget):
         row = hbox(self.elapsed_word, STRETCH, self.elapsed)
         vbox(self.part, self.heading, self.setting, STRETCH, spacing=6, margins=0, parent=self._words)
         vbox(row, self.bar, self.least, STRETCH, spacing=6, margins=0, parent=self._time)
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(0, 0, 0, 0)
-        self._grid.setHorizontalSpacing(24)
-        self._grid.setVerticalSpacing(12)
+        self._grid = grid(24, 12, margins=0, parent=self)
         self.lie_flat(False)
 
     def lie_flat(self, yes: bool) -> None:
@@ -293,10 +290,7 @@ class Tally(QWidget):
         self.track = label("", "small", "text2", wraps=True)
         self.track.hide()
         self._flat = False
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(0, 0, 0, 0)
-        self._grid.setHorizontalSpacing(8)
-        self._grid.setVerticalSpacing(8)
+        self._grid = grid(8, 8, margins=0, parent=self)
 
     def lie_flat(self, yes: bool) -> None:
         self._flat = yes
@@ -306,8 +300,7 @@ class Tally(QWidget):
         """Show the counts, the newest limit that was broken (the tip has all of them), and how the track is doing."""
         if len(self.counts) < len(view.counts):
             for _ in range(len(view.counts) - len(self.counts)):
-                value = figures("", "label")
-                value.setFont(font("label", weight=600, tabular=True))
+                value = figures("", "label", weight=600)
                 self.counts.append((label("", "label", "text2"), value))
             self._place()
         for (name, value), (word, count) in zip(self.counts, view.counts, strict=True):

@@ -9,7 +9,7 @@ from typing import Literal
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QMainWindow, QWidget
+from PySide6.QtWidgets import QMainWindow, QWidget
 
 from study_app.gui.operator.controls import ALL_ROWS, Actions, DeviceCard, NotesCard, ReasonQuestion, StopPanel
 from study_app.gui.operator.operator_view import NOTES_SHOWN, OperatorView
@@ -18,7 +18,7 @@ from study_app.gui.operator.servo_health import Forces, ServoHealth
 from study_app.gui.operator.session_panels import NARROW, SLIM, WIDTH, Banner, Header, Rail
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
-from study_app.gui.widgets.boxes import add_layout, vbox
+from study_app.gui.widgets.boxes import add_layout, grid, vbox
 from study_app.gui.widgets.cards import Card, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.dialogs import Notice
@@ -53,9 +53,7 @@ class Arrangement(QWidget):
         self._parts = p = window
         self._arranged: tuple[object, ...] = ()
         self.now = Card(padding=14, gap=10)
-        self._middle = QGridLayout()
-        self._middle.setContentsMargins(0, 0, 0, 0)
-        self._middle.setSpacing(GAP)
+        self._middle = grid(GAP, GAP, margins=0)
         for column in (0, 1):
             self._middle.setColumnStretch(column, 1)
         side = vbox(p.device, (p.notes, 1), spacing=GAP, margins=0)
@@ -63,8 +61,7 @@ class Arrangement(QWidget):
         self.side_area = scrolled(side)
         self.side_area.setFixedWidth(SIDE)
         right = vbox((self.side_area, 1), p.stop, spacing=GAP)
-        self._body = QGridLayout()
-        self._body.setVerticalSpacing(GAP)
+        self._body = grid(down=GAP)
         add_layout(self._body, right, 0, 2, 2, 1)
         self._body.setColumnStretch(1, 1)
         self._body.setRowStretch(0, 1)

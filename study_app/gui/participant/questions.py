@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QKeyEvent, QMouseEvent, QPaintEvent, QPen, QWheelEvent
-from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QPlainTextEdit, QPushButton, QSizePolicy, QSlider, QWidget
+from PySide6.QtWidgets import QLabel, QLineEdit, QPlainTextEdit, QPushButton, QSizePolicy, QSlider, QWidget
 
 from study_app.gui.participant.forms.question_field import (
     ENTER,
@@ -24,7 +24,7 @@ from study_app.gui.participant.forms.question_field import (
 from study_app.gui.participant.pages.page_widget import DigitPad, page_painter, point_at
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import say
-from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.numbers import read_number, write_number
 from study_app.protocol.questions import (
     ChoiceView,
@@ -62,8 +62,7 @@ class ChoiceField(OptionsField):
         longest = max(len(text) for _, text in view.options)
         self._across = min(len(self.options), 3 if longest <= SHORT else 2 if longest <= MEDIUM else 1)
         area = QWidget(self)
-        self._cells = QGridLayout(area)
-        self._cells.setContentsMargins(0, 0, 0, 0)
+        self._cells = grid(margins=0, parent=area)
         self._arrange(self._across)
         self.put(area)
 
@@ -272,8 +271,7 @@ class RatingField(ScaleField):
         self.build(view.labels, view.cannot_judge, view.cannot_judge)
         scale, area = QWidget(self), QWidget(self)
         scale.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
-        self.cells = QGridLayout(scale)
-        self.cells.setContentsMargins(0, 0, 0, 0)
+        self.cells = grid(margins=0, parent=scale)
         self.row = hbox((scale, len(self.points)), margins=0, parent=area)
         if self.judge is not None:
             self.row.addWidget(self.judge, JUDGE_SHARE, Qt.AlignmentFlag.AlignBottom)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QAccessible, QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QLabel, QProgressBar, QScrollArea, QWidget
+from PySide6.QtWidgets import QAbstractSlider, QLabel, QProgressBar, QScrollArea, QWidget
 
 from study_app.devices.descriptor import NOT_AVAILABLE, Backend
 from study_app.gui.sessions.session_facts import extent_of, operator_language, step_title
@@ -18,7 +18,7 @@ from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import describe_plot, give_role
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, Number
 from study_app.gui.widgets.dialogs import Question
@@ -210,8 +210,7 @@ class CheckRow(Themed, QWidget):
         name = label(check.name, "body")
         name.setFont(font("body", weight=600, scale=0.97))
         name.setFixedWidth(NAME)
-        about = label(check.about, "label", "text2", wraps=True)
-        about.setFont(font("label", weight=400, tabular=True))
+        about = label(check.about, "label", "text2", wraps=True, weight=400, tabular=True)
         about.setMinimumWidth(LEAST_WORDS)
         value = figures(check.value, "body", "text" if check.verdict == "ok" else ink)
         value.setFont(font("body", weight=600, tabular=True, scale=0.97))
@@ -228,8 +227,7 @@ class CheckRow(Themed, QWidget):
         hbox(name, (said, 1), value, spacing=14, margins=(0, 4, 0, 4), parent=holder)
         column = vbox(holder, spacing=0, margins=(LEFT, 0, 24, 0 if check.verdict == "ok" else 14), parent=self)
         if check.advice:
-            advice = label(check.advice, "label", "text", wraps=True)
-            advice.setFont(font("label", weight=500))
+            advice = label(check.advice, "label", "text", wraps=True, weight=500)
             column.addWidget(advice)
         self.setAccessibleName(f"{check.name}, {word}, {check.said}")
 
@@ -321,8 +319,7 @@ class PreflightWindow(QWidget):
         self.plot.setMinimumHeight(150)
         lateness.column.addWidget(self.plot, 1)
         self.runs = Card("What will run", padding=18, gap=8)
-        self._grid = QGridLayout()
-        self._grid.setVerticalSpacing(9)
+        self._grid = grid(down=9)
         self._grid.setColumnStretch(1, 1)
         add_layout(self.runs.column, self._grid)
         if self.masking is not None:
@@ -368,8 +365,7 @@ class PreflightWindow(QWidget):
     def _show_rows(self, view: PreflightView) -> None:
         for place, (name, words) in enumerate(view.rows):
             if name not in self._values:
-                value = figures("", "label")
-                value.setFont(font("label", weight=600, tabular=True))
+                value = figures("", "label", weight=600)
                 value.setAlignment(Qt.AlignmentFlag.AlignRight)
                 value.setWordWrap(True)
                 self._grid.addWidget(label(name, "label", "text2"), place, 0)

@@ -189,8 +189,7 @@ class SessionsCard(Card):
         self.state.addItem(EVERY, "")
         self._none = ""
         self.rows = SessionsTable(COLUMNS, "")
-        self.head = label("", "label")
-        self.head.setFont(font("label", weight=600, tabular=True))
+        self.head = label("", "label", weight=600, tabular=True)
         self.why = label("", "small", "text2", wraps=True)
         self.details = IconButton("file", "Details of the selected session", size=36, role="plain")
         self.details.setEnabled(False)
@@ -246,8 +245,7 @@ class ExclusionsCard(Card):
     def __init__(self) -> None:
         self.leave_out = ActionButton("minus", "Exclude …", height=36)
         super().__init__("Excluded", self.leave_out, padding=14, gap=6)
-        self.none = label("Nothing is excluded from the analysis.", "label", "text2", wraps=True)
-        self.none.setFont(font("label", weight=400))
+        self.none = label("Nothing is excluded from the analysis.", "label", "text2", wraps=True, weight=400)
         self.open = ActionButton("file", "Open the list", role="plain", height=30)
         inside = QWidget()
         self._rows = vbox(STRETCH, spacing=8, margins=0, parent=inside)
@@ -287,10 +285,8 @@ class ExclusionsCard(Card):
 def _line(one: LeftOut, back: ActionButton) -> QWidget:
     """Return one decision: what, why, who and when."""
     made = QWidget()
-    what = label(one.what, "label", wraps=True)
-    what.setFont(font("label", weight=600))
-    why = label(one.reason, "label", "text2", wraps=True)
-    why.setFont(font("label", weight=400))
+    what = label(one.what, "label", wraps=True, weight=600)
+    why = label(one.reason, "label", "text2", wraps=True, weight=400)
     now = datetime.now().astimezone()
     when = "" if one.at is None else f", {started_words(one.at.astimezone(now.tzinfo), now)}"
     who = label(f"{one.by}{when}", "small", "text2")

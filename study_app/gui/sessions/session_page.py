@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QDialog, QGridLayout, QLineEdit, QScrollArea, QSizePolicy, QWidget
+from PySide6.QtWidgets import QDialog, QLineEdit, QScrollArea, QSizePolicy, QWidget
 
 from study_app.devices.registry import discover
 from study_app.errors import StoreError
@@ -27,7 +27,7 @@ from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, insert_layout, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, insert_layout, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.dialogs import Question
@@ -259,9 +259,7 @@ class Decision(Question):
         super().__init__(parent, theme, title, explanation)
         self.setModal(True)
         self.setMinimumWidth(WIDTH)
-        self.form = QGridLayout()
-        self.form.setHorizontalSpacing(16)
-        self.form.setVerticalSpacing(10)
+        self.form = grid(16, 10)
         self.form.setColumnStretch(1, 1)
         add_layout(self.column, self.form)
         self.by = _line("Your name or initials, such as AK")

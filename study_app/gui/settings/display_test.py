@@ -19,7 +19,7 @@ from study_app.gui.kit.fields import LEAST_WORDS
 from study_app.gui.participant.tank.layers import paint_patch, patch_place
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.theme.themed import apply_theme
-from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import figures, label
@@ -108,8 +108,7 @@ class OffsetForm(QWidget):
         self.how.setMaximumWidth(220)
         for way in HOWS:
             self.how.addItem(way.capitalize(), way)
-        self.said = label("", "label", "text2", wraps=True)
-        self.said.setFont(font("label", weight=400, tabular=True))
+        self.said = label("", "label", "text2", wraps=True, weight=400, tabular=True)
         self.said.setMinimumWidth(LEAST_WORDS)
         self.sign = Icon("warning", "bad", 16)
         self.why = label("", "label", "bad", wraps=True)
@@ -127,21 +126,19 @@ class OffsetForm(QWidget):
         self._refuse("")
 
     def _lay_out(self) -> None:
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(12)
-        grid.setVerticalSpacing(6)
+        cells = grid(12, 6)
         named = (("Mean, ms", self.mean), ("Spread, ms", self.spread), ("Measured by", self.how))
         for column, (name, field) in enumerate(named):
             over = label(name, "label", "text2")
             over.setBuddy(field)
             field.setAccessibleName(f"Display offset: {name}")
-            grid.addWidget(over, 0, column)
-            grid.addWidget(field, 1, column)
-        grid.setColumnStretch(2, 1)
-        grid.setColumnStretch(3, 2)
+            cells.addWidget(over, 0, column)
+            cells.addWidget(field, 1, column)
+        cells.setColumnStretch(2, 1)
+        cells.setColumnStretch(3, 2)
         trouble = hbox((self.sign, 0, Qt.AlignmentFlag.AlignTop), (self.why, 1), spacing=6)
         foot = hbox(self.keep, self.forget, STRETCH, spacing=12)
-        vbox(self.said, grid, trouble, foot, spacing=8, margins=0, parent=self)
+        vbox(self.said, cells, trouble, foot, spacing=8, margins=0, parent=self)
 
     def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
         """Show what was measured; of another screen than ``screen`` it is said so."""
@@ -304,15 +301,13 @@ class DisplayTest(QWidget):
         vbox(head, self._figures(), ramp, fields, self._foot(), spacing=18, margins=(40, 32, 40, 32), parent=self)
 
     def _figures(self) -> QGridLayout:
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(40)
-        grid.setVerticalSpacing(2)
+        cells = grid(40, 2)
         for place, (name, value) in enumerate(zip(NAMES, self.values, strict=True)):
             value.setAccessibleName(name)
-            grid.addWidget(label(name, "label", "text2"), 0, place)
-            grid.addWidget(value, 1, place)
-        grid.setColumnStretch(len(NAMES), 1)
-        return grid
+            cells.addWidget(label(name, "label", "text2"), 0, place)
+            cells.addWidget(value, 1, place)
+        cells.setColumnStretch(len(NAMES), 1)
+        return cells
 
     def _fields(self) -> QBoxLayout:
         fields = [(LineField(thick, standing=standing), 2) for thick in (1, 2) for standing in (True, False)]

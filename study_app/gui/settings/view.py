@@ -105,8 +105,7 @@ class ScreensCard(Card):
                 radio.clicked.connect(partial(self.chosen.emit, screen))
                 group.addButton(radio)
                 size = f"{screen.width_mm:.0f} × {screen.height_mm:.0f} mm" if screen.width_mm > 0 else "size unknown"
-                about = label(f"{screen.words}  ·  {size}", "label", "text2", wraps=True)
-                about.setFont(font("label", weight=400, tabular=True))
+                about = label(f"{screen.words}  ·  {size}", "label", "text2", wraps=True, weight=400, tabular=True)
                 about.setMinimumWidth(LEAST_WORDS)
                 name = Elided("label", "text2")
                 name.show_text(screen.name)
@@ -182,8 +181,7 @@ class MachinePlace(Place):
             f"background: {PARTICIPANT.window}; color: {PARTICIPANT.text}; padding: 7px 15px;"
             f"border: 1px solid {PARTICIPANT.border}; border-radius: {RADIUS_CONTROL}px"
         )
-        self.said = label("", "label", "text2", wraps=True)
-        self.said.setFont(font("label", weight=400, tabular=True))
+        self.said = label("", "label", "text2", wraps=True, weight=400, tabular=True)
         self.said.setMinimumWidth(LEAST_WORDS)
         self.folder, self.kept_in = Elided("label", "text"), Elided("label", "text2")
         self.kept_in.setFont(font("label", weight=400))

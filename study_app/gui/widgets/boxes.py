@@ -29,6 +29,20 @@ def vbox(
     return _box(QVBoxLayout(), parts, spacing, margins, parent)
 
 
+def grid(
+    across: int | None = None, down: int | None = None, *, margins: Margins = None, parent: QWidget | None = None
+) -> QGridLayout:
+    """Return a grid with its gaps across and down [px], as the layout of ``parent`` where there is one."""
+    made = QGridLayout(parent) if parent is not None else QGridLayout()
+    if margins is not None:
+        made.setContentsMargins(*((margins,) * 4 if isinstance(margins, int) else margins))
+    if across is not None:
+        made.setHorizontalSpacing(across)
+    if down is not None:
+        made.setVerticalSpacing(down)
+    return made
+
+
 def _box(box: B, parts: tuple[Part, ...], spacing: int | None, margins: Margins, parent: QWidget | None) -> B:
     if parent is not None:
         parent.setLayout(box)

@@ -15,12 +15,22 @@ Ink: TypeAlias = Literal["text", "text2", "text3", "ok", "warn", "bad", "accent"
 
 
 def label(
-    text: str = "", role: TypeRole = "body", ink: Ink = "text", *, wraps: bool = False, heading: bool | None = None
+    text: str = "",
+    role: TypeRole = "body",
+    ink: Ink = "text",
+    *,
+    wraps: bool = False,
+    heading: bool | None = None,
+    weight: int | None = None,
+    tabular: bool | None = None,
 ) -> QLabel:
-    """Return a label in the type ``role`` and the colour role ``ink``; by default titles are headings."""
+    """Return a label in the type ``role`` and the colour role ``ink``; by default titles are headings.
+
+    ``tabular`` figures share one width.
+    """
     made = HeadingLabel(text) if (role in HEADINGS if heading is None else heading) else QLabel(text)
     made.setTextFormat(Qt.TextFormat.PlainText)
-    made.setFont(font(role))
+    made.setFont(font(role, weight=weight, tabular=tabular))
     made.setProperty("role", ink)
     made.setWordWrap(wraps)
     if wraps:
@@ -30,11 +40,9 @@ def label(
     return made
 
 
-def figures(text: str = "", role: TypeRole = "label", ink: Ink = "text") -> QLabel:
+def figures(text: str = "", role: TypeRole = "label", ink: Ink = "text", *, weight: int | None = None) -> QLabel:
     """Return a label whose figures share one width, for numbers that change or stand in a column."""
-    made = label(text, role, ink, heading=False)
-    made.setFont(font(role, tabular=True))
-    return made
+    return label(text, role, ink, heading=False, weight=weight, tabular=True)
 
 
 class Elided(QLabel):

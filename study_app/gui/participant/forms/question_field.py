@@ -23,12 +23,13 @@ from PySide6.QtGui import (
     QPaintEvent,
     QPen,
 )
-from PySide6.QtWidgets import QButtonGroup, QCheckBox, QGridLayout, QRadioButton, QSizePolicy, QStyle, QWidget
+from PySide6.QtWidgets import QButtonGroup, QCheckBox, QRadioButton, QSizePolicy, QStyle, QWidget
 
 from study_app.gui.participant.pages.page_widget import Button, beginning, page_painter, point_at
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
 from study_app.gui.widgets.accessible import give_role, say
+from study_app.gui.widgets.boxes import grid
 from study_app.protocol.questions import ItemView, Value
 
 if TYPE_CHECKING:
@@ -204,8 +205,7 @@ class QuestionField(QWidget):
         self.scale = 1.0
         give_role(self, QAccessible.Role.Grouping)
         self.statement = QuestionWords(view.number, view.text, self)
-        self.grid = QGridLayout(self)
-        self.grid.setHorizontalSpacing(0)
+        self.grid = grid(0, parent=self)
         self.grid.addWidget(self.statement, 0, 0)
         self.grid.setColumnStretch(0, WORDS_SHARE)
         self.grid.setColumnStretch(self.ANSWER, ANSWER_SHARE)

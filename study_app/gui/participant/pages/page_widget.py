@@ -20,19 +20,11 @@ from PySide6.QtGui import (
     QPen,
     QResizeEvent,
 )
-from PySide6.QtWidgets import (
-    QAbstractButton,
-    QGridLayout,
-    QGroupBox,
-    QLineEdit,
-    QPushButton,
-    QRadioButton,
-    QSizePolicy,
-    QWidget,
-)
+from PySide6.QtWidgets import QAbstractButton, QGroupBox, QLineEdit, QPushButton, QRadioButton, QSizePolicy, QWidget
 
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
+from study_app.gui.widgets.boxes import grid
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import Progress
 
@@ -473,8 +465,7 @@ class DigitPad(QWidget):
         super().__init__(parent)
         self._field = field
         self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid = grid(margins=0, parent=self)
         self.keys = [QPushButton(text, self) for text in (*DIGITS, *more, DELETE)]
         for place, key in enumerate(self.keys):
             key.setFocusPolicy(Qt.FocusPolicy.NoFocus)
