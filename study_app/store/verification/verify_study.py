@@ -323,7 +323,7 @@ def _blinding(study: StudyFolder, key: Key | None, found: Collector) -> None:
     with contextlib.suppress(KeyError, TypeError, AttributeError, ValueError):  # a receipt without what it must hold
         protocol = whole_protocol(published, key)
         levels = presented_numbers(protocol)
-        for session in study.sessions():
+        for session in study.sessions() if has_intervals(published) else ():  # others present no levels
             with contextlib.suppress(StoreError):  # said of the journal already
                 levels |= recorded_numbers(protocol, opened(journal.read(session.journal), key))
     for leak in find_leaks(study.path, certain_telltales(key.tables, published, levels)):
