@@ -318,24 +318,13 @@ SLOWER = (2, 4, 10)
 RESOLUTIONS_M = (0.005, 0.02)
 LEAST_RATE_HZ = 50.0
 _WORDS: dict[Effect, str] = {"added_mass": "added mass", "history": "history"}
-_SHORT: dict[Law, str] = {
-    "constant": "constant C$_d$",
-    "schiller-naumann": "Schiller–Naumann (SN)",
-    "haider-levenspiel": "Haider–Levenspiel (HL)",
-    "brown-lawler": "Brown–Lawler (BL)",
+_LAWS: dict[Law, tuple[str, str]] = {
+    "constant": ("constant C_d", "constant C$_d$"),
+    "schiller-naumann": ("Schiller–Naumann", "SN"),
+    "haider-levenspiel": ("Haider–Levenspiel", "HL"),
+    "brown-lawler": ("Brown–Lawler", "BL"),
 }
-_PLAIN: dict[Law, str] = {
-    "constant": "constant C_d",
-    "schiller-naumann": "Schiller–Naumann",
-    "haider-levenspiel": "Haider–Levenspiel",
-    "brown-lawler": "Brown–Lawler",
-}
-_INITIALS: dict[Law, str] = {
-    "constant": _SHORT["constant"],
-    "schiller-naumann": "SN",
-    "haider-levenspiel": "HL",
-    "brown-lawler": "BL",
-}
+"""Name and initials."""
 
 
 def with_wake(scene: Scene, **changes: Any) -> Scene:
@@ -406,7 +395,8 @@ def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
     exact = given(_only(scene, scene.liquids[0]))
     candidates: list[Candidate] = [LinearViscosity("linear viscosity", "linear viscosity", "law", exact)]
     candidates += [
-        Candidate(_PLAIN[law], label, "law", with_effects(exact, "drag", law=law)) for law, label in _SHORT.items()
+        Candidate(name, f"{name} ({short})" if len(short) == 2 else short, "law", with_effects(exact, "drag", law=law))
+        for law, (name, short) in _LAWS.items()
     ]
     carried: tuple[Effect, ...] = ()
     for effect in ("added_mass", "history"):
@@ -430,9 +420,9 @@ def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
 
 def _carrying(exact: Scene, law: Law, carried: tuple[Effect, ...]) -> Candidate:
     """Return drag with added mass and history as applicable."""
-    words = [_WORDS[it] for it in carried]
+    words, (name, short) = [_WORDS[it] for it in carried], _LAWS[law]
     of = with_effects(exact, "drag", *carried, law=law)
-    return Candidate(" + ".join([_PLAIN[law], *words]), " + ".join([_INITIALS[law], *words]), "effects", of)
+    return Candidate(" + ".join([name, *words]), " + ".join([short, *words]), "effects", of)
 
 
 def _has_wake(scene: Scene) -> bool:

@@ -109,7 +109,8 @@ def _run(name: str, checkout: Path, folder: Path) -> None:
     """Run a command in a folder of its own, and keep what it printed in the file ``stdout``, its exit code last."""
     for file in sorted(folder.rglob("*"), reverse=True):
         file.rmdir() if file.is_dir() else file.unlink()
-    (folder / "settings").mkdir(parents=True, exist_ok=True)
+    for part in ("out", "settings"):
+        (folder / part).mkdir(parents=True, exist_ok=True)
     of_user = {"LIQUID_STUDY_CONFIG": str(folder / "settings"), "QT_QPA_PLATFORM": "offscreen"}
     ended = subprocess.run(
         [sys.executable, "-m", "study_app", *COMMANDS[name].arguments.split()],
