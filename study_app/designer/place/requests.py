@@ -199,8 +199,8 @@ class Several:
 
 
 Task: TypeAlias = Literal[
-    "select", "join", "write", "back", "find", "undo", "redo", "save", "open", "new", "begin", "banner", "add", "copy", "paste",
-    "delete", "series", "judge id", "repair", "repairs",
+    "select", "join", "write", "back", "find", "undo", "redo", "save", "open", "new", "begin", "banner", "add", "copy",
+    "paste", "delete", "series", "judge id", "repair", "repairs",
 ]  # fmt: skip
 
 
