@@ -19,6 +19,7 @@ from study_app.designer.measures.level_words import LevelWords, even_ticks, log_
 from study_app.designer.measures.limit_colours import limit_colour
 from study_app.designer.measures.measures_view import focus_of
 from study_app.designer.measures.number_cards import LIMIT_NAMES, Limit, Ticks
+from study_app.designer.measures.levels import limit_colour
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.numbers import Range

@@ -1,80 +1,123 @@
-"""The body of the tab Measures: numbers and plots of a block with a method, cards of everything else."""
+"""The tab Measures: numbers and plots of a block with a method, cards of everything else; and the cards below tabs."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QScrollArea, QWidget
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QPaintEvent, QShowEvent
+from PySide6.QtWidgets import QScrollArea, QSizePolicy, QWidget
 
-from study_app.designer.measures.card_grid import CardGrid
-from study_app.designer.measures.controls import MeasureControls
-from study_app.designer.measures.number_cards import EARLIER, FAILED, ForcesPlot, MeasuresView, NumberCard
-from study_app.designer.measures.parts import NumberPart
+from study_app.designer.measures.cards import UNKNOWN, CardGrid, NumbersRow, Verdict
+from study_app.designer.measures.levels import LevelBlock, LevelWords, rounded
+from study_app.designer.measures.measures_view import FAILED, NO_FORCES, MeasuresView
+from study_app.designer.measures.simulation import Controls
+from study_app.designer.problems.problem_rows import ProblemRow
 from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
+from study_app.gui.widgets.number_field import NumberField
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
+from study_app.protocol.checks.force_limits import clipped, clipped_unpaced
+from study_app.viewmodels.tones import Tone
 
 if TYPE_CHECKING:
-    from study_app.designer.measures.block_plots import ForcesView, FunctionView, TrackView
+    from study_app.designer.measures.plots import ForcesView, FunctionView, TrackView
 
-NUMBERS, ONE_ROW_FROM = 4, 600
+EARLIER = "These numbers are of the last valid state: solve the problems to update them."
+FIELD_PX = 48
 PLOT_PX, HIGHEST_PX, FORCES_PX = 300, 470, 216
 FUNCTION_LEGEND = (
     "Line: simulated observers. Bands: 50 and 90 % of the estimates. Bars: how often each level is presented."
 )
 TRACK_LEGEND = "Bands: 50 and 90 % of the estimates. Marks: the trials of one observer, filled if correct."
+FACTS_MOST, FACTS_LEAST = 366, 190
+FACTS_SHARE, HIGH_FROM = 0.3, 940
+"""The share of a window's height that the cards take at most; in windows as high as this two rows are shown whole."""
 
 
-class NumbersRow(QWidget):
-    """Four numbers side by side, in narrow places two by two."""
+class Control(QWidget):
+    """A number with its words before and its unit behind it; ``entered`` carries what was typed or stepped to."""
+
+    entered = Signal(float)
+
+    def __init__(self, words: str, unit: str, step: float) -> None:
+        super().__init__()
+        self._value, self._step = 0.0, step
+        self.words, self.unit = label(words, "small", "text2"), label(unit, "small", "text2")
+        self.field = NumberField()
+        self.field.setFixedWidth(FIELD_PX)
+        self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
+        hbox(self.words, self.field, self.unit, spacing=6, margins=0, parent=self)
+        self.show_words(words, unit)
+        self.field.entered.connect(self.entered)
+        self.field.unread.connect(lambda _text: self.field.put_back())
+        self.field.stepped.connect(lambda steps: self.entered.emit(self._value + steps * self._step))
+
+    def show_words(self, words: str, unit: str) -> None:
+        """Call the number otherwise."""
+        self.words.setText(words.removeprefix("simulated "))
+        self.unit.setText(unit)
+        self.unit.setVisible(bool(unit))
+        self.field.setAccessibleName(f"{words}, {unit}" if unit else words)
+
+    def show_number(self, text: str) -> None:
+        self._value = float(text)
+        self.field.show_text(text)
+
+
+class MeasureControls(QWidget):
+    """Simulated threshold, lapse rate and participants."""
+
+    participants_asked = Signal(float)
+    threshold_asked = Signal(float)
+    lapses_asked = Signal(float)
 
     def __init__(self) -> None:
         super().__init__()
-        self.grid = QGridLayout(self)
-        self.grid.setContentsMargins(0, 0, 0, 0)
-        self.grid.setSpacing(8)
-        self.parts = [NumberPart() for _ in range(NUMBERS)]
-        self._columns = 0
-        self._lay(NUMBERS)
+        self.setAccessibleName("What is simulated")
+        self.threshold = Control("simulated JND", "%", 1.0)
+        self.lapses = Control("lapses", "%", 1.0)
+        self.participants = Control("participants", "", 1.0)
+        hbox(STRETCH, self.threshold, self.lapses, self.participants, spacing=10, margins=0, parent=self)
+        self.threshold.entered.connect(self.threshold_asked)
+        self.lapses.entered.connect(self.lapses_asked)
+        self.participants.entered.connect(self.participants_asked)
 
-    def show_numbers(self, shown: tuple[NumberCard, ...], waiting: str) -> None:
-        self.setVisible(bool(shown))
-        for part, one in zip(self.parts, shown, strict=False):
-            part.show_card(one, waiting)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._lay(NUMBERS if self.width() >= ONE_ROW_FROM else NUMBERS // 2)
-
-    def _lay(self, columns: int) -> None:
-        if columns != self._columns:
-            self._columns = columns
-            for at, part in enumerate(self.parts):
-                self.grid.addWidget(part, at // columns, at % columns)
-            for at in range(NUMBERS):
-                self.grid.setColumnStretch(at, int(at < columns))
+    def show_values(self, shown: Controls, words: LevelWords | None) -> None:
+        """Show other values; threshold and lapses only where observers are simulated, at levels with ``words``."""
+        planned = "planned" if shown.planned == shown.participants else f"({shown.planned or 'none'} planned)"
+        self.participants.show_words("participants", planned)
+        self.participants.show_number(str(shown.participants))
+        self.threshold.setVisible(words is not None)
+        self.lapses.setVisible(words is not None)
+        if words is not None:
+            self.threshold.show_words(f"simulated {words.name}", words.unit)
+            self.threshold.show_number(words.number(shown.threshold))
+            self.lapses.show_number(rounded(100 * shown.lapses))
 
 
 class PlotCard(Card):
     """A plot under its heading, its units and what its marks mean."""
 
-    def __init__(self, title: str, legend: str, plot: QWidget) -> None:
+    def __init__(self, title: str, legend: str, plot: FunctionView | TrackView) -> None:
         self.heading_unit = Elided("small", "text2")
         self.heading_unit.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         super().__init__(title, padding=14, gap=4)
         self.heading_unit.setAlignment(Qt.AlignmentFlag.AlignLeft)
         self.legend = label(legend, "small", "text2", wraps=True)
         add_parts(self.column, self.heading_unit, self.legend, (plot, 1))
-        self._legend = legend
+        self._legend, self.plot = legend, plot
 
-    def show_heading(self, words: str, waiting: str) -> None:
-        """Say what is drawn, and how far the simulations of what is to be drawn are."""
-        self.heading_unit.show_text(words)
-        self.legend.setText(f"{waiting[:1].upper()}{waiting[1:]}" if waiting else self._legend)
+    def show_simulated(self, heading: str, of: LevelBlock, shown: MeasuresView) -> None:
+        """Show what observers answered so far; where others are simulated or cannot be, the legend says so."""
+        observed, waiting = shown.simulated.observed, shown.simulated.waiting
+        self.heading_unit.show_text(heading if observed else "")
+        said = FAILED[2] if shown.simulated.failed else waiting
+        self.legend.setText(f"{said[:1].upper()}{said[1:]}" if said else self._legend)
+        self.plot.show_observed(of, observed, grey=shown.earlier or bool(waiting))
 
 
 class WarningBar(Themed, QWidget):
@@ -92,7 +135,7 @@ class ForcesCard(Card):
     def __init__(self, plot: ForcesView) -> None:
         super().__init__(padding=14, gap=4)
         self.plot = plot
-        self.shown: ForcesPlot | None = None
+        self.offered: tuple[ProblemRow, str] | None = None
         self.unit = Elided("small", "text2")
         self.chips = [Chip(small=True), Chip(small=True)]
         head = hbox(label("Force at each level", "card"), (self.unit, 1), *self.chips)
@@ -105,23 +148,49 @@ class ForcesCard(Card):
         hbox(*parts, spacing=10, margins=(12, 6, 8, 6), parent=self.bar)
         add_parts(self.column, head, (plot, 1), self.bar)
 
-    def show_forces(self, shown: ForcesPlot) -> None:
-        self.shown = shown
-        self.unit.show_text(shown.heading)
-        for chip, state in zip(self.chips, (*shown.verdicts, None), strict=False):
+    def show_levels(self, shown: MeasuresView) -> None:
+        """Show the forces, unless they are not known or a level has none."""
+        of = shown.levels
+        has_forces = of is not None and any(one.asked_n is not None for one in of.shown)
+        if of is None or not has_forces or (of.forces and of.limits is None):
+            self.hide()
+            return
+        self.show()
+        count, total = sum(one.clipped_by is not None for one in of.levels), len(of.levels)
+        verdicts: tuple[Verdict, ...] = (("ok", "check", f"{total - count} of {total} as asked"),)
+        if of.limits is None:
+            verdicts = (("neutral", "info", f"{UNKNOWN} of {total} as asked"),)
+        elif count:
+            tone: Tone = "bad" if shown.problems else "warn"
+            verdicts = ("neutral", "info", verdicts[0][2]), (tone, "warning", f"{count} clipped")
+        standard = "" if of.standard is None else f"standard {rounded(of.standard)} {of.words.value_unit}, "
+        speed = "" if of.limits is None else f"N, {standard}at {of.limits.hand_mps:.3f} m/s of the hand"
+        self.unit.show_text(speed)
+        for chip, state in zip(self.chips, (*verdicts, None), strict=False):
             chip.setVisible(state is not None)
             if state is not None:
                 chip.show_state(*state)
-        self.bar.setVisible(bool(shown.warning))
-        self.words.setText(shown.warning)
-        self.repair.setVisible(shown.repair is not None)
-        if shown.repair is not None:
-            self.repair.show_action("", shown.repair.words)
-        self.plot.show_plot(shown)
+        warning = clipped_sentence(of)
+        self.bar.setVisible(bool(warning))
+        self.words.setText(warning)
+        self.offered = next(((row, words[0]) for row, words in shown.problems if words), None)
+        self.repair.setVisible(self.offered is not None)
+        if self.offered is not None:
+            self.repair.show_action("", self.offered[1])
+        self.plot.show_levels(of)
 
     def _ask(self) -> None:
-        if self.shown is not None and self.shown.repair is not None:
-            self.repair_asked.emit(self.shown.repair.row, self.shown.repair.words)
+        if self.offered is not None:
+            self.repair_asked.emit(*self.offered)
+
+
+def clipped_sentence(of: LevelBlock) -> str:
+    """Return what clips levels, "" where nothing does."""
+    if of.limits is None:
+        return NO_FORCES
+    messages = [fault.message for fault in clipped(of.protocol, [of.block], ASSUMED_TICKS)]
+    said = ". ".join(f"{one[:1].upper()}{one[1:]}" for one in messages)
+    return said or clipped_unpaced(of.protocol, [of.block]) or ""
 
 
 class MeasuresPage(Themed, QWidget):
@@ -137,13 +206,10 @@ class MeasuresPage(Themed, QWidget):
         self.controls = MeasureControls()
         self.numbers = NumbersRow()
         self.numbers.hide()
-        self.function: FunctionView | None = None
-        self.track: TrackView | None = None
-        self.forces: ForcesView | None = None
-        self.cards: dict[str, Card] = {}
-        self.blocks, self.grid = CardGrid(), CardGrid()
-        for grid in (self.blocks, self.grid):
-            grid.open_asked.connect(self.open_asked)
+        self.function: PlotCard | None = None
+        self.track: PlotCard | None = None
+        self.forces: ForcesCard | None = None
+        self.blocks, self.grid = CardGrid(self.open_asked.emit), CardGrid(self.open_asked.emit)
         inside = QWidget()
         self.curves = QWidget()
         self.plots = hbox(spacing=8, margins=0, parent=self.curves)
@@ -165,7 +231,7 @@ class MeasuresPage(Themed, QWidget):
     def show_measures(self, shown: MeasuresView) -> None:
         """Show other measures; while the page is hidden they are kept for later."""
         self.shown = shown
-        self.controls.show_values(shown.controls)
+        self.controls.show_values(shown.controls, shown.words)
         if self.isVisible():
             self._show()
 
@@ -181,46 +247,94 @@ class MeasuresPage(Themed, QWidget):
         self.area.widget().setEnabled(not shown.earlier)
         self.blocks.setVisible(shown.blocks is not None)
         self.blocks.show_cards(() if shown.blocks is None else (shown.blocks,))
-        self.numbers.show_numbers(shown.numbers, shown.waiting)
-        if (shown.numbers or shown.forces) and not self.cards:
-            self._make_plots()
-        for name, there in (("function", shown.numbers), ("track", shown.numbers), ("forces", shown.forces)):
-            if name in self.cards:
-                self.cards[name].setVisible(bool(there))
+        self.numbers.show_numbers(shown.numbers, shown.simulated.waiting)
         self.curves.setVisible(bool(shown.numbers))
-        waiting = FAILED[2] if shown.failed else shown.waiting
-        for name, view, plot in (("function", self.function, shown.function), ("track", self.track, shown.track)):
-            if view is not None:
-                view.show_plot(plot, grey=shown.earlier or bool(shown.waiting))
-                self._head(name, "" if plot is None else plot.heading, waiting)
-        forces = self.cards.get("forces")
-        if shown.forces is not None and isinstance(forces, ForcesCard):
-            forces.show_forces(shown.forces)
+        of = shown.levels
+        if of is not None and self.forces is None:
+            self._make_plots()
+        if self.forces is not None:
+            self.forces.show_levels(shown)
+        if of is not None and shown.numbers and self.function is not None and self.track is not None:
+            unit = f", {of.words.unit}" if of.words.unit else ""
+            self.function.show_simulated(f"% {of.words.success} over {of.words.kind}{unit}", of, shown)
+            self.track.show_simulated(f"{of.words.kind}{unit} over trials", of, shown)
         self.grid.setVisible(bool(shown.cards))
         self.grid.show_cards(shown.cards)
 
-    def _head(self, name: str, words: str, waiting: str) -> None:
-        card = self.cards[name]
-        if isinstance(card, PlotCard):
-            card.show_heading(words, waiting)
-
     def _make_plots(self) -> None:
-        from study_app.designer.measures.block_plots import ForcesView, FunctionView, TrackView  # noqa: PLC0415 - pyqtgraph, once there is a plot
+        from study_app.designer.measures.plots import ForcesView, FunctionView, TrackView  # noqa: PLC0415 - pyqtgraph, once there is a plot
 
-        self.function, self.track, self.forces = FunctionView(), TrackView(), ForcesView()
-        forces = ForcesCard(self.forces)
-        forces.repair_asked.connect(self.repair_asked)
-        self.cards = {
-            "function": PlotCard("Psychometric function", FUNCTION_LEGEND, self.function),
-            "track": PlotCard("Expected track", TRACK_LEGEND, self.track),
-            "forces": forces,
-        }
-        for name in ("function", "track"):
-            self.cards[name].setMinimumHeight(PLOT_PX)
-            self.plots.addWidget(self.cards[name], 1)
-        forces.setMinimumHeight(FORCES_PX)
-        forces.setMaximumHeight(HIGHEST_PX)
-        self.column.insertWidget(3, forces, 2)
-        for card in self.cards.values():
-            card.hide()
-            apply_theme_within(card, self.theme)
+        self.function = PlotCard("Psychometric function", FUNCTION_LEGEND, FunctionView())
+        self.track = PlotCard("Expected track", TRACK_LEGEND, TrackView())
+        self.forces = ForcesCard(ForcesView())
+        self.forces.repair_asked.connect(self.repair_asked)
+        for card in (self.function, self.track):
+            card.setMinimumHeight(PLOT_PX)
+            self.plots.addWidget(card, 1)
+        self.forces.setMinimumHeight(FORCES_PX)
+        self.forces.setMaximumHeight(HIGHEST_PX)
+        self.column.insertWidget(3, self.forces, 2)
+        for made in (self.curves, self.forces):
+            apply_theme_within(made, self.theme)
+
+
+class FactsRow(QScrollArea):
+    """Draws the cards of a `MeasuresView` that stay below other tabs; ``open_asked`` carries an element's path."""
+
+    open_asked = Signal(object)
+    appeared = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Facts")
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setWidgetResizable(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.shown: MeasuresView | None = None
+        self.numbers = NumbersRow()
+        self.numbers.hide()
+        self.grid = CardGrid(self.open_asked.emit)
+        self.earlier = label(EARLIER, "small", "warn", wraps=True)
+        self.earlier.hide()
+        inside = QWidget()
+        inside.setObjectName("earlier")
+        self._inside = vbox(self.earlier, self.numbers, (self.grid, 1), spacing=8, margins=0, parent=inside)
+        self.setWidget(inside)
+        self._window_px = self._left_px = 0
+        self.make_room(0, 0)
+
+    def make_room(self, window_px: int, left_px: int) -> None:
+        """Take the height of the cards, as far as the window has room for them, or the page above leaves it."""
+        self._window_px, self._left_px = window_px, left_px
+        most = FACTS_MOST if window_px >= HIGH_FROM else max(FACTS_LEAST, round(FACTS_SHARE * window_px))
+        most = left_px if left_px > 0 else most
+        needed = max(
+            self._inside.totalHeightForWidth(self.viewport().width()), self._inside.totalMinimumSize().height()
+        )
+        self.setFixedHeight(min(most, needed + 2 * self.frameWidth()) if self.grid.cards else most)
+
+    def show_measures(self, shown: MeasuresView) -> None:
+        """Show other numbers; while the cards are hidden they are kept for later."""
+        self.shown = shown
+        if self.isVisible():
+            self._show()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._show()
+        self.appeared.emit()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        handled = super().eventFilter(watched, event)
+        if watched is self.widget() and event.type() == QEvent.Type.LayoutRequest:
+            self.make_room(self._window_px, self._left_px)
+        return handled
+
+    def _show(self) -> None:
+        if self.shown is not None:
+            self.earlier.setVisible(self.shown.earlier)
+            for part in (self.numbers, self.grid):
+                part.setEnabled(not self.shown.earlier)
+            self.numbers.show_numbers(self.shown.numbers, self.shown.simulated.waiting)
+            self.grid.show_cards(self.shown.below)
+            self.make_room(self._window_px, self._left_px)

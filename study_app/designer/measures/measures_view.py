@@ -1,83 +1,87 @@
 """What the tab Measures shows for the selected element, and the cards below the other tabs."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
 from study_app.designer.document.study import Study
+from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import title_of
+from study_app.designer.document.fields import label_of
+from study_app.designer.document.languages import languages_of
+from study_app.designer.document.names import blocks_using
 from study_app.designer.document.study_facts import Facts
-from study_app.designer.measures import session_cards as cards
-from study_app.designer.measures.level_plots import (
-    Controls,
-    forces_plot,
-    function_plot,
-    level_block,
-    number_cards,
-    track_plot,
-)
-from study_app.designer.measures.level_words import LevelWords, rounded
-from study_app.designer.measures.number_cards import Card, ControlValues, LinesCard, MeasuresView, people
-from study_app.designer.measures.planned import Simulated
+from study_app.designer.measures.cards import (
+    MOST_LINES,
+    NARROW_CODES,
+    UNKNOWN,
+    Figures,
+    Line,
+    Lines,
+    Link,
+    MeasureCard,
+    NumberCard,
+    Part,
+    Segment,
+    Segments,
+    Table,
+    Verdict,
+)  # fmt: skip
+from study_app.designer.measures.levels import LIMIT_NAMES, LevelBlock, LevelWords, level_block, rounded
+from study_app.designer.measures.observers import ENOUGH, Simulated, balance_of
+from study_app.designer.measures.participant_texts import copied_texts, own_texts, revealing, texts_by_language
+from study_app.designer.measures.simulation import Controls, Focus, focus_of
 from study_app.designer.measures.valid_part import valid_part
 from study_app.designer.problems.problems import ProblemRow
+from study_app.designer.problems.problem_rows import ProblemRow
+from study_app.haptics.model.gate import calls_for
+from study_app.haptics.model.slope_limits import HAND_MPS, steady
+from study_app.number_text import counted
 from study_app.protocol.blocks import Block
-from study_app.protocol.checks.expected_precision import ThresholdPlan, threshold_plan
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import order_of
+from study_app.protocol.orders.block_orders import BlockOrder, order_of
+from study_app.protocol.orders.durations import answering_s
 from study_app.protocol.source.document import Path
+from study_app.protocol.wording.languages import language_name
+from study_app.viewmodels.number_words import duration, duration_figure, duration_range
 
 BELOW: Final = 4
 """So many cards stay below the other tabs."""
-_NAMED_BY: Final = {"stimuli": "stimulus", "methods": "method", "designs": "design", "questionnaires": "questionnaire",
-                    "tasks": "task"}  # fmt: skip
+SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
+MOST_CODES: Final = 8
+"""Of more codes only how even they are is said."""
+MOST_ROWS: Final = 6
+"""Positions that are shown of a long block."""
+NO_FORCES: Final = "Not known until the problems of device and scene are solved."
+ON_AVERAGE: Final = "The warning of check is about the precision that the planned participants reach on average"
+FAILED: Final[Verdict] = ("bad", "warning", "simulation failed")
+CLIPPED: Final[Verdict] = ("bad", "warning", "levels are clipped")
+TOO_SMALL: Final = "All levels are below twice the level error of a valid trial"
 
 
 @dataclass(frozen=True, slots=True)
-class Focus:
-    """What the measures are of: the block, and what its tracks are simulated by; None where it has none.
+class MeasuresView:
+    """What the tab shows: numbers and plots of a block with a method, else cards; and the cards below other tabs.
 
-    Attributes
-    ----------
-    block : Block or None
-        The selected block, or the first one that uses what is selected.
-    plan : ThresholdPlan or None
-        What decides how precise its thresholds are.
-    compares : bool
-        Whether its statements compare conditions, so that studies of it are simulated.
+    ``words`` are those of the levels where observers are simulated, ``levels`` those whose forces are drawn, and
+    ``problems`` theirs, each with the words of its repairs. ``blocks`` says which use the element, where it is not one
+    itself; ``earlier``: all is of the last study without faults.
     """
 
-    block: Block | None = None
-    plan: ThresholdPlan | None = None
-    compares: bool = False
+    controls: Controls
+    words: LevelWords | None = None
+    numbers: tuple[NumberCard, ...] = ()
+    levels: LevelBlock | None = None
+    simulated: Simulated = field(default_factory=Simulated)
+    problems: tuple[tuple[ProblemRow, tuple[str, ...]], ...] = ()
+    cards: tuple[MeasureCard, ...] = ()
+    blocks: MeasureCard | None = None
+    earlier: bool = False
 
-
-def focus_of(protocol: Protocol | None, path: Path) -> Focus:
-    """Return what the measures of an element are of."""
-    if protocol is None or len(path) < 2:
-        return Focus()
-    block = protocol.blocks.get(str(path[1])) if path[0] == "blocks" else None
-    if (key := _NAMED_BY.get(str(path[0]))) is not None:
-        users = [one for one in protocol.blocks_in_order if getattr(one, key) == path[1]]
-        block = next((one for one in users if one.phase == "main"), next(iter(users), None))
-    if block is None:
-        return Focus()
-    questionnaire = protocol.questionnaire_of(block.id)
-    statements = () if questionnaire is None else questionnaire.statements
-    compares = block.phase == "main" and bool(statements) and len(block.conditions) > 1
-    return Focus(block, threshold_plan(protocol, block), compares)
-
-
-def control_values(protocol: Protocol | None, focus: Focus, controls: Controls) -> ControlValues:
-    """Return what the controls show: threshold and lapses only where observers are simulated."""
-    unit = "planned" if controls.planned == controls.participants else f"({controls.planned or 'none'} planned)"
-    values = ControlValues(controls.participants, unit)
-    if protocol is None or focus.plan is None:
-        return values
-    words = LevelWords(focus.plan.stimulus, focus.plan.design)
-    return replace(
-        values, threshold=words.number(controls.threshold), threshold_words=f"simulated {words.name}",
-        threshold_unit=words.unit, lapses=rounded(100 * controls.lapses),
-    )  # fmt: skip
+    @property
+    def below(self) -> tuple[MeasureCard, ...]:
+        """The cards that stay below other tabs."""
+        return () if self.numbers else self.cards[:BELOW]
 
 
 def measures_view(
@@ -88,94 +92,61 @@ def measures_view(
     simulated: Simulated,
     problems: Mapping[ProblemRow, tuple[str, ...]],
     parts: int | None = None,
+    *,
+    earlier: bool = False,
 ) -> MeasuresView:
     """Return what is shown of the selected element.
 
-    Parameters
-    ----------
-    study : Study
-        The study.
-    facts : Facts
-        Its facts.
-    path : tuple of str or int
-        The selected element.
-    controls : Controls
-        What is simulated.
-    simulated : Simulated
-        What simulations answered.
-    problems : mapping
-        The problems of the study, each with the words of its repairs as far as they were found.
-    parts : int, optional
-        On how many parts the questions stand on a small screen, where that is known.
+    ``controls``: what is simulated; ``simulated``: what simulations answered; ``problems``: the problems of the study,
+    each with the words of its repairs as far as they were found; ``parts``: on how many parts the questions stand on a
+    small screen, where that is known; ``earlier``: whether the study is the last one without faults.
     """
     valid = valid_part(study)
     protocol, focus = valid.protocol, focus_of(valid.protocol, path)
-    block, values = focus.block, control_values(protocol, focus, controls)
-    blocks = None
-    if protocol is not None:
-        words = {one.id: _measured(protocol, one) for one in protocol.blocks_in_order}
-        shown_of = "" if block is None else block.id
-        blocks = cards.blocks_card(study, protocol, facts, path, words, shown_of)
-    of = None if protocol is None or block is None else level_block(protocol, block, forces=valid.forces)
-    if protocol is not None and block is not None and of is not None and focus.plan is not None:
-        numbers = number_cards(
-            of, simulated, controls, facts.steps_s.get(block.id, 0.0), order_of(protocol, block),
-        )  # fmt: skip
-        return MeasuresView(
-            values, numbers, function_plot(of, simulated), track_plot(of, simulated),
-            forces_plot(of, problems), (), tuple(_others(study, facts, path, simulated)), simulated.waiting,
-            bool(simulated.failed), blocks=blocks,
-        )  # fmt: skip
-    shown = tuple(_cards(study, facts, path, focus, controls, simulated, parts))
-    forces = None if of is None else forces_plot(of, problems)
-    return MeasuresView(
-        values, forces=forces, cards=shown, below=shown[:BELOW], waiting=simulated.waiting, blocks=blocks
-    )
-
-
-def _measured(protocol: Protocol, block: Block) -> str:
-    """Return what a block measures."""
-    focus = focus_of(protocol, ("blocks", block.id))
-    if focus.plan is None:
-        return "smallest differences" if focus.compares else ""
-    return f"{LevelWords(focus.plan.stimulus, focus.plan.design).name}s"
-
-
-def _others(study: Study, facts: Facts, path: Path, simulated: Simulated) -> list[Card]:
-    session: list[Card] = [cards.session_card(study, facts, path)]
-    warned = cards.warnings_card(facts, simulated.warnings)
-    return session if warned is None else [*session, warned]
+    if protocol is None:
+        cards = _cards(study, facts, path, focus, controls, simulated, parts)
+        return MeasuresView(controls, simulated=simulated, cards=tuple(cards), earlier=earlier)
+    block, plan = focus.block, focus.plan
+    blocks = blocks_card(study, protocol, facts, path, "" if block is None else block.id)
+    levels = None if block is None else level_block(protocol, block, forces=valid.forces)
+    words = None if plan is None else LevelWords(plan.stimulus, plan.design)
+    of = None if block is None else ("stimuli", str(block.stimulus), "levels")
+    own = tuple((row, repairs) for row, repairs in problems.items() if row.fault.path == of)
+    if block is not None and levels is not None and plan is not None:
+        lasts = facts.steps_s.get(block.id, 0.0)
+        numbers = number_cards(levels, simulated, controls, lasts, order_of(protocol, block))
+        cards = [session_card(study, facts, path), *warnings_card(facts, simulated.warnings)]
+    else:
+        numbers, cards = (), _cards(study, facts, path, focus, controls, simulated, parts)
+    return MeasuresView(controls, words, numbers, levels, simulated, own, tuple(cards), blocks, earlier)
 
 
 def _cards(
     study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, simulated: Simulated, parts: int | None
-) -> list[Card]:
+) -> list[MeasureCard]:
     """Return the cards of an element without simulated tracks, those that concern it first."""
     valid, block = valid_part(study), focus.block
     protocol = valid.protocol
     asked = path[0] == "questionnaires" and protocol is not None and path[1:2] and path[1] in protocol.questionnaires
-    found: list[Card] = [cards.session_card(study, facts, path, None if asked else parts)]
+    found: list[MeasureCard] = [session_card(study, facts, path, None if asked else parts)]
     if protocol is None:
-        return found if study.unreadable else [*found, cards.texts_card(study)]
+        return found if study.unreadable else [*found, texts_card(study)]
     if asked:
-        found = [cards.questions_card(protocol, str(path[1]), parts), cards.texts_card(study), *found]
-    if block is not None and (
-        balance := cards.balance_card(study, protocol, block, controls.participants, controls.planned)
-    ):
-        found.append(balance)
+        found = [questions_card(protocol, str(path[1]), parts), texts_card(study), *found]
+    if block is not None:
+        found += balance_card(study, protocol, block, controls)
     if block is not None and focus.compares:
         known = simulated.detectable
         who = people(controls.participants if known is None else known.participants, controls.planned)
-        found.append(cards.detectable_card(study, block, who, simulated))
-    found.append(cards.force_card(study, facts, protocol, _liquids(protocol, path, block)))
+        found.append(detectable_card(study, block, who, simulated))
+    found.append(force_card(study, facts, protocol, _liquids(protocol, path, block)))
     if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids and valid.forces:
-        found.insert(0, cards.effects_card(study, protocol, str(path[1])))
+        found.insert(0, effects_card(study, protocol, str(path[1])))
     if block is not None and path[0] == "blocks":
-        found.append(cards.block_card(study, facts, protocol, block))
+        found.append(block_card(study, facts, protocol, block))
     if not asked:
-        found.append(cards.texts_card(study))
-    warned: LinesCard | None = cards.warnings_card(facts, simulated.warnings)
-    return found if warned is None else [*found, warned]
+        found.append(texts_card(study))
+    return [*found, *warnings_card(facts, simulated.warnings)]
 
 
 def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
@@ -187,3 +158,348 @@ def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
         names = (str(path[1]),)
     found = dict.fromkeys(liquid for name in names for liquid in protocol.conditions[name].liquid_ids)
     return list(found) or list(protocol.liquids)
+
+
+def people(participants: int, planned: int | None) -> str:
+    """Return a number of participants that are simulated, and whether the file plans as many."""
+    return f"{participants} {'planned' if participants == planned else 'simulated'}"
+
+
+def number_cards(
+    of: LevelBlock, simulated: Simulated, controls: Controls, duration_s: float, order: BlockOrder
+) -> tuple[NumberCard, ...]:
+    """Return the four numbers of a block whose tracks are simulated."""
+    breaks = f", {counted(order.breaks, 'break')}" if order.breaks else ""
+    return (
+        _range(of, simulated, controls),
+        _one_person(of, simulated),
+        _people(of, simulated, controls),
+        NumberCard(
+            "Lasts", *duration_figure(duration_s),
+            ("neutral", "clock", f"{order.trials} trials{breaks}"), simulated=False,
+        ),
+    )  # fmt: skip
+
+
+def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:
+    """Return a number that is not known: not yet, because its simulation failed, or because nothing simulates it."""
+    if simulated.failed:
+        return NumberCard(title, UNKNOWN, unit, FAILED, simulated.failed)
+    return NumberCard(title, UNKNOWN, unit, ("neutral", "info", "not simulated"))
+
+
+def _range(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
+    title, found, words = (
+        f"{of.words.name[:1].upper()}{of.words.name[1:]}s it can measure",
+        simulated.measurable,
+        of.words,
+    )
+    if found is None:
+        return _unknown(title, words.unit, simulated)
+    clipped = of.clipped_words
+    if found.ends is None:
+        if found.planted:
+            return NumberCard(title, "none", "", ("bad", "warning", "estimates are biased"), clipped)
+        if of.clipping is None:
+            return NumberCard(title, "none", "", ("bad", "warning", "levels are too small"), TOO_SMALL)
+        why = "the standard is clipped" if of.clipping.clips_standard else CLIPPED[2]
+        return NumberCard(title, "none", "", ("bad", "warning", why), clipped)
+    low, high = found.ends
+    note: Verdict = ("neutral", "info", f"of {words.number(of.words.stimulus.levels[1])} {words.unit} at most")
+    if words.stimulus.level_kind == "weber" and of.standard is not None:
+        values = (rounded(level * of.standard, 2) for level in (low, high))
+        note = ("neutral", "info", f"{' to '.join(values)} {words.value_unit}")
+    if not low * 0.999 <= controls.threshold <= high * 1.001:
+        note = ("warn", "warning", f"not {words.words(controls.threshold)}")
+    return NumberCard(title, f"{words.number(low, 2)} – {words.number(high, 2)}", words.unit, note, clipped)
+
+
+def _one_person(of: LevelBlock, simulated: Simulated) -> NumberCard:
+    found = simulated.observed
+    if found is None:
+        return _unknown("One person", "%", simulated)
+    if not of.measures(found.threshold):
+        return NumberCard("One person", UNKNOWN, "%", CLIPPED, of.clipped_words)
+    note: Verdict = ("neutral", "people", f"at a {of.words.name} of {of.words.words(found.threshold)}")
+    return NumberCard("One person", f"± {100 * found.error:.0f}", "%", note, of.as_asked)
+
+
+def _people(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
+    found = simulated.group
+    if found is None:
+        title = f"{people(controls.participants, controls.planned)} in ± {100 * controls.precision:g} %"
+        return _unknown(title, "% of studies", simulated)
+    title = f"{people(found.participants, controls.planned)} in ± {100 * found.precision:g} %"
+    if not of.measures(controls.threshold):
+        return NumberCard(title, UNKNOWN, "% of studies", CLIPPED, of.clipped_words)
+    enough = found.share >= ENOUGH
+    note: Verdict = ("ok", "check", "Enough") if enough else ("warn", "warning", "Not enough")
+    many = f"more than {found.most}" if found.enough is None else f"about {found.enough}"
+    needed = f"{100 * ENOUGH:g} % are enough" if enough else f"Needed: {many} participants for {100 * ENOUGH:g} %"
+    more = f"{needed}; with {found.more_trials} trials: {100 * found.more_share:.0f} %"
+    more = ". ".join(filter(None, (more, ON_AVERAGE if simulated.warnings else "", of.as_asked)))
+    return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, more)
+
+
+def session_card(study: Study, facts: Facts, path: Path, parts: int | None = None) -> MeasureCard:
+    """Return the session in numbers, with the step that is looked at; ``parts`` as of `measures_view`."""
+    verdicts = (*_fit(parts), *text_verdicts(study, facts))
+    if facts.expected_s is None or facts.range_s is None:
+        unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials"))
+        return MeasureCard("Session", "", (Figures(unknown), *_ruled(verdicts)))
+    figures = (
+        duration_figure(facts.expected_s),
+        (str(facts.answers), _word(facts.answers, "answer")),
+        (str(facts.trials), _word(facts.trials, "trial")),
+    )
+    whole = max(1e-9, sum(facts.steps_s.values()))
+    chosen = str(path[1]) if len(path) > 1 else ""
+    segments = tuple(
+        Segment(f"{_title(study, step)} {duration(step_s)}", step_s / whole, step == chosen, _path(study, step))
+        for step, step_s in facts.steps_s.items()
+    )
+    longest = sorted(facts.steps_s, key=lambda step: -facts.steps_s[step])[:2]
+    named = [chosen, *(one for one in longest if one != chosen)][:2] if chosen in facts.steps_s else longest
+    notes = tuple(f"{_title(study, step)} {duration(facts.steps_s[step])}" for step in facts.steps_s if step in named)
+    breaks = counted(facts.breaks, "break") if facts.breaks else ""
+    least_to_most = duration_range(*facts.range_s)
+    aside = ", ".join(filter(None, (least_to_most if " to " in least_to_most else "", breaks)))
+    return MeasureCard("Session", aside, (Figures(figures), Segments(segments, notes), *_ruled(verdicts)))
+
+
+def _ruled(verdicts: Iterable[Verdict]) -> tuple[Part, ...]:
+    """Return states below a rule; nothing where there are none."""
+    return (None, *found) if (found := tuple(verdicts)) else ()
+
+
+def questions_card(protocol: Protocol, name: str, parts: int | None) -> MeasureCard:
+    """Return a questionnaire in numbers: each time it is asked, and in a session."""
+    questionnaire = protocol.questionnaires[name]
+    count = len(questionnaire.items)
+    blocks = [block for block in protocol.blocks_in_order if block.questionnaire == name]
+    times = sum(order_of(protocol, block).trials for block in blocks) + (name in protocol.forms)
+    figures = (duration_figure(answering_s(questionnaire)), (str(count), _word(count, "answer")))
+    asked: Verdict = ("neutral", "info", f"{count * times} answers per session, asked {times} {_word(times, 'time')}")
+    if not times:
+        asked = ("warn", "warning", "It is never asked")
+    return MeasureCard("Each time it is asked", "", (Figures(figures), *_ruled((*_fit(parts), asked))))
+
+
+def blocks_card(study: Study, protocol: Protocol, facts: Facts, path: Path, shown: str) -> MeasureCard | None:
+    """Return the blocks that use an element that is not one of them; None where none does.
+
+    The study and its settings concern every block; ``shown`` is the block whose numbers are shown, "" for none.
+    """
+    if path[:1] == ("blocks",) and len(path) > 1:
+        return None
+    used = list(protocol.blocks) if len(path) < 2 else blocks_using(study.document, path)
+    links = []
+    for block in dict.fromkeys(one.id for one in protocol.blocks_in_order if one.id in used):
+        focus, lasts = focus_of(protocol, ("blocks", block)), facts.steps_s.get(block)
+        measured = "smallest differences" if focus.compares else ""
+        if focus.plan is not None:
+            measured = f"{LevelWords(focus.plan.stimulus, focus.plan.design).name}s"
+        known = (measured, "" if lasts is None else duration(lasts), "shown here" if block == shown else "")
+        words = f"Block {_title(study, block)}: {', '.join(filter(None, known))}"
+        links.append(Link(("neutral", "layers", words), "Open", ("blocks", block)))
+    title = "Blocks of the study" if len(path) < 2 else f"Blocks that use {title_of(study.document, path[:2])}"
+    return MeasureCard(title, "", tuple(links), wide=True) if links else None
+
+
+def _word(count: int | None, word: str) -> str:
+    return word if count == 1 else f"{word}s"
+
+
+def _fit(parts: int | None) -> tuple[Verdict, ...]:
+    """Return whether questions fit on one page; nothing where that is not known."""
+    if parts is None:
+        return ()
+    if parts == 1:
+        return (("ok", "check", "One page, no scrolling at 1366 × 768"),)
+    return (("neutral", "info", f"{parts} pages at 1366 × 768"),)
+
+
+def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> MeasureCard:
+    """Return a block in numbers."""
+    order, questionnaire = order_of(protocol, block), protocol.questionnaire_of(block.id)
+    answers = 0 if questionnaire is None else len(questionnaire.items)
+    duration_s = facts.steps_s.get(block.id)
+    figures = (
+        (UNKNOWN, "min") if duration_s is None else duration_figure(duration_s),
+        (str(order.trials), _word(order.trials, "trial")),
+        (str(order.trials * answers), _word(order.trials * answers, "answer")),
+    )
+    aside = counted(order.breaks, "break") if order.breaks else ""
+    return MeasureCard(_title(study, block.id), aside, (Figures(figures),))
+
+
+def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
+    """Return whether texts are missing, and whether a text reveals a condition."""
+    if study.unreadable:
+        return ()
+    missing = ", ".join(f"{count} in {language_name(code)}" for code, count in facts.missing.items())
+    codes = languages_of(study)
+    languages = " and ".join(language_name(code) for code in codes) if len(codes) < 3 else f"{len(codes)} languages"
+    found: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
+    if not missing:
+        found = [("ok", "check", f"Every text in {languages}")]
+    if copied := ", ".join(f"{count} in {language_name(code)}" for code, count in copied_texts(study).items()):
+        found = [*(found if missing else ()), ("neutral", "info", f"Texts to translate: {copied}")]
+    if (protocol := valid_part(study).protocol) is not None:
+        revealed = revealing(study, protocol)
+        named = f"{revealed[0].element}: “{revealed[0].word}” reveals a condition" if revealed else ""
+        more = f", and {len(revealed) - 1} more" if len(revealed) > 1 else ""
+        found.append(("warn", "warning", named + more) if revealed else ("ok", "check", "No text reveals a condition"))
+    return found
+
+
+def balance_card(study: Study, protocol: Protocol, block: Block, controls: Controls) -> list[MeasureCard]:
+    """Return how even the orders of a block are over so many participants; none where it has one code."""
+    participants = controls.participants
+    judged = balance_of(protocol, block, participants)
+    if judged is None:
+        return []
+    evenness, rows = judged.evenness, judged.rows
+    if evenness.balanced:
+        verdict: Verdict = ("ok", "check", "balanced")
+        if rows is not None:
+            rounds = counted(participants // rows, "round")
+            verdict = ("ok", "check", f"balanced: {participants} participants are {rounds} of {rows}")
+    elif rows is not None and participants % rows:
+        even = " or ".join(str(one) for one in (judged.last_even, judged.next_even) if one)
+        verdict = ("warn", "warning", f"balanced with {even} participants, for a {SQUARE_NAMES[judged.order]}")
+    elif rows is not None:
+        verdict = ("warn", "warning", "positions balanced, carry-over not")
+    elif judged.order == "fixed":
+        verdict = ("warn", "warning", "all participants have the same order, which reveals the codes")
+    else:
+        verdict = ("neutral", "info", "balanced on average only: drawn for each session")
+    aside = f"{_title(study, block.id)}, {people(participants, controls.planned)}"
+    if len(evenness.codes) > MOST_CODES:
+        cells = [count for line in evenness.positions for count in line]
+        after = evenness.after_another
+        words = f"positions {min(cells)} to {max(cells)} times, carry-over {min(after)} to {max(after)} times"
+        return [MeasureCard("Balance", aside, ((*verdict[:2], f"{verdict[2]}; {words}"),))]
+    shown, codes = evenness.positions[:MOST_ROWS], evenness.codes
+    places = tuple(str(number + 1) for number in range(len(shown)))
+    tables = Table("position", codes, places, shown), Table("comes after", codes, codes, evenness.follows)
+    hidden = len(evenness.positions) - len(shown)
+    more = (f"and {hidden} more positions",) if hidden else ()
+    return [MeasureCard("Balance", aside, (tables, *more, verdict), wide=len(codes) > NARROW_CODES)]
+
+
+def lines_card(
+    title: str, aside: str, lines: Iterable[Line], sentences: Iterable[Verdict] = (), waiting: str = ""
+) -> MeasureCard:
+    """Return lines with bars, and sentences below them; grey lines where others are simulated (``waiting``)."""
+    there, said = tuple(lines), tuple(sentences)
+    parts = (Lines(there, grey=bool(waiting)), *_ruled(said)) if there else said
+    return MeasureCard(title, waiting or aside, parts)
+
+
+def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[str]) -> MeasureCard:
+    """Return the force of some liquids against a hand at 0.1 m/s."""
+    if not valid_part(study).forces:
+        unknown = tuple(Line(_title(study, name, "liquids"), UNKNOWN, 0.0) for name in names)
+        return lines_card("Force of each liquid", "", unknown, (("neutral", "minus", NO_FORCES),))
+    limit_n = protocol.device.force_limit_n
+    lines = []
+    for name in names:
+        it = steady(protocol.scene_of(name), HAND_MPS)
+        verdict: Verdict = ("ok", "check", "not clipped")
+        if it.limit is not None:  # in the colour of the limit
+            verdict = ("warn" if it.limit == "norm" else "bad", "warning", f"clipped by the {LIMIT_NAMES[it.limit]}")
+        lines.append(
+            Line(_title(study, name, "liquids"), f"{it.force_n:.2f} N", min(1.0, it.force_n / limit_n), verdict)
+        )
+    alike = [one for one in facts.warnings if "hard to tell apart" in one and any(name in one for name in names)]
+    sentences: tuple[Verdict, ...] = tuple(("warn", "warning", _sentence(one)) for one in alike)
+    if not sentences and len(names) > 1:
+        sentences = (("ok", "check", "No pair is hard to tell apart"),)
+    return lines_card("Force of each liquid", f"0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences)
+
+
+def effects_card(study: Study, protocol: Protocol, name: str) -> MeasureCard:
+    """Return which effects act in a liquid, with their bounds, and why others do not."""
+    verdicts = [one for one in calls_for(protocol.scene_of(name)) if one.liquid == name]
+    lines = tuple(
+        Line(
+            label_of(one.effect), f"{one.bound_n:.3g} N", one.share,
+            ("ok", "check", f"in: {one.why}") if one.included else ("neutral", "minus", f"out: {one.why}"),
+        )
+        for one in verdicts
+    )  # fmt: skip
+    said = tuple((*line.verdict[:2], f"{line.title}, {line.verdict[2]}") for line in lines)
+    return lines_card(f"Effects in {_title(study, name, 'liquids')}", "largest force of each", lines, said)
+
+
+def texts_card(study: Study) -> MeasureCard:
+    """Return how many texts each language has, and the texts that reveal a condition."""
+    lines = []
+    counts = texts_by_language(study)
+    with_own = own_texts(study, counts)
+    for code, (there, wanted) in counts.items():
+        own = with_own[code][0]
+        parts = (wanted - there, "missing"), (there - own, "to translate")
+        words = ", ".join(f"{count} {what}" for count, what in parts if count)
+        verdict: Verdict = ("bad", "warning", words) if there < wanted else ("neutral", "info", words)
+        if own == wanted:
+            verdict = ("ok", "check", "complete")
+        lines.append(Line(language_name(code), f"{own} of {wanted}", own / max(1, wanted), verdict))
+    protocol = valid_part(study).protocol
+    found = () if protocol is None else revealing(study, protocol)
+    links = [
+        Link(("warn", "warning", f"{one.element}, {one.key.lower()}: “{one.word}”"), "Go there", one.path[:2])
+        for one in found[:MOST_LINES]
+    ]
+    return MeasureCard("Languages", "texts of the study", (Lines(tuple(lines)), *((None, *links) if links else ())))
+
+
+def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) -> MeasureCard:
+    """Return the smallest difference of each statement that studies of so many participants (``who``) show."""
+    title, found = "Smallest differences", simulated.detectable
+    if not valid_part(study).forces:  # what is answered depends on them
+        return lines_card(title, who, (), (("neutral", "minus", NO_FORCES),))
+    if found is None and simulated.failed:
+        return lines_card(title, who, (), (FAILED, ("neutral", "info", simulated.failed)))
+    if found is None:
+        return lines_card(title, who, (), (("neutral", "clock", "Studies are simulated."),), simulated.waiting)
+    items = study.document.get("questionnaires", {}).get(block.questionnaire, {}).get("items", ())
+    places = {item.get("id"): at for at, item in enumerate(items)}
+    lines = []
+    for one in found.findings:
+        path: Path = ("questionnaires", str(block.questionnaire), "items", places.get(one.item, 0))
+        name = title_of(study.document, path)
+        number = UNKNOWN if one.detectable is None else f"{one.detectable:.1f}"
+        lines.append(Line(name, number, (one.detectable or 0.0) / (found.points - 1)))
+    model = (
+        f"The smallest difference, in points of {found.points}, that 4 of 5 simulated studies show. The answers are a "
+        "model's, not measured."
+    )
+    note: Verdict = ("neutral", "info", model)
+    if not lines:
+        note = ("neutral", "info", "The answer model knows none of the statements.")
+    return lines_card(title, who, tuple(lines), (note,), simulated.waiting)
+
+
+def warnings_card(facts: Facts, more: Sequence[str]) -> list[MeasureCard]:
+    """Return the warnings of ``check``, if any; ``more`` are those about a precision, which take simulations."""
+    sentences: list[Verdict] = [("warn", "warning", _sentence(one)) for one in (*facts.warnings, *more)]
+    if more:
+        sentences.append(("neutral", "info", f"{ON_AVERAGE}."))
+    return [lines_card("Warnings", "of check", (), sentences)] if sentences else []
+
+
+def _title(study: Study, name: str, section: str = "") -> str:
+    return title_of(study.document, _path(study, name, section))
+
+
+def _path(study: Study, name: str, section: str = "") -> Path:
+    sections = (section,) if section else ("blocks", "pages", "questionnaires")
+    return next((one for one in sections if name in study.document.get(one, {})), "blocks"), name
+
+
+def _sentence(words: str) -> str:
+    """Return words as a sentence; a place in the file, such as "designs.pair.feedback:", stays as it is."""
+    place = "." in words.partition(":")[0].partition(" ")[0]
+    return f"{words if place else words[:1].upper() + words[1:]}."

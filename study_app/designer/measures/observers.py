@@ -1,4 +1,4 @@
-"""What simulated observers with one planted threshold show of a block: levels asked, estimates, errors.
+"""What is computed of a block: what simulated observers show, what studies find, how even its orders are.
 
 The observers answer by the block's own method and are estimated as the analysis does, as for ``check`` and ``power``.
 """
@@ -11,6 +11,11 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from study_app.protocol.checks.expected_precision import ObserverAnswers, ThresholdPlan
+from study_app.protocol.blocks import Block
+from study_app.protocol.checks.expected_precision import Answered, ThresholdPlan
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.balance import Evenness, balances, numbered
+from study_app.protocol.orders.sequences import row_count
 from study_app.psychophysics.families import Floats
 
 OBSERVERS: Final = 400
@@ -24,6 +29,8 @@ MOST_BARS: Final = 60
 COURSE: Final = 12
 """Numbers of trials after which the estimate is computed."""
 PLANTED: Final = 12
+ENOUGH: Final = 0.8
+"""Participants are enough where so many simulated studies are as precise as planned."""
 BIAS: Final = 0.1
 COVERAGE: Final = 0.93
 """A threshold can be measured if the mean estimate is within the bias and so many 95 % intervals hold it. [choice]"""
@@ -93,6 +100,64 @@ class Measurable:
 
     ends: tuple[float, float] | None
     planted: tuple[Planted, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupPrecision:
+    """How many simulated studies know the group's mean threshold as precisely as planned.
+
+    ``precision`` is half the group's 95 % interval that is wanted, as a share of the mean. With ``trials`` of each
+    standard ``share`` of the studies reach it, with ``more_trials``, a third more, ``more_share``. ``enough`` is how
+    many participants are enough, None if more than ``most``.
+    """
+
+    participants: int
+    studies: int
+    precision: float
+    trials: int
+    share: float
+    more_trials: int
+    more_share: float
+    most: int
+    enough: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A statement of a block, and the smallest difference that 80 % of studies show [points]; None: none simulated."""
+
+    item: str
+    detectable: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Detectable:
+    """The smallest differences that simulated studies of a block show, of each statement that the answer model knows.
+
+    The smallest difference comes first; the scale has so many ``points``.
+    """
+
+    participants: int
+    studies: int
+    points: int
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """What was simulated of an element, each part None until it was answered for the first time.
+
+    ``waiting`` is said of numbers that are of an earlier study while others are simulated, ``failed`` why they cannot
+    be; both are "" otherwise. ``warnings`` are those of ``check`` that take simulated observers.
+    """
+
+    observed: Observed | None = None
+    measurable: Measurable | None = None
+    group: GroupPrecision | None = None
+    detectable: Detectable | None = None
+    warnings: tuple[str, ...] = ()
+    waiting: str = ""
+    failed: str = ""
 
 
 def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check = unchecked) -> Observed:
@@ -205,3 +270,39 @@ def _one(plan: ThresholdPlan, answered: ObserverAnswers) -> list[Asked]:
             place = at * tracks + track if plan.method.order == "interleaved" else track * each + at
             found.append(Asked(place + 1, track + 1, plan.stimulus.level_of(u), bool(answers.successes[0, at])))
     return sorted(found, key=lambda one: one.trial)
+
+
+@dataclass(frozen=True, slots=True)
+class Balanced:
+    """How even a block's orders are.
+
+    A round of its square takes so many participants (``rows``), None where it has none; ``session`` says whose orders,
+    where sessions differ.
+    """
+
+    order: str
+    evenness: Evenness
+    rows: int | None
+    session: str = ""
+
+    @property
+    def last_even(self) -> int:
+        """The number of participants of the last full round; 0 where there is none."""
+        return 0 if self.rows is None else self.evenness.orders - self.evenness.orders % self.rows
+
+    @property
+    def next_even(self) -> int | None:
+        """The next number of participants that fills a round; None without a square."""
+        people = self.evenness.orders
+        return None if self.rows is None else people + -people % self.rows
+
+
+def balance_of(protocol: Protocol, block: Block, participants: int) -> Balanced | None:
+    """Return how even the orders of a block are; None where it has one code."""
+    for judged in balances(protocol, numbered(participants), SEED):
+        for one in judged.blocks:
+            if one.id == block.id:
+                codes = len(one.evenness.codes)
+                rows = row_count(one.order, codes) if one.order in ("williams", "latin") else None
+                return Balanced(one.order, one.evenness, rows, judged.session)
+    return None

@@ -13,11 +13,13 @@ from study_app.designer.document.study import Study
 from study_app.designer.measures.level_plots import Controls
 from study_app.designer.measures.measures_view import Focus, focus_of
 from study_app.designer.measures.observers import Check, measurable, observe
+from study_app.designer.document.edited_study import Study
+from study_app.designer.measures.observers import ENOUGH, Check, Detectable, Finding, GroupPrecision, Simulated, measurable, observe
 from study_app.designer.measures.participant_texts import text_keys
-from study_app.designer.measures.planned import ENOUGH, Detectable, Finding, GroupPrecision, Simulated
+from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import ThresholdPlan, imprecise, threshold_plan
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.document import value_at
+from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.trials.presented_levels import clipping
 from study_app.workers.client import WorkerClient
 from study_app.workers.server import Send, Stop, Stopped
@@ -43,6 +45,51 @@ LAPSES: Final = 0.02
 ERRORS: Final = 2.0
 """A threshold below so many times the largest error of a valid trial is not measured. [choice]"""
 USUAL_ERROR_PERCENT, USUAL_ERROR_MS = 2.0, 2.0
+
+_NAMED_BY: Final = {"stimuli": "stimulus", "methods": "method", "designs": "design", "questionnaires": "questionnaire",
+                    "tasks": "task"}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Controls:
+    """What is simulated: participants, the threshold (a level), the lapse rate, and the precision that is wanted.
+
+    ``planned`` is how many participants the file plans, None where it does not say.
+    """
+
+    participants: int = 12
+    threshold: float = 0.2
+    lapses: float = 0.02
+    precision: float = 0.15
+    planned: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Focus:
+    """The block that measures are of: the selected one, or the first that uses what is selected, else None.
+
+    ``plan`` decides how precise its thresholds are; ``compares``: studies of its statements are simulated.
+    """
+
+    block: Block | None = None
+    plan: ThresholdPlan | None = None
+    compares: bool = False
+
+
+def focus_of(protocol: Protocol | None, path: Path) -> Focus:
+    """Return what the measures of an element are of."""
+    if protocol is None or len(path) < 2:
+        return Focus()
+    block = protocol.blocks.get(str(path[1])) if path[0] == "blocks" else None
+    if (key := _NAMED_BY.get(str(path[0]))) is not None:
+        users = [one for one in protocol.blocks_in_order if getattr(one, key) == path[1]]
+        block = next((one for one in users if one.phase == "main"), next(iter(users), None))
+    if block is None:
+        return Focus()
+    questionnaire = protocol.questionnaire_of(block.id)
+    statements = () if questionnaire is None else questionnaire.statements
+    compares = block.phase == "main" and bool(statements) and len(block.conditions) > 1
+    return Focus(block, threshold_plan(protocol, block), compares)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,10 +178,7 @@ def start_measure_worker() -> MeasureClient:
 def carry_out(order: Simulation, send: Send, stop: Stop) -> None:
     """Answer with what is known so far, each time a part of it was simulated, the quickest first.
 
-    Raises
-    ------
-    Stopped
-        Another order came, or the client is gone.
+    Raises Stopped if another order came, or the client is gone.
     """
 
     def check() -> None:

@@ -1,18 +1,59 @@
-"""What a new study can begin as: a card for each template, and a smaller one for each study that can be copied.
+"""What a new study can begin as: a card for each template with its picture, and a smaller one for each study."""
 
-The chosen card has an accent edge, the one with the keyboard a ring around it.
-"""
+import math
+from typing import Final
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QFocusEvent,
+    QFontMetricsF,
+    QKeyEvent,
+    QLinearGradient,
+    QPainter,
+    QPainterPath,
+    QPaintEvent,
+    QPen,
+)
+from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy
 
-from study_app.designer.new_study.pictures import PICTURES, paint_picture
 from study_app.designer.new_study.template_choices import PLANNED, SHIPPED, TemplateChoice
+from study_app.designer.new_study.templates import FOLDER
 from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import RADIUS_CARD, font
+from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, TANK, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.labels import clamped
+
+DEEP: Final = "#142E40"
+
+
+def paint_picture(painter: QPainter, name: str, body: QRectF) -> None:
+    """Paint the picture of a template into the upper part of its card: what a participant feels or answers."""
+    ground = QPainterPath()
+    ground.addRoundedRect(body.adjusted(0, 0, 0, RADIUS_CARD), RADIUS_CARD, RADIUS_CARD)
+    painter.save()
+    painter.setClipRect(body)
+    if name == "questionnaire-only":
+        painter.fillPath(ground, QColor(PARTICIPANT.window))
+    else:
+        water = QLinearGradient(body.topLeft(), body.bottomLeft())
+        water.setColorAt(0, QColor(TANK.water_light))
+        water.setColorAt(1, QColor(DEEP))
+        painter.fillPath(ground, water)
+        glass = QColor(TANK.glass)
+        glass.setAlpha(70)
+        painter.setPen(QPen(glass, 1))
+        for high, depth in ((0.12, 2.2), (0.17, 1.6)):
+            top, across = body.top() + high * body.height(), [step / 60 for step in range(61)]
+            points = (QPointF(body.left() + x * body.width(), top + depth * math.sin(6 * math.pi * x)) for x in across)
+            painter.drawPolyline(list(points))
+    scale = min(body.width() / 340, body.height() / 180)
+    size = QSizeF(340 * scale, 190 * scale)
+    picture = QRectF(body.center() - QPointF(size.width() / 2, size.height() / 2), size)
+    QSvgRenderer(str(FOLDER / f"{name}.svg")).render(painter, picture)
+    painter.restore()
+
 
 PICTURE_PX, WORDS_PX, COPY_PX = 150, 132, 76
 RING = 4
@@ -45,7 +86,7 @@ class TemplateButton(Themed, QAbstractButton):
     def picture(self) -> str:
         """The name of its picture, "" where it has none."""
         name = self.choice.source.removeprefix("template:")
-        return name if name in PICTURES and not self.choice.copy else ""
+        return name if FOLDER.joinpath(f"{name}.svg").exists() and not self.choice.copy else ""
 
     def sizeHint(self) -> QSize:
         return QSize(200, 2 * RING + (COPY_PX if self.choice.copy else PICTURE_PX + WORDS_PX))

@@ -101,10 +101,7 @@ def source_of(file: Path) -> str:
 def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
     """Return what a new study can begin as: templates, the empty one last, then studies to copy.
 
-    Raises
-    ------
-    StudyError
-        The study ``source`` cannot be read.
+    Raises StudyError if the study ``source`` cannot be read.
     """
     in_order = [name for name in TEMPLATES if name in templates()]
     choices = [_template_choice(name) for name in dict.fromkeys((*in_order, *templates()))]

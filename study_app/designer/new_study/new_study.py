@@ -24,15 +24,9 @@ from study_app.workspace import workspace
 class Answers:
     """What a new study begins with; what is left out stays as it is in the template.
 
-    Attributes
-    ----------
-    title : str
-        Its title, "" for that of the template.
-    languages : tuple of str
-        Its languages; the texts of those that the template lacks are missing. Where it lacks all, the first one has
-        the texts of the template's first language.
-    values : tuple of (tuple of str, object)
-        Answers to the template's own questions: key and value.
+    ``title``: its title, "" for that of the template; ``languages``: its languages; the texts of those that the
+    template lacks are missing. Where it lacks all, the first one has the texts of the template's first language;
+    ``values``: answers to the template's own questions: key and value.
     """
 
     title: str = ""
@@ -49,10 +43,7 @@ _SELF: Final = "liquid-study check NAME"
 def template(name: str) -> Study:
     """Return a template.
 
-    Raises
-    ------
-    Refused
-        There is none of this name.
+    Raises Refused if there is none of this name.
     """
     if name not in templates():
         raise Refused(f'there is no template "{name}": {did_you_mean(name, templates())}')
@@ -62,10 +53,7 @@ def template(name: str) -> Study:
 def copy_of(study: Study, name: str) -> Study:
     """Return a copy of a study under another name, comments included, as version 0.1.
 
-    Raises
-    ------
-    Refused
-        The name is not permitted, or the study cannot be read.
+    Raises Refused if the name is not permitted, or the study cannot be read.
     """
     _check_name(name)
     named = Study(study.text.replace(_SELF, f"liquid-study check {name}"), study.folder)
@@ -75,10 +63,7 @@ def copy_of(study: Study, name: str) -> Study:
 def answered(study: Study, answers: Answers) -> Study:
     """Return a study with the answers to the questions that it begins with.
 
-    Raises
-    ------
-    Refused
-        An answer is not permitted.
+    Raises Refused if an answer is not permitted.
     """
     for place, value in answers.values:
         study, _ = study.edited(Set(place, value))
@@ -110,10 +95,7 @@ def _titled(study: Study, title: str) -> tuple[Set, ...]:
 def check_free(name: str) -> Path:
     """Return the file of a new study in the workspace's protocols.
 
-    Raises
-    ------
-    Refused
-        The name is not permitted, or taken.
+    Raises Refused if the name is not permitted, or taken.
     """
     _check_name(name)
     file = workspace().protocols / f"{name}.toml"
@@ -125,12 +107,7 @@ def check_free(name: str) -> Path:
 def write_new(study: Study, name: str) -> Path:
     """Write a copy of a study into the workspace's protocols and return its file.
 
-    Raises
-    ------
-    Refused
-        The name is not permitted, or taken.
-    StoreError
-        It cannot be written.
+    Raises Refused if the name is not permitted, or taken; StoreError if it cannot be written.
     """
     file = check_free(name)
     save(file, copy_of(study, name).text, "")

@@ -1,9 +1,14 @@
-"""What a new study can begin as: templates and copies, each with its session, and the questions that it begins with."""
+"""What a new study can begin as: templates and copies, their sessions and questions, and known answers."""
 
+import json
+import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
 
 from study_app.designer.document.elements import study_title, title_of
 from study_app.designer.document.fields import row_at, unit_of
@@ -11,15 +16,76 @@ from study_app.designer.document.names import Document
 from study_app.designer.document.study import Study
 from study_app.designer.new_study.known_answers import KnownAnswer, known_answers
 from study_app.designer.new_study.new_study import Answers
-from study_app.designer.new_study.templates import QUESTIONS
+from study_app.designer.new_study.templates import FOLDER, QUESTIONS
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.number_text import counted, duration
+from study_app.number_text import counted
+from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.wording.languages import LANGUAGES
+from study_app.psychophysics.precision import BETWEEN_PEOPLE
+from study_app.viewmodels.number_words import duration
+
+FILE: Final = FOLDER / "known_answers.json"
+STUDIES: Final = 100
+SEED: Final = 1
+MIDDLE: Final = (0.05, 0.95)
+
+
+@dataclass(frozen=True, slots=True)
+class KnownAnswer:
+    """A planted threshold, and what simulated studies find of it.
+
+    ``planted``: mean threshold of the simulated people, in the unit of the levels; ``unit``: that unit; "" of a Weber
+    fraction; ``source``: where the planted threshold is from; ``people``: how many take part in each study; ``found``,
+    ``low``, ``high``: mean of the studies' thresholds, and the ends of the middle 90 % of them.
+    """
+
+    planted: float
+    unit: str
+    source: str
+    people: int
+    found: float
+    low: float
+    high: float
+
+    @property
+    def recovered(self) -> bool:
+        """Whether the mean is within 10 % of the planted threshold, which is among the middle 90 %."""
+        return abs(self.found / self.planted - 1) <= 0.1 and self.low <= self.planted <= self.high
+
+
+@cache
+def known_answers() -> dict[str, KnownAnswer]:
+    """Return the known answers of the templates that have one, as they were computed when the templates were made."""
+    found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return {name: KnownAnswer(**values) for name, values in found.items()}
+
+
+def simulated(protocol: Protocol, planted: float, unit: str, source: str) -> KnownAnswer:
+    """Simulate studies of a protocol's first block with levels, and return what they find.
+
+    ``protocol``: the study; its plan says how many people take part; ``planted``: mean threshold of the people; each
+    person's own differs from it by a factor of `BETWEEN_PEOPLE`; ``unit``, ``source``: unit of the levels, and where
+    the planted threshold is from. Raises ValueError if the study has no thresholds, or does not say how many people
+    take part.
+    """
+    plan = next((one for block in protocol.main_blocks if (one := threshold_plan(protocol, block)) is not None), None)
+    people = protocol.analysis.participants if protocol.analysis is not None else None
+    if plan is None or people is None or plan.stimulus.spacing != "log":
+        raise ValueError("the study has no thresholds on logarithmic levels, or does not say how many take part")
+    rng = np.random.default_rng(SEED)
+    apart = math.log10(BETWEEN_PEOPLE) * rng.standard_normal((STUDIES, people))
+    estimates = plan.simulate((plan.stimulus.coordinate(planted) + apart).ravel(), rng)
+    means = 10.0 ** estimates.medians.reshape(STUDIES, people).mean(axis=1)
+    low, high = np.quantile(means, MIDDLE)
+    figures = (round(float(one), 4) for one in (means.mean(), low, high))
+    return KnownAnswer(planted, unit, source, people, *figures)
+
 
 __all__ = [
     "Answers", "OwnQuestion", "Recovery", "TemplateChoice", "copy_choice", "languages_offered", "template_choice",
@@ -72,16 +138,9 @@ class OwnQuestion:
 class Recovery:
     """The known answer of a template, for a bar from 0 to ``most``.
 
-    Attributes
-    ----------
-    planted, low, high, most : float
-        The planted threshold, the ends of the middle 90 % of what studies find, and the end of the axis, as shown.
-    unit : str
-        Their unit: "%", "ms".
-    recovered : bool
-        Whether the planted threshold is found.
-    sentence : str
-        All of it in words.
+    ``planted``, ``low``, ``high``, ``most``: the planted threshold, the ends of the middle 90 % of what
+    studies find, and the end of the axis, as shown; ``unit``: their unit: "%", "ms"; ``recovered``: whether the planted
+    threshold is found; ``sentence``: all of it in words.
     """
 
     planted: float
@@ -97,26 +156,11 @@ class Recovery:
 class TemplateChoice:
     """What a new study can begin as.
 
-    Attributes
-    ----------
-    source, title, description : str
-        What it is opened by, what it is called, and what it is for.
-    copy : bool
-        Whether it is another study.
-    note : str
-        Of a copy: where the study is from.
-    figures : tuple of (str, str)
-        Icon and words of its length, people and trials.
-    tags : tuple of (str, str)
-        Icon and words of what it needs.
-    session : tuple of (str, str, str)
-        Icon, title and time of each step.
-    recovery : Recovery or None
-        Its known answer.
-    name, study_title : str
-        Short name that a copy gets where none is given, and title that it has.
-    questions : tuple of OwnQuestion
-        What it asks beyond title, name and languages.
+    ``source``, ``title``, ``description``: what it is opened by, what it is called, and what it is for; ``copy``:
+    whether it is another study; ``note``: of a copy: where the study is from; ``figures``: icon and words of its
+    length, people and trials; ``tags``: icon and words of what it needs; ``session``: icon, title and time of each
+    step; ``recovery``: its known answer; ``name``, ``study_title``: short name that a copy gets where none is given,
+    and title that it has; ``questions``: what it asks beyond title, name and languages.
     """
 
     source: str

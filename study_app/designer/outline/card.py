@@ -1,8 +1,39 @@
 """The outline: what the study is made of, as a tree to choose from, with a field to find."""
 
-from PySide6.QtCore import QEvent, QItemSelectionModel, QModelIndex, QObject, QPoint, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QStandardItem, QStandardItemModel
-from PySide6.QtWidgets import QLineEdit, QMenu
+from PySide6.QtCore import (
+    QEvent,
+    QItemSelectionModel,
+    QModelIndex,
+    QObject,
+    QPersistentModelIndex,
+    QPoint,
+    QRectF,
+    QSize,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import (
+    QColor,
+    QKeyEvent,
+    QKeySequence,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QStandardItem,
+    QStandardItemModel,
+)
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
+    QFrame,
+    QLineEdit,
+    QMenu,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTreeView,
+)
 
 from study_app.designer.outline.outline_rows import ElementPath, OutlineRow
 from study_app.designer.outline.rows import ROW_ROLE, Index
@@ -10,11 +41,277 @@ from study_app.designer.outline.tree import Tree
 from study_app.gui.kit.commands import key_cap, key_words, keys_of, tip, with_key
 from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.icons import draw_icon, icon
+from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
+from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided
+
+ROW_PX, HEADING_PX = 32, 38
+INDENT = 20
+"""So wide is the grip at the left of a row that can be dragged."""
+ROW_ROLE = Qt.ItemDataRole.UserRole + 1
+Index = QModelIndex | QPersistentModelIndex
+
+
+class RowPainter(QStyledItemDelegate):
+    """Paints rows; the tree says the theme and whether rows may be moved."""
+
+    def __init__(self, tree: QTreeView) -> None:
+        super().__init__(tree)
+        self.tree = tree
+        self.theme: Theme | None = None
+        self.movable = True
+
+    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
+        return QSize(100, HEADING_PX if not index.data(ROW_ROLE).path else ROW_PX)
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        """Paint the heading of a section, or an element with icon, title, time and faults."""
+        row = index.data(ROW_ROLE)
+        place = QRectF(option.rect)  # type: ignore[attr-defined]  # missing in the stubs
+        place.setLeft(0)
+        place.setRight(self.tree.viewport().width())
+        if self.theme is None:
+            return
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if row.path:
+            self._element(painter, place, row, option.state, index)  # type: ignore[attr-defined]
+        else:
+            middle = Qt.AlignmentFlag.AlignVCenter
+            painter.setPen(QColor(self.theme.text2))
+            painter.setFont(font("label", weight=600, tabular=True))
+            painter.drawText(place.adjusted(8, 6, -10, 0), middle, row.title)
+            painter.drawText(place.adjusted(8, 6, -10, 0), middle | Qt.AlignmentFlag.AlignRight, row.note)
+        painter.restore()
+
+    def _element(
+        self, painter: QPainter, place: QRectF, row: OutlineRow, state: QStyle.StateFlag, index: Index
+    ) -> None:
+        t = self.theme
+        assert t is not None  # noqa: S101 - `paint` saw it
+        middle, right = Qt.AlignmentFlag.AlignVCenter, place.right() - 10
+        chosen = bool(state & QStyle.StateFlag.State_Selected)
+        current = index == self.tree.currentIndex()
+        pointed = bool(state & QStyle.StateFlag.State_MouseOver)
+        if chosen or pointed:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(t.selected if chosen else t.hover))
+            painter.drawRoundedRect(place.adjusted(0, 1, 0, -1), RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
+        if current and chosen:
+            painter.setBrush(QColor(t.accent))
+            painter.drawRoundedRect(QRectF(0, place.top() + 5, 3, place.height() - 10), 1.5, 1.5)
+            if self.tree.hasFocus():
+                painter.setPen(QPen(QColor(t.accent), 2))
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+                painter.drawRoundedRect(place.adjusted(1, 2, -1, -2), RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
+        x = sign_right(row) - INDENT
+        if row.step and self.movable and (chosen or pointed):
+            paint_grip(painter, QRectF(x - 8, place.top(), 8, place.height()), t.text2)
+        if self.tree.model().hasChildren(index):
+            chevron = "chevron_down" if self.tree.isExpanded(index) else "chevron"
+            draw_icon(painter, chevron, QRectF(x + 2, place.center().y() - 7, 14, 14), t.text2, 2.0)
+        ink = t.accent if chosen else t.text if row.depth == 1 else t.text2
+        draw_icon(painter, row.icon, QRectF(x + 20, place.center().y() - 9, 18, 18), ink, 1.9)
+        painter.setFont(font("label", weight=600, tabular=True))
+        if row.faults:
+            badge = QRectF(right - 22, place.center().y() - 10, 22, 20)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(t.bad_bg))
+            painter.drawRoundedRect(badge, 10, 10)
+            painter.setPen(QColor(t.bad))
+            painter.drawText(badge, Qt.AlignmentFlag.AlignCenter, str(row.faults))
+            right = badge.left() - 6
+        if row.note:
+            painter.setFont(font("label", weight=400, tabular=True))
+            painter.setPen(QColor(t.text2))
+            width = painter.fontMetrics().horizontalAdvance(row.note) + 2
+            painter.drawText(QRectF(right - width, place.top(), width, place.height()), middle, row.note)
+            right -= width + 8
+        painter.setFont(font("label", weight=600 if chosen else 500))
+        painter.setPen(QColor(ink))
+        room = QRectF(x + 46, place.top(), right - x - 46, place.height())
+        words = painter.fontMetrics().elidedText(row.title, Qt.TextElideMode.ElideRight, int(room.width()))
+        painter.drawText(room, middle, words)
+
+
+def sign_right(row: OutlineRow) -> float:
+    """Return where the sign ends that shows whether what is below a row is shown [px]."""
+    return 12.0 + INDENT * row.depth
+
+
+def paint_grip(painter: QPainter, place: QRectF, ink: str) -> None:
+    """Paint the six dots that something is dragged by."""
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(ink))
+    middle = place.center()
+    for across in (-2.2, 2.2):
+        for down in (-4.6, 0.0, 4.6):
+            painter.drawEllipse(QRectF(middle.x() + across - 1.1, middle.y() + down - 1.1, 2.2, 2.2))
+
+
+LINE_PX = 2.0
+EDGE_PX = 24
+
+
+class Tree(Themed, QTreeView):
+    """The rows.
+
+    Signals: ``delete_asked``, ``entered_row`` (by Enter), ``copy_asked``, ``paste_asked``, ``dropped``
+    (entries of a list, and the index of the one that they come before).
+    """
+
+    delete_asked = Signal()
+    entered_row = Signal()
+    copy_asked = Signal()
+    paste_asked = Signal()
+    dropped = Signal(object, int)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Outline of the study")
+        self.setHeaderHidden(True)
+        self.setIndentation(0)
+        self.setRootIsDecorated(False)
+        self.setExpandsOnDoubleClick(False)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setMouseTracking(True)
+        self.rows = RowPainter(self)
+        self.setItemDelegate(self.rows)
+        self.setStyleSheet("QTreeView { background: transparent; border: none; outline: none; }")
+        self.dragged: tuple[ElementPath, ...] = ()
+        self.target: tuple[int, float] | None = None
+        self.arrow_pressed = False
+        self._pressed: tuple[QPoint, tuple[ElementPath, ...]] | None = None
+
+    def apply_theme(self, theme: Theme) -> None:
+        self.theme = self.rows.theme = theme
+        self.viewport().update()
+
+    def selected_rows(self) -> list[OutlineRow]:
+        """Return the selected elements, in the order of the outline, the current one's list first."""
+        found = [index.data(ROW_ROLE) for index in self.selectedIndexes()]
+        return [row for row in found if row.path]
+
+    # keys
+
+    def event(self, event: QEvent) -> bool:
+        """Keep copying and pasting for the rows."""
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
+            keys = (QKeySequence.StandardKey.Copy, QKeySequence.StandardKey.Paste)
+            if any(event.matches(key) for key in keys):
+                event.accept()
+                return True
+        return super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if self.dragged and event.key() == Qt.Key.Key_Escape:
+            self._let_go()
+        elif event.key() == Qt.Key.Key_Delete and not event.modifiers():
+            self.delete_asked.emit()
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self.entered_row.emit()
+        elif event.matches(QKeySequence.StandardKey.Copy):
+            self.copy_asked.emit()
+        elif event.matches(QKeySequence.StandardKey.Paste):
+            self.paste_asked.emit()
+        else:
+            super().keyPressEvent(event)
+
+    # dragging
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        index = self.indexAt(event.position().toPoint())
+        row = index.data(ROW_ROLE) if index.isValid() else None
+        self._pressed = None
+        arrow = row is not None and self.model().hasChildren(index) and event.position().x() < sign_right(row)
+        self.arrow_pressed = arrow
+        plain = event.button() == Qt.MouseButton.LeftButton and not event.modifiers()
+        if plain and row is not None and row.step and self.rows.movable:
+            selected = [one.step for one in self.selected_rows() if one.step[:-1] == row.step[:-1]]
+            together = tuple(dict.fromkeys(selected)) if row.step in selected else (row.step,)
+            self._pressed = (event.position().toPoint(), together)
+            if len(together) > 1:
+                self.setFocus(Qt.FocusReason.MouseFocusReason)
+                return
+        super().mousePressEvent(event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        at = event.position().toPoint()
+        if self._pressed is None or not event.buttons() & Qt.MouseButton.LeftButton:
+            super().mouseMoveEvent(event)
+            return
+        start, together = self._pressed
+        if not self.dragged and (at - start).manhattanLength() >= QApplication.startDragDistance():
+            self.dragged = together
+            self.viewport().setCursor(Qt.CursorShape.ClosedHandCursor)
+        if self.dragged:
+            bar, height = self.verticalScrollBar(), self.viewport().height()
+            if at.y() < EDGE_PX or at.y() > height - EDGE_PX:
+                bar.setValue(bar.value() + (-12 if at.y() < EDGE_PX else 12))
+            self.target = self._target(at)
+            self.viewport().update()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        dragged, target, pressed = self.dragged, self.target, self._pressed
+        self._let_go()
+        if dragged:
+            if target is not None:
+                self.dropped.emit(dragged, target[0])
+        elif pressed is not None and len(pressed[1]) > 1:
+            self.setCurrentIndex(self.indexAt(event.position().toPoint()))
+        else:
+            super().mouseReleaseEvent(event)
+
+    def _let_go(self) -> None:
+        self.dragged, self.target, self._pressed = (), None, None
+        self.viewport().unsetCursor()
+        self.viewport().update()
+
+    def _target(self, at: QPoint) -> tuple[int, float]:
+        """Return the index of the entry that comes next where the line is, and how far down the line is."""
+        best, place = (0, 0.0), self.dragged[0][:-1]
+        nearest = float("inf")
+        index = self.model().index(0, 0)
+        last = -1
+        bottom = 0.0
+        while index.isValid():
+            row = index.data(ROW_ROLE)
+            box = QRectF(self.visualRect(index))
+            if row.step and row.step[:-1] == place:
+                last, bottom = int(row.step[-1]), box.bottom()
+                if abs(box.top() - at.y()) < nearest:
+                    nearest, best = abs(box.top() - at.y()), (last, box.top())
+            elif last >= 0 and row.path and self._below(index, place):
+                bottom = box.bottom()
+            index = self.indexBelow(index)
+        return (last + 1, bottom) if abs(bottom - at.y()) < nearest else best
+
+    def _below(self, index: QModelIndex, place: ElementPath) -> bool:
+        """Return whether a row is shown below an entry of a list."""
+        above = index.parent()
+        while above.isValid():
+            row = above.data(ROW_ROLE)
+            if row.step and row.step[:-1] == place:
+                return True
+            above = above.parent()
+        return False
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if self.target is not None:
+            painter = QPainter(self.viewport())
+            y = min(max(self.target[1], 1.0), self.viewport().height() - 1.0)
+            place = QRectF(6, y - LINE_PX / 2, self.viewport().width() - 12, LINE_PX)
+            painter.fillRect(place, QColor(self.theme.accent))
 
 
 class OutlineCard(Card):

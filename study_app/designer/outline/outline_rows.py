@@ -41,24 +41,11 @@ ElementPath: TypeAlias = Path
 class OutlineRow:
     """One row of the outline.
 
-    Attributes
-    ----------
-    path : tuple of str or int
-        The element; () for the heading of a section.
-    title, icon, note : str
-        What it is called, the name of its icon, and a word at its right: a time, a count, or its `brief` fact.
-    depth : int
-        How far it is below the heading of its section.
-    faults : int
-        How many faults are within it.
-    name : str
-        What a screen reader says of it.
-    step : tuple of str or int
-        Its entry in the list that orders it; () where it cannot be moved.
-    field : tuple of str or int
-        The field of it that was found, () where none was looked for.
-    named : bool
-        Whether what was looked for is in its title or id.
+    ``path``: the element; () for the heading of a section; ``title``, ``icon``, ``note``: what it is called, the
+    name of its icon, and a word at its right: a time, a count, or its `brief` fact; ``depth``: how far it is below the
+    heading of its section; ``faults``: how many faults are within it; ``name``: what a screen reader says of it;
+    ``step``: its entry in the list that orders it; () where it cannot be moved; ``field``: the field of it that was
+    found, () where none was looked for; ``named``: whether what was looked for is in its title or id.
     """
 
     path: Path
@@ -76,14 +63,8 @@ class OutlineRow:
 def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
     """Return the outline of a study; with words to find only the elements that hold them.
 
-    Parameters
-    ----------
-    study : Study
-        The study.
-    times_s : mapping of str to float
-        How long each step takes [s], by its id; empty while the study has faults.
-    find : str
-        What an element's title, id or one of its texts must hold, or the label or a choice of one of its fields.
+    ``times_s``: how long each step takes [s], by its id; empty while the study has faults; ``find``: what an element's
+    title, id or one of its texts must hold, or the label or a choice of one of its fields.
     """
     if study.unreadable:
         only = Element(FIRST, title_of({}, FIRST), FIRST[0], faults=len(study.faults))

@@ -9,16 +9,21 @@ from PySide6.QtCore import QObject, Qt, QTimer
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.study import Study
 from study_app.designer.measures.valid_part import valid_part
-from study_app.designer.participant.participant_page import SIZES, ParticipantView, ScreenSize, moment_words, step_words
 from study_app.designer.participant.participant_tab import ParticipantTab
+from study_app.designer.participant.playable import last_valid, sound_part
 from study_app.designer.participant.shown_step import (
+    SIZES,
     STANDALONE,
     Found,
+    ParticipantView,
+    ScreenSize,
     StepPosition,
+    moment_words,
     same_step,
     showing,
     side_of,
     step_name,
+    step_words,
 )
 from study_app.designer.participant.sound_part import last_valid, sound_part
 from study_app.designer.place.arrangement import PanePage

@@ -1,15 +1,161 @@
-"""Which step of which session shows the selected element, and which of its pages."""
+"""Which step of which session shows the selected element, which of its pages, and what the tab shows."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple, TypeAlias
 
-from study_app.designer.participant.first_step import first_step
+from study_app.designer.document.names import named_places
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial, build_schedule
 from study_app.protocol.source.document import Path
-from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Preview, preview
+from study_app.protocol.wording.languages import Words, language_name, words
+from study_app.session.pages import Page
+from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Moment, Preview, preview
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenSize:
+    """A screen that the page is shown for: name, words, size [logical px], and how much larger words are at least."""
+
+    name: str
+    words: str
+    width: int
+    height: int
+    text_scale: float = 1.0
+
+
+SIZES: Final = (
+    ScreenSize("small", "1366 × 768", 1366, 768),
+    ScreenSize("full", "1920 × 1080", 1920, 1080),
+    ScreenSize("touch", "Touch, 1280 × 800", 1280, 800),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ParticipantView:
+    """What the tab shows.
+
+    ``page``: the page; None where it cannot be shown; ``language``: the language of the page; ``languages``: the
+    study's languages; ``step``: which step it is, as "Liquids, trial 1 of 6"; ``trial``, ``trials``: which trial of
+    its block it is, from 1, and how many the block has; 0 where it is none; ``has_before``, ``has_after``: whether
+    there is a step before and after it; ``moments``: the pages of the step, with their words; ``moment``: the one that
+    is shown; ``focused``: the id of the question that is selected; ``note``: what cannot be shown and why; "" where all
+    is; ``photodiode``: whether the tank has a corner for a photodiode.
+    """
+
+    page: Page | None = None
+    language: str = "en"
+    languages: tuple[str, ...] = ()
+    step: str = ""
+    has_before: bool = False
+    has_after: bool = False
+    moments: tuple[tuple[Moment, str], ...] = ()
+    moment: Moment | None = None
+    focused: str | None = None
+    note: str = ""
+    photodiode: bool = True
+    trial: int = 0
+    trials: int = 0
+
+    @property
+    def around_trial(self) -> tuple[str, str]:
+        """The words of the step before and after the number of its trial: "Liquids, trial", "of 6"."""
+        before, _, after = self.step.rpartition(f" {self.trial} of ")
+        return before, f"of {after}"
+
+    @property
+    def words(self) -> Words:
+        """The interface's words in the language of the page."""
+        return words(self.language)
+
+    @property
+    def name(self) -> str:
+        """What the page is called for a screen reader."""
+        named = language_name(self.language)
+        return f"Participant's page, {named}"
+
+
+def step_words(shown: Preview, step: Step, language: str) -> str:
+    """Return what a step is called: "Welcome", "Liquids, trial 3 of 6"."""
+    protocol = shown.protocol
+    if isinstance(step, Trial):
+        title = protocol.text(protocol.blocks[step.block].title, language)
+        return title if step.of == 1 else f"{title}, trial {step.index} of {step.of}"
+    if isinstance(step, PageStep):
+        return protocol.text(protocol.pages[step.page_id].title, language)
+    form = protocol.questionnaires[step.form].title
+    return step.form.replace("_", " ").capitalize() if form is None else protocol.text(form, language)
+
+
+def moment_words(moments: tuple[Moment, ...]) -> tuple[tuple[Moment, str], ...]:
+    """Return the pages of a step with their words; none where there is no choice."""
+    tanks = sum(moment.kind == "tank" for moment in moments)
+    named = {
+        "tank": "Tank",
+        "questions": "Questions" if tanks < 2 else "Question",
+        "feedback": "Feedback",
+        "text": "Text",
+    }
+    if len(moments) < 2:
+        return ()
+    return tuple(
+        (moment, f"Interval {moment.interval}" if moment.kind == "tank" and tanks > 1 else named[moment.kind])
+        for moment in moments
+    )
+
+
+Graph: TypeAlias = Mapping[Path, frozenset[Path]]
+"""What each table names, by paths: ``("conditions", "syrup")`` → ``{("liquids", "syrup")}``."""
+
+
+def first_step(shown: Preview, path: Path) -> int:
+    """Return the index of the first step that shows an element; 0 where no step is about it.
+
+    ``shown``: the session; ``path``: the element, or a place within it: ``("conditions", "water")``, a question, a text
+    of a page.
+    """
+    graph = graph_of(shown.protocol.model_dump())
+    tables = (_shown_by(shown, step, graph) for step in shown.schedule.steps)
+    return next((at for at, found in enumerate(tables) if path[:2] in found), 0)
+
+
+def graph_of(document: Mapping[str, object]) -> Graph:
+    """Return what each table of a study names."""
+    found: dict[Path, set[Path]] = {}
+    for place, named in named_places(document):
+        found.setdefault(place[:2], set()).add(named[:2])
+    return {table: frozenset(named) for table, named in found.items()}
+
+
+def reached(graph: Graph, first: Iterable[Path]) -> frozenset[Path]:
+    """Return tables and all that they name, directly or not."""
+    found = dict.fromkeys(first)
+    todo = list(found)
+    for table in todo:  # grows while it is read
+        new = [named for named in graph.get(table, ()) if named not in found]
+        found |= dict.fromkeys(new)
+        todo += new
+    return frozenset(found)
+
+
+def _shown_by(shown: Preview, step: Step, graph: Graph) -> frozenset[Path]:
+    """Return the tables that a step presents, and what these name; of a trial only its own condition."""
+    if isinstance(step, PageStep):
+        return reached(graph, [("pages", step.page_id)])
+    if isinstance(step, FormStep):
+        return reached(graph, [("questionnaires", step.form)])
+    block: Path = ("blocks", step.block)
+    parts = [part for part in graph.get(block, ()) if part[0] not in {"conditions", "pages"}]
+    return reached(graph, [*parts, *_presented(shown, step)]) | {block}
+
+
+def _presented(shown: Preview, trial: Trial) -> Iterator[Path]:
+    """Yield the conditions that a trial names; those of a varied number follow from the block's stimulus."""
+    for name in (shown.codes[trial.block][trial.code], shown.protocol.blocks[trial.block].standard):
+        if name in shown.protocol.conditions:
+            yield ("conditions", str(name))
+
 
 Side: TypeAlias = Literal["tank", "questions"]
 

@@ -19,7 +19,7 @@ from study_app.designer.form.form import form
 from study_app.designer.measures.measures_controller import MeasuresController
 from study_app.designer.new_study.known_studies import header_state, new_choices, source_of, studies
 from study_app.designer.new_study.new_study import NO_ANSWERS, Answers, answered, template
-from study_app.designer.outline.addable import addable, fields_to_go_to
+from study_app.designer.outline.add_list import addable, fields_to_go_to
 from study_app.designer.outline.outline_rows import outline_rows
 from study_app.designer.participant.feeling import Feeling
 from study_app.designer.participant.preview import ParticipantPreview

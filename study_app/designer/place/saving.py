@@ -12,12 +12,9 @@ from study_app.designer.place.designer_view import Banner, BannerAction
 from study_app.designer.place.editing import Editing, OpenStudy, why_read_only
 from study_app.designer.place.prompts import DiscardCard
 from study_app.designer.place.view import DesignerPlace
-from study_app.designer.versions.changes_controller import compare, newest, version_of
-from study_app.designer.versions.file_watch import FileWatch
-from study_app.designer.versions.known_runs import KnownRuns
-from study_app.designer.versions.standing import Standing, check_version
-from study_app.designer.versions.version_rows import FILE, Comparison, save_prompt
-from study_app.designer.versions.versions_page import SaveCard
+from study_app.designer.versions.changes_controller import SaveCard, compare, newest, version_of
+from study_app.designer.versions.known_runs import FileWatch, KnownRuns
+from study_app.designer.versions.version_rows import FILE, Comparison, Standing, check_version, save_prompt
 from study_app.errors import StudyError
 from study_app.gui.home.study_facts import time_words
 from study_app.number_text import counted

@@ -13,8 +13,7 @@ from study_app.designer.form.typed_fields import TypedLine, TypedText
 from study_app.designer.measures.measures_page import MeasuresPage
 from study_app.designer.new_study.new_study_page import NewStudyPage, NoStudyCard
 from study_app.designer.new_study.template_choices import TemplateChoice
-from study_app.designer.outline.add_list import AddList
-from study_app.designer.outline.addable import Addable
+from study_app.designer.outline.add_list import Addable, AddList
 from study_app.designer.outline.card import OutlineCard
 from study_app.designer.outline.outline_rows import ElementPath
 from study_app.designer.place.arrangement import Arrangement, PanePage, RightPane

@@ -1,23 +1,102 @@
-"""Versions of a study as the designer shows them: the chip of the header, the card that saves, the tab Changes."""
+"""Versions of a study: which may be saved, what was run, and what is said of them."""
 
 import re
+import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache
+from pathlib import Path
 from typing import Final
 
 from study_app.designer.versions.standing import Standing
 from study_app.gui.sessions.session_facts import started_words
 from study_app.gui.theme.theme import Tone
+from study_app.designer.document.edited_study import Study
+from study_app.designer.document.elements import study_title, title_of
+from study_app.designer.document.fields import label_of
+from study_app.designer.document.writer.refused import Refused
+from study_app.designer.problems.problem_rows import element_of
 from study_app.number_text import counted
+from study_app.protocol.differences import document_differences
 from study_app.store.study_runs import Run
 from study_app.store.study_versions import Kept, kept_content
+
+_VERSION: Final = re.compile(r"[0-9A-Za-z.+-]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How a study's content stands to those that participants were run with.
+
+    ``version``: the version to save it as: its own, or the next free one; ``was``: the version that was run last; ""
+    where none was; ``sessions``: how many sessions were run with this very content; ``asks``: whether saving asks
+    first: the content differs from the one that was run; ``others``: how many sessions were run with the study's own
+    version and another content.
+    """
+
+    version: str
+    was: str = ""
+    sessions: int = 0
+    asks: bool = False
+    others: int = 0
+
+
+def standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Standing:
+    """Return how a study's content stands to what was run; pilots and rehearsals protect nothing.
+
+    ``hash_``: ``protocol_hash`` of the study as it is edited; ``base``: ``protocol_hash`` of the file that it is edited
+    from; "" for a new study; ``version``: the version that the study states; ``known``: what was run (`runs`).
+    """
+    ran = [run for run in known if run.sessions]
+    if not ran:
+        return Standing(version)
+    same = sum(run.sessions for run in ran if run.hash == hash_)
+    others = sum(run.sessions for run in ran if run.version == version and run.hash != hash_)
+    asks = not same and bool(others or any(run.hash == base for run in ran))
+    free = version
+    while not same and any(run.version == free for run in ran):
+        free = next_version(free)
+    return Standing(free, ran[-1].version, same, asks, others)
+
+
+def check_saving(hash_: str, version: str, known: tuple[Run, ...]) -> None:
+    """Refuse to save a version under the number of another content that participants were run with.
+
+    ``hash_``, ``version``: ``protocol_hash`` and version of what is to be saved; ``known``: what was run (`runs`);
+    pilots and rehearsals protect nothing. Raises Refused if the version was run with another content.
+    """
+    others = sum(run.sessions for run in known if run.version == version and run.hash != hash_)
+    if others:
+        raise Refused(
+            f"version {version} was run by {counted(others, 'session')} with another content: "
+            f"save it as version {next_version(version)}"
+        )
+
+
+def check_version(version: str, known: Iterable[Run]) -> None:
+    """Refuse what cannot be the version of a content that was not run.
+
+    Raises Refused if it is not letters, digits, dots, plus and minus, or participants were run with it.
+    """
+    if not _VERSION.fullmatch(version):
+        raise Refused(f'"{version}" cannot be a version: write letters, digits, dots, plus and minus, such as 1.2')
+    if any(run.sessions and run.version == version for run in known):
+        raise Refused(f"version {version} was run with another content: choose another number")
+
+
+def next_version(version: str) -> str:
+    """Return a version with its last number raised: 1.2 of 1.1; of one without a number, with ".1" added."""
+    last = re.search(r"(\d+)(\D*)$", version)
+    if last is None:
+        return f"{version}.1"
+    return f"{version[: last.start()]}{int(last[1]) + 1}{last[2]}"
+
 
 FILE: Final = "file"
 """The key of what the file holds."""
 MOST_KEPT: Final = 40
-_VERSION: Final = re.compile(r"""^\s*version\s*=\s*["']([^"']+)""", re.MULTILINE)
+_STATED: Final = re.compile(r"""^\s*version\s*=\s*["']([^"']+)""", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,16 +192,8 @@ def save_prompt(standing: Standing, known: Iterable[Run], difference: Comparison
 def version_choices(known: Sequence[Run], kept: Iterable[Kept], file: str, now: datetime) -> tuple[VersionChoice, ...]:
     """Return what a study can be compared with: its file, what was run, and what was saved, the newest first.
 
-    Parameters
-    ----------
-    known : sequence of Run
-        What was run.
-    kept : iterable of Kept
-        What was saved.
-    file : str
-        What is said of the file; "" where it does not differ from the study.
-    now : datetime
-        For "Today 14:02".
+    ``known``: what was run; ``kept``: what was saved; ``file``: what is said of the file; "" where it does not differ
+    from the study; ``now``: for "Today 14:02".
     """
     found = [VersionChoice(FILE, file)] if file else []
     ran = {run.hash for run in known}
@@ -144,7 +215,7 @@ def _kept_words(one: Kept, now: datetime) -> str:
 
 @lru_cache(maxsize=256)
 def _stated(hash_: str) -> str:
-    found = _VERSION.search((kept_content(hash_) or b"").decode("utf-8", "replace"))
+    found = _STATED.search((kept_content(hash_) or b"").decode("utf-8", "replace"))
     return found[1] if found else "No version"
 
 
@@ -154,3 +225,28 @@ def _when(moment: str, now: datetime) -> str:
     except ValueError:
         return "at an unknown time"
     return f"{words[:1].lower()}{words[1:]}"
+
+
+NAMED_AT_MOST: Final = 3
+"""So many elements with edits that were not saved are named."""
+
+
+def draft_title(draft: str, folder: Path) -> str:
+    """Return the title of a study, "" where it has none."""
+    return study_title(Study(draft, folder).document)
+
+
+def edited_words(saved: str, draft: str, folder: Path) -> str:
+    """Return the elements in which a draft differs from its file, in words: ": Water, Welcome and 2 more"."""
+    study = Study(draft, folder)
+    try:
+        found = document_differences(tomllib.loads(saved), tomllib.loads(draft))
+    except ValueError:  # the text of one of them is not TOML
+        return ""
+    places = (one.place[:2] for one in found)
+    titles = dict.fromkeys(
+        label_of(path[1]) if path[0] == "study" else title_of(study.document, element_of(study, path))
+        for path in places
+    )
+    named, more = list(titles)[:NAMED_AT_MOST], len(titles) - NAMED_AT_MOST
+    return f": {', '.join(named) or 'comments, order or notation'}{f' and {more} more' if more > 0 else ''}"

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
-from study_app.designer.outline.rows import ROW_ROLE
+from study_app.designer.outline.card import ROW_ROLE
 
 pytestmark = pytest.mark.slow
 

@@ -10,8 +10,8 @@ from study_app.analysis.planning.threshold_studies import Case, study_batch
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.measures import observers
-from study_app.designer.measures.measures_view import focus_of
 from study_app.designer.measures.observers import measurable, observe
+from study_app.designer.measures.simulation import focus_of
 from study_app.designer.new_study.new_study import template
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
 from study_app.protocol.source.files import shipped_file

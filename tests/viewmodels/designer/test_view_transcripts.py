@@ -16,6 +16,14 @@ from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.observers import Asked, Measurable, Observed, Planted
 from study_app.designer.measures.planned import Detectable, Finding, GroupPrecision, Simulated
 from study_app.designer.outline.addable import addable, fields_to_go_to
+from study_app.designer.form.element_facts import brief, used_by
+from study_app.designer.form.form_rows import form, position_of
+from study_app.designer.measures.measures_page import clipped_sentence
+from study_app.designer.measures.measures_view import MeasuresView, measures_view
+from study_app.designer.measures.observers import Asked, Detectable, Finding, GroupPrecision, Measurable, Observed, Planted, Simulated
+from study_app.designer.measures.plots import forces_sentence, function_sentence, track_sentence
+from study_app.designer.measures.simulation import Controls
+from study_app.designer.outline.add_list import addable, fields_to_go_to
 from study_app.designer.outline.outline_rows import outline_rows
 from study_app.designer.place.file import file_text
 from study_app.designer.place.requests import MakeSeries
@@ -30,6 +38,21 @@ from tests.protocol.edited_studies import CASES, cases_of
 GOLDEN = File(__file__).parent / "golden"
 STUDIES = ("rows", "sound", "every_design", "grouped", "slime")
 """Studies of which each has kinds of elements that none before it has; the first is short."""
+
+
+def measures(view: MeasuresView) -> dict[str, Any]:
+    """Return what is shown of an element: numbers, cards, and each plot in a sentence."""
+    of, observed = view.levels, view.simulated.observed
+    return {
+        "simulated": None if view.words is None else view.words.words(view.controls.threshold),
+        "numbers": view.numbers,
+        "cards": view.cards,
+        "blocks": view.blocks,
+        "function": function_sentence(of.words, observed) if of is not None and observed is not None else "",
+        "track": track_sentence(of.words, observed) if of is not None and observed is not None else "",
+        "forces": "" if of is None else forces_sentence(of),
+        "clipped": "" if of is None else clipped_sentence(of),
+    }
 
 
 class Shown:
@@ -63,7 +86,8 @@ class Shown:
         yield f"brief: {brief(document, path)} | {used_by(document, path)} | {position_of(document, path)}"
         yield f"lines: {marked.selected} {marked.faulty}"
         yield from value_lines(form(study, path), "form")
-        yield from self.note("measures", measures_view(study, facts(study), path, Controls(12), Simulated(), {}))
+        view = measures_view(study, facts(study), path, Controls(12), Simulated(), {})
+        yield from self.note("measures", measures(view))
         yield from self.note("to add", tuple(addable(study, path)))
         if (prompt := series_prompt(study, path)) is not None:
             yield from value_lines(prompt)
@@ -116,7 +140,8 @@ def of_blocks(study: Study, simulated: Simulated) -> Iterator[str]:
     for name in study.document["blocks"]:
         for people in (1, 13):
             controls = Controls(people, threshold=0.19, planned=12)
-            yield from value_lines(measures_view(study, facts(study), ("blocks", name), controls, simulated, {}, 2))
+            view = measures_view(study, facts(study), ("blocks", name), controls, simulated, {}, 2)
+            yield from value_lines(measures(view))
 
 
 @pytest.mark.parametrize("name", [STUDIES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in STUDIES[1:])])

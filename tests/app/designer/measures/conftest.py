@@ -4,8 +4,15 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.measures.observers import Asked, Measurable, Observed
-from study_app.designer.measures.planned import Detectable, Finding, GroupPrecision, Simulated
+from study_app.designer.measures.observers import (
+    Asked,
+    Detectable,
+    Finding,
+    GroupPrecision,
+    Measurable,
+    Observed,
+    Simulated,
+)
 from study_app.designer.measures.simulation import Simulation
 from study_app.protocol.checks.expected_precision import threshold_plan
 

@@ -16,10 +16,19 @@ from study_app.designer.measures.measures_view import Focus, focus_of
 from study_app.designer.measures.number_cards import ANEW, FAILED, UNKNOWN
 from study_app.designer.measures.page_fit import _pages
 from study_app.designer.measures.planned import ENOUGH
+from study_app.designer.document.edited_study import read
+from study_app.designer.document.writer.edits import Set, Unset
+from study_app.designer.measures.cards import UNKNOWN
+from study_app.designer.measures.measures_controller import ANEW, _pages
+from study_app.designer.measures.measures_view import FAILED
+from study_app.designer.measures.observers import ENOUGH
 from study_app.designer.measures.simulation import (
     THRESHOLD_STUDIES,
+    Controls,
+    Focus,
     Simulation,
     carry_out,
+    focus_of,
     simulation_of,
     start_measure_worker,
 )
@@ -48,22 +57,22 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     shown(qtbot, designer, 1, "± 26")
     shown(qtbot, designer, 2, "93")
     assert designer.place.header.problems.words == "1 warning"  # that of the precision takes simulated observers
-    assert page.function.accessibleDescription().startswith("Share of answers that are correct")
-    assert "19 %" in page.track.accessibleDescription()
-    assert page.forces.accessibleDescription().startswith("Force at 31 levels")
+    assert page.function.plot.accessibleDescription().startswith("Share of answers that are correct")
+    assert "19 %" in page.track.plot.accessibleDescription()
+    assert page.forces.plot.accessibleDescription().startswith("Force at 31 levels")
 
     designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
     qtbot.waitUntil(lambda: len(worker.orders) == 2)
     assert page.numbers.parts[1].note.text() == ANEW  # grey, with the number of before
     assert page.numbers.parts[1].number.text() == "± 26"
-    assert page.function.grey
+    assert page.function.plot.grey
     designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 100))
     qtbot.waitUntil(lambda: worker.stops == 1)  # what was under way is given up
     qtbot.waitUntil(lambda: len(worker.orders) == 3)
     assert worker.orders[2].protocol.methods["adaptive"].trials == 100
     designer.editing.undo()
     designer.editing.undo()
-    qtbot.waitUntil(lambda: not page.function.grey)  # kept by what it depends on
+    qtbot.waitUntil(lambda: not page.function.plot.grey)  # kept by what it depends on
     qtbot.wait(120)
     assert len(worker.orders) == 3
     designer.editing.make("Change", Set(("pages", "welcome", "title"), "Hello"))
@@ -85,7 +94,7 @@ def test_numbers_appear_as_they_come_and_the_others_say_that_their_simulation_cr
     qtbot.waitUntil(lambda: bool(worker.orders))
     jnds, one, people, _ = designer.place.measures.numbers.parts
     assert {part.note.text() for part in (jnds, one, people)} == {ANEW}
-    assert designer.place.measures.cards["function"].legend.text().casefold() == ANEW
+    assert designer.place.measures.function.legend.text().casefold() == ANEW
     worker.given.append((1, replace(answer_to(worker.orders[0]), group=None, measurable=None)))
     shown(qtbot, designer, 1, "± 26")
     worker.given.append((1, Crashed(1)))
@@ -104,7 +113,7 @@ def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> 
     part = designer.place.measures.numbers.parts[1]
     qtbot.waitUntil(lambda: part.note.text() == FAILED[2])
     assert part.more.text() == "The process of the simulations does not start."
-    assert designer.place.measures.cards["function"].legend.text() == FAILED[2].capitalize()
+    assert designer.place.measures.function.legend.text() == FAILED[2].capitalize()
     assert designer.place.measures.numbers.parts[3].number.text() == "17"
 
 
@@ -154,7 +163,7 @@ def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worke
     qtbot.waitUntil(page.earlier.isVisible)
     assert [part.number.text() for part in page.numbers.parts] == before
     assert {ink(part) for part in page.numbers.parts} == {grey}
-    assert page.function.grey  # drawn in grey, too
+    assert page.function.plot.grey  # drawn in grey, too
     assert "last valid state" in page.earlier.text()
     designer.editing.undo()
     qtbot.waitUntil(lambda: not page.earlier.isVisible())
@@ -164,7 +173,7 @@ def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worke
     designer.editing.undo()
     qtbot.waitUntil(lambda: not page.earlier.isVisible())
     assert grey not in {ink(part) for part in page.numbers.parts}
-    assert not page.function.grey
+    assert not page.function.plot.grey
 
 
 class Serial(Executor):

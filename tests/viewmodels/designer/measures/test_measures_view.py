@@ -10,6 +10,13 @@ from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.number_cards import UNKNOWN, LinesCard, MeasuresView, SessionCard
 from study_app.designer.measures.observers import Measurable, Observed
 from study_app.designer.measures.planned import GroupPrecision, Simulated
+from study_app.designer.document.writer.edits import Set
+from study_app.designer.measures.cards import UNKNOWN, Figures, Line, Lines, MeasureCard
+from study_app.designer.measures.levels import AS_ASKED
+from study_app.designer.measures.measures_page import clipped_sentence
+from study_app.designer.measures.measures_view import MeasuresView, measures_view
+from study_app.designer.measures.observers import GroupPrecision, Measurable, Observed, Simulated
+from study_app.designer.measures.simulation import Controls
 from study_app.designer.new_study.new_study import template
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.files import shipped_file
@@ -25,17 +32,22 @@ def view(
     return measures_view(study, facts(study), path, controls or Controls(), simulated or Simulated(), {})
 
 
+def lines_of(card: MeasureCard) -> tuple[Line, ...]:
+    return next((part.lines for part in card.parts if isinstance(part, Lines)), ())
+
+
 def test_a_force_that_a_limit_clips_is_said_and_sums_of_a_broken_study_are_not_known() -> None:
     study = study_of("rek2024")
     weak, _ = study.edited(Set(("device", "force_limit_n"), 0.5))
-    (force,) = [card for card in view(weak, ("study",)).cards if isinstance(card, LinesCard) and card.lines]
-    assert {line.verdict[2] for line in force.lines} == {"clipped by the force limit"}
-    assert {line.share for line in force.lines} == {1.0}
+    (force,) = [card for card in view(weak, ("study",)).cards if card.title == "Force of each liquid"]
+    assert {line.verdict[2] for line in lines_of(force)} == {"clipped by the force limit"}
+    assert {line.share for line in lines_of(force)} == {1.0}
     broken, _ = study.edited(Set(("blocks", "liquids", "repetitions"), -1))
     session = view(broken, ("study",)).cards[0]
-    assert isinstance(session, SessionCard)
-    assert {number for number, _ in session.figures} == {UNKNOWN}
-    assert any(isinstance(card, LinesCard) and len(card.lines) == 4 for card in view(broken, ("study",)).cards)
+    figures = session.parts[0]
+    assert isinstance(figures, Figures)
+    assert {number for number, _ in figures.figures} == {UNKNOWN}
+    assert any(len(lines_of(card)) == 4 for card in view(broken, ("study",)).cards)
 
 
 def test_cards_say_which_levels_are_clipped_and_whether_that_is_simulated() -> None:
@@ -59,20 +71,21 @@ def test_cards_say_which_levels_are_clipped_and_whether_that_is_simulated() -> N
     ):
         jnds, _, people, _ = view(study, ("blocks", "viscosity"), measured).numbers
         assert jnds.more == said
-        own = view(study, ("blocks", "training")).forces
+        own = view(study, ("blocks", "training")).levels
         assert own is not None
-        assert own.warning == ""  # it presents no clipped level
+        assert clipped_sentence(own) == ""  # it presents no clipped level
         assert people.more == f"80 % are enough; with 107 trials: 100 %{group}"
 
 
 @pytest.mark.parametrize(
-    ("study", "block", "words"),
-    [("viscosityjnd", "viscosity", "simulated JND"), ("forcedelay", "delay", "simulated threshold")],
+    ("study", "block", "name"), [("viscosityjnd", "viscosity", "JND"), ("forcedelay", "delay", "threshold")]
 )
 def test_what_is_simulated_is_called_a_threshold_where_the_standard_is_nothing(
-    study: str, block: str, words: str
+    study: str, block: str, name: str
 ) -> None:
-    assert view(study_of(study), ("blocks", block)).controls.threshold_words == words
+    words = view(study_of(study), ("blocks", block)).words
+    assert words is not None
+    assert words.name == name
 
 
 CLIPPED = "levels are clipped"
@@ -115,5 +128,4 @@ def test_where_nothing_is_measured_the_cards_say_why(
 
 def test_nothing_is_said_of_the_texts_of_a_file_that_was_never_readable() -> None:
     (session,) = view(Study("[study"), ("study",)).cards
-    assert isinstance(session, SessionCard)
-    assert session.verdicts == ()
+    assert [type(part) for part in session.parts] == [Figures]

@@ -1,15 +1,22 @@
-"""Levels of a stimulus in words, their places along an axis, and its ticks."""
+"""The levels of a block: in words, along an axis, and as limits clip them."""
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal, TypeAlias
 
-from study_app.designer.measures.number_cards import Ticks
+from study_app.gui.theme.theme import Theme
+from study_app.protocol.blocks import Block
+from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.designs import Design
+from study_app.protocol.trials.presented_levels import Clipping, Level, LevelLimits, clipping, level_limits, levels
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.trials.tracks import success_name
+from study_app.protocol.trials.tracks import design_of, stimulus_of, success_name
 
+Limit: TypeAlias = Literal["norm", "slope"]
+Ticks: TypeAlias = tuple[tuple[float, str], ...]
+LIMIT_NAMES: Final[dict[Limit, str]] = {"norm": "force limit", "slope": "slope limit"}
+AS_ASKED: Final = "Clipped levels are simulated as they are requested"
 MOST_TICKS: Final = 7
 _BY_DECADE: Final = ((1.0,), (1.0, 3.0), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 5.0, 7.0), tuple(range(1, 10)))
 _STEPS: Final = (1, 2, 2.5, 5, 10)
@@ -74,6 +81,79 @@ class LevelWords:
         low, high = (self.factor * level for level in self.stimulus.levels)
         values = log_ticks(low, high, most) if self.stimulus.spacing == "log" else even_ticks(low, high, most)
         return tuple((self.stimulus.coordinate(value / self.factor), rounded(value)) for value in values)
+
+
+@dataclass(frozen=True, slots=True)
+class LevelBlock:
+    """A block with a stimulus: what its levels are, how limits clip them, and whether their forces are known."""
+
+    protocol: Protocol
+    block: Block
+    words: LevelWords
+    levels: tuple[Level, ...]
+    limits: LevelLimits | None
+    clipping: Clipping | None
+    forces: bool = True
+
+    @property
+    def standard(self) -> float | None:
+        """The standard that is shown: the highest, whose forces are the strongest."""
+        return max((one.standard for one in self.levels if one.standard is not None), default=None)
+
+    @property
+    def shown(self) -> tuple[Level, ...]:
+        """The levels of that standard."""
+        return tuple(one for one in self.levels if one.standard == self.standard)
+
+    @property
+    def clipped_from(self) -> tuple[float, Limit] | None:
+        """The place from which on a limit takes part of the force away, and which; None where no level is beyond it."""
+        level = math.inf if self.clipping is None else self.clipping.highest(self.words.stimulus)
+        if self.limits is None or not math.isfinite(level):
+            return None
+        return self.words.at(level), "norm" if self.limits.force == self.limits.lowest else "slope"
+
+    def measures(self, threshold: float) -> bool:
+        """Return whether a threshold is below the highest level that observers answer to in full."""
+        paced = self.clipping is not None and self.clipping.paced
+        return not paced or self.clipping is None or threshold < self.clipping.highest(self.words.stimulus)
+
+    @property
+    def as_asked(self) -> str:
+        """That clipped levels are simulated as they are asked; "" where none is clipped, or as they are presented."""
+        simulated = self.clipping is not None and self.clipping.paced
+        return "" if simulated or all(one.clipped_by is None for one in self.shown) else AS_ASKED
+
+    @property
+    def clipped_words(self) -> str:
+        """Which levels a limit clips, and what is simulated of them; "" where none is clipped."""
+        if self.clipping is None:
+            return self.as_asked
+        highest = self.clipping.highest(self.words.stimulus)
+        named = self.clipping.named and f"{self.clipping.named} {self.words.value_unit}".rstrip()
+        which = f"Levels above {self.words.words(highest)}{named and f' of standard{named}'} are"
+        if self.clipping.clips_standard:
+            which = f"The standard{named} is"
+        if self.clipping.paced:
+            return f"{which} clipped: observers are simulated with what the limits leave"
+        return f"{which} clipped in fast motions, whose trials are repeated. {AS_ASKED}"
+
+
+def level_block(protocol: Protocol, block: Block, *, forces: bool = True) -> LevelBlock | None:
+    """Return a block's levels; None where it varies nothing. Without ``forces`` its limits are not known."""
+    if block.stimulus is None or block.design is None:
+        return None
+    found = levels(protocol, block.id)
+    words = LevelWords(stimulus_of(protocol, block), design_of(protocol, block))
+    if not forces:
+        return LevelBlock(protocol, block, words, found, None, None, forces)
+    limits = level_limits(protocol, block)
+    return LevelBlock(protocol, block, words, found, limits, clipping(protocol, block, limits), forces)
+
+
+def limit_colour(theme: Theme, limit: Limit) -> str:
+    """Return the colour of a limit, the same on the axis of the levels and in every plot."""
+    return theme.bad if limit == "slope" else theme.warn
 
 
 def rounded(value: float, digits: int = 3) -> str:

@@ -1,0 +1,440 @@
+"""Cards of measures: words, numbers, bars and tables, as values and as the widgets that show them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+from PySide6.QtCore import QEvent, QRectF, Qt
+from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
+
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, insert_layout, vbox
+from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
+from study_app.protocol.source.document import Path
+from study_app.viewmodels.tones import Tone
+
+UNKNOWN: Final = "–"
+"""Stands for a number that is not known."""
+Verdict: TypeAlias = tuple[Tone, str, str]
+"""Tone, icon and words."""
+INKS: dict[Tone, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}
+NAME_PX = 132
+MOST_LINES = 7
+NARROW_CODES = 3
+NUMBERS, ONE_ROW_FROM = 4, 600
+
+
+@dataclass(frozen=True, slots=True)
+class NumberCard:
+    """One number with its verdict or a note, and a sentence below it; grey while another one is ``simulated``."""
+
+    title: str
+    number: str
+    unit: str = ""
+    note: Verdict = ("neutral", "", "")
+    more: str = ""
+    simulated: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """Numbers with their words, side by side."""
+
+    figures: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A step of a session: its words, its share of the time, whether it is looked at, and the element."""
+
+    words: str
+    share: float
+    chosen: bool
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Segments:
+    """The steps of a session in order, and what is written below them: left and right."""
+
+    segments: tuple[Segment, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line with a bar: its title, its number in words, its share (0 to 1), and its verdict where it has an icon."""
+
+    title: str
+    number: str
+    share: float
+    verdict: Verdict = ("neutral", "", "")
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """Lines with bars; grey while others are simulated."""
+
+    lines: tuple[Line, ...]
+    grey: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows of counts: how often each code is at a place."""
+
+    name: str
+    codes: tuple[str, ...]
+    places: tuple[str, ...]
+    counts: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A state with a button that opens an element."""
+
+    verdict: Verdict
+    action: str
+    path: Path
+
+
+Part: TypeAlias = Verdict | Figures | Segments | Lines | tuple[Table, ...] | Link | str | None
+"""What is on a card, one below the other; None is a rule."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeasureCard:
+    """A card: title, what stands at its right, parts, and whether it is as wide as two."""
+
+    title: str
+    aside: str = ""
+    parts: tuple[Part, ...] = ()
+    wide: bool = False
+
+
+class NumberPart(Card):
+    """One number; grey while another one is computed."""
+
+    def __init__(self) -> None:
+        super().__init__(padding=14, gap=2)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.shown: tuple[NumberCard, str] | None = None
+        self.title = Elided("small", "text2")
+        self.number, self.unit = figures("", "number"), label("", "small", "text2")
+        self.icon, self.note = Icon("info", "text2", 14), label("", "small", "text2", wraps=True)
+        self.more = label("", "small", "text2", wraps=True)
+        across = hbox(self.number, (self.unit, 0, Qt.AlignmentFlag.AlignBottom), STRETCH, spacing=6)
+        below = hbox((self.icon, 0, Qt.AlignmentFlag.AlignTop), (self.note, 1), spacing=6)
+        add_parts(self.column, self.title, across, below, self.more, STRETCH)
+
+    def show_card(self, shown: NumberCard, waiting: str) -> None:
+        """Show a number; ``waiting`` is said of one that is simulated."""
+        waiting = waiting if shown.simulated else ""
+        if (shown, waiting) == self.shown:
+            return
+        self.shown = (shown, waiting)
+        self.title.show_text(shown.title)
+        self.number.setText(shown.number)
+        set_ink(self.number, "text3" if waiting else "text")
+        self.unit.setText(shown.unit)
+        note: Verdict = ("neutral", "clock", waiting)
+        tone, icon, words = note if waiting else shown.note
+        self.icon.show_icon(icon or "info", INKS[tone])
+        self.note.setText(words)
+        self.more.setText(shown.more)
+        self.more.setVisible(bool(shown.more) and not waiting)
+        also = f". {shown.more}" if self.more.isVisibleTo(self) else ""
+        self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {words}{also}")
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        margins = self.column.contentsMargins()
+        room = self.width() - margins.left() - margins.right() - self.unit.sizeHint().width() - 6
+        self.number.setFont(font("number", tabular=True))
+        if self.number.sizeHint().width() > room:
+            self.number.setFont(font("card", tabular=True))
+
+
+class NumbersRow(QWidget):
+    """Four numbers side by side, in narrow places two by two."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.grid = QGridLayout(self)
+        self.grid.setContentsMargins(0, 0, 0, 0)
+        self.grid.setSpacing(8)
+        self.parts = [NumberPart() for _ in range(NUMBERS)]
+        self._columns = 0
+        self._lay(NUMBERS)
+
+    def show_numbers(self, shown: tuple[NumberCard, ...], waiting: str) -> None:
+        self.setVisible(bool(shown))
+        for part, one in zip(self.parts, shown, strict=False):
+            part.show_card(one, waiting)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._lay(NUMBERS if self.width() >= ONE_ROW_FROM else NUMBERS // 2)
+
+    def _lay(self, columns: int) -> None:
+        if columns != self._columns:
+            self._columns = columns
+            for at, part in enumerate(self.parts):
+                self.grid.addWidget(part, at // columns, at % columns)
+            for at in range(NUMBERS):
+                self.grid.setColumnStretch(at, int(at < columns))
+
+
+class Strip(Themed, QWidget):
+    """The steps of a session side by side, as wide as they are long; a click opens one."""
+
+    def __init__(self, segments: tuple[Segment, ...], opens: Callable[[Path], None]) -> None:
+        super().__init__()
+        self.segments, self.opens = segments, opens
+        self.setFixedHeight(14)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        listed = [one.words for one in segments]
+        self.setAccessibleName("Session, in order: " + ", ".join(listed))
+        self.setToolTip("\n".join((*listed, "Click a step to open it")))
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
+        x = 0.0
+        for one in self.segments:
+            x += one.share * self.width()
+            if event.position().x() < x:
+                self.opens(one.path)
+                return
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter, x = QPainter(self), 0.0
+        painter.setPen(Qt.PenStyle.NoPen)
+        for one in self.segments:
+            width = one.share * self.width()
+            painter.setBrush(QColor(self.theme.accent if one.chosen else self.theme.ctl))
+            painter.setOpacity(1.0 if one.chosen else 0.45)
+            painter.drawRect(QRectF(x, 0, max(1.0, width - 1.0), self.height()))
+            x += width
+
+
+class CardWidget(Card):
+    """Shows a card; ``opens`` is called with the path of an element whose button or step is clicked."""
+
+    def __init__(self, shown: MeasureCard, opens: Callable[[Path], None]) -> None:
+        self.aside = Elided("small", "text2")
+        self.aside.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.aside.show_text(shown.aside)
+        super().__init__(shown.title, self.aside, padding=16, gap=8)
+        self.shown, self.opens = shown, opens
+        self.buttons: list[ActionButton] = []
+        self.setAccessibleName(shown.title)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)  # columns are equally wide
+        add_parts(self.column, *map(self._part, shown.parts), STRETCH)
+        self._beside = True
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        margins = self.column.contentsMargins()
+        needed = self.heading.sizeHint().width() + self.aside.sizeHint().width() + 2 * self.title_row.spacing()
+        beside = needed <= self.width() - margins.left() - margins.right()
+        if beside != self._beside:
+            self._beside = beside
+            side = Qt.AlignmentFlag.AlignRight if beside else Qt.AlignmentFlag.AlignLeft
+            self.aside.setAlignment(side | Qt.AlignmentFlag.AlignVCenter)
+            if beside:
+                self.title_row.addWidget(self.aside)
+            else:
+                self.column.insertWidget(1, self.aside)
+
+    def _part(self, part: Part) -> QWidget:
+        if part is None:
+            return Rule()
+        if isinstance(part, str):
+            return label(part, "small", "text2")
+        if isinstance(part, Lines):
+            return _lines(part)
+        made = QWidget()
+        if isinstance(part, Figures):
+            row = hbox(spacing=6, margins=0, parent=made)
+            for value, word in part.figures:
+                number = figures(value, "number")
+                number.setAccessibleName(f"{value} {word}")
+                add_parts(row, number, (label(word, "small", "text2"), 0, Qt.AlignmentFlag.AlignBottom), 8)
+            row.addStretch()
+        elif isinstance(part, Segments):
+            notes = hbox(margins=0)
+            for at, words in enumerate(part.notes):
+                note = Elided("small", "text2")
+                note.show_text(words)
+                if at:
+                    note.setAlignment(Qt.AlignmentFlag.AlignRight)
+                notes.addWidget(note)
+            vbox(Strip(part.segments, self.opens), notes, spacing=8, margins=0, parent=made)
+        elif isinstance(part, Link):
+            button = ActionButton("", part.action, height=32)
+            button.setProperty("dense", "true")
+            button.setAccessibleName(f"{part.action}: {part.verdict[2]}")
+            button.clicked.connect(lambda: self.opens(part.path))
+            self.buttons.append(button)
+            hbox((verdict_line(part.verdict), 1, Qt.AlignmentFlag.AlignVCenter), button, margins=0, parent=made)
+        elif isinstance(part[0], Table):
+            tables = ((_table(one), 0, Qt.AlignmentFlag.AlignTop) for one in part if isinstance(one, Table))
+            hbox(*tables, STRETCH, spacing=18, margins=0, parent=made)
+        else:
+            return verdict_line(part)
+        return made
+
+
+def verdict_line(verdict: Verdict) -> QWidget:
+    """Return a state as icon and words that wrap."""
+    tone, icon, words = verdict
+    made = QWidget()
+    sign = (Icon(icon or "info", INKS[tone], 16), 0, Qt.AlignmentFlag.AlignTop)
+    said = label(words, "small", "text" if tone != "neutral" else "text2", wraps=True)
+    hbox(sign, (said, 1), spacing=8, margins=0, parent=made)
+    return made
+
+
+def _table(table: Table) -> QWidget:
+    made = QWidget()
+    grid = QGridLayout(made)
+    grid.setContentsMargins(0, 0, 0, 0)
+    grid.setSpacing(3)
+    grid.addWidget(label(table.name, "small", "text2"), 0, 0, 1, len(table.codes) + 1)
+    for across, code in enumerate(table.codes, start=1):
+        grid.addWidget(label(code, "small", "text2"), 1, across, Qt.AlignmentFlag.AlignHCenter)
+    for down, (place, line) in enumerate(zip(table.places, table.counts, strict=True), start=2):
+        grid.addWidget(label(place, "small", "text2"), down, 0)
+        for across, (code, count) in enumerate(zip(table.codes, line, strict=True), start=1):
+            cell = _Cell(count, f"{code}, {table.name} {place}: {count} times")
+            cell.setFixedSize(30 if len(table.codes) <= NARROW_CODES else 24, 17)
+            grid.addWidget(cell, down, across)
+    return made
+
+
+class _Cell(Themed, QWidget):
+    """A count on a coloured field."""
+
+    def __init__(self, count: int, name: str) -> None:
+        super().__init__()
+        self._count = count
+        self.setAccessibleName(name)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(self.theme.selected if self._count else self.theme.sunk))
+        painter.drawRoundedRect(QRectF(self.rect()), 3, 3)
+        painter.setPen(QColor(self.theme.accent if self._count else self.theme.text2))
+        painter.setFont(font("small", weight=600, tabular=True))
+        painter.drawText(QRectF(self.rect()), Qt.AlignmentFlag.AlignCenter, str(self._count))
+
+
+def _lines(shown: Lines) -> QWidget:
+    made = QWidget()
+    ink: Ink = "text3" if shown.grey else "text"
+    grid = QGridLayout(made)
+    grid.setContentsMargins(0, 0, 0, 0)
+    grid.setVerticalSpacing(4)
+    grid.setColumnStretch(1, 1)
+    for at, line in enumerate(shown.lines[:MOST_LINES]):
+        name, bar = Elided("label", ink), Bar(6)
+        name.setFixedWidth(NAME_PX)
+        name.show_text(line.title)
+        bar.show_share(line.share)
+        number = figures(line.number, ink=ink)
+        tone, icon, words = line.verdict
+        number.setAccessibleName(f"{line.title}: {line.number}{f', {words}' if words else ''}")
+        grid.addWidget(name, at, 0)
+        grid.addWidget(bar, at, 1)
+        grid.addWidget(number, at, 2, Qt.AlignmentFlag.AlignRight)
+        if icon:
+            mark = Icon(icon, INKS[tone], 16)
+            mark.setToolTip(words)
+            mark.setAccessibleName(f"{line.title}: {words}")
+            grid.addWidget(mark, at, 3)
+    if len(shown.lines) > MOST_LINES:
+        grid.addWidget(label(f"and {len(shown.lines) - MOST_LINES} more", "small", "text2"), MOST_LINES, 0, 1, 2)
+    return made
+
+
+class CardGrid(Themed, QWidget):
+    """Cards in two columns; only those that changed are made anew.
+
+    While the pointer is over them, none becomes lower: what is pointed at stays where it is.
+    """
+
+    def __init__(self, opens: Callable[[Path], None]) -> None:
+        super().__init__()
+        self.opens = opens
+        self.cards: tuple[MeasureCard, ...] = ()
+        self.parts: list[CardWidget] = []
+        self.grid = vbox((STRETCH, 1), spacing=8, margins=0, parent=self)
+        self._rows: list[QHBoxLayout] = []
+
+    def show_cards(self, cards: tuple[MeasureCard, ...]) -> None:
+        if cards == self.cards:
+            return
+        pointed = self.isVisible() and self.underMouse()
+        heights = [(part.height(), part.accessibleName()) for part in self.parts] if pointed else []
+        kept = {at: part for at, (part, card) in enumerate(zip(self.parts, self.cards, strict=True))
+                if at < len(cards) and card == cards[at]}  # fmt: skip
+        for at, part in enumerate(self.parts):
+            if at not in kept:
+                remove_widget(part)
+        for row in self._rows:
+            for part in kept.values():
+                row.removeWidget(part)
+            self.grid.removeItem(row)
+            row.deleteLater()
+        self.parts = []
+        for at, card in enumerate(cards):
+            self.parts.append(kept[at] if at in kept else self._made(card))
+        self._rows = [hbox(*((part, 1) for part in some), spacing=8) for some in _rows(self.parts)]
+        for at, row in enumerate(self._rows):
+            insert_layout(self.grid, at, row)
+        self.cards = cards
+        for part, (height, title) in zip(self.parts, heights, strict=False):
+            part.setMinimumHeight(height if title == part.accessibleName() else 0)
+
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        self._let_shrink()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self._let_shrink()
+
+    def _let_shrink(self) -> None:
+        for part in self.parts:
+            part.setMinimumHeight(0)
+
+    def _made(self, card: MeasureCard) -> CardWidget:
+        part = CardWidget(card, self.opens)
+        apply_theme_within(part, self.theme)
+        return part
+
+
+def _rows(parts: Sequence[CardWidget]) -> list[list[CardWidget]]:
+    """Return cards in rows of two, wide ones in a row of their own."""
+    rows: list[list[CardWidget]] = []
+    waiting: list[CardWidget] = []
+    for part in parts:
+        if part.shown.wide:
+            rows.append([part])
+            continue
+        waiting.append(part)
+        if len(waiting) == 2:
+            rows.append(waiting)
+            waiting = []
+    return [*rows, waiting] if waiting else rows

@@ -1,0 +1,327 @@
+"""The plots of a block with a method: psychometric function, expected track, force of each level."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QSize, Qt
+from PySide6.QtGui import QBrush, QColor, QPen
+
+from study_app.designer.measures.levels import (
+    LIMIT_NAMES,
+    LevelBlock,
+    LevelWords,
+    Limit,
+    even_ticks,
+    limit_colour,
+    rounded,
+)
+from study_app.designer.measures.measures_view import NO_FORCES
+from study_app.designer.measures.observers import Observed
+from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.widgets.accessible import describe_plot
+from study_app.gui.widgets.live_plots import Floats, Plot, pen
+from study_app.protocol.trials.presented_levels import Level, standard_of
+
+BARS = 0.14  # of the height, for how often each level is asked
+SYMBOLS = ("o", "t1", "s", "d")
+DASHED = (4.0, 3.0)
+LIMITS_PX = 128.0  # of the names of the limits
+MOST_LABELS = 9
+
+
+class MeasurePlot(Plot):
+    """A plot that is drawn anew from its value."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.axes["left"].setWidth(40)
+        self.axes["bottom"].setHeight(26)
+        self.drawn: list[pg.GraphicsObject] = []
+        self.shown: tuple[Any, ...] = ()
+        self.grey = False
+        describe_plot(self, name, "Not known yet.")
+
+    def sizeHint(self) -> QSize:
+        return QSize(220, 110)
+
+    def show_plot(self, sentence: str, *shown: Any, grey: bool = False) -> None:
+        """Draw other values, nothing where there are none; ``grey`` if they are of an earlier study."""
+        if (shown, grey) != (self.shown, self.grey):
+            self.shown, self.grey = shown, grey
+            self.setAccessibleDescription(sentence)
+            self._draw()
+
+    def _draw(self) -> None:
+        for item in self.drawn:
+            self.box.removeItem(item)
+        self.drawn = []
+        if self.shown:
+            self.draw(*self.shown)
+        else:
+            self.show_ticks("left", [])
+            self.show_ticks("bottom", [])
+
+    def draw(self, *shown: Any) -> None:
+        """Draw values in the colours of the theme."""
+        raise NotImplementedError
+
+    def apply_theme(self, theme: Theme) -> None:
+        super().apply_theme(theme)
+        self._draw()
+
+    def add(self, item: pg.GraphicsObject, z: float = 0.0) -> None:
+        """Draw an item at a height: those of more are in front."""
+        item.setZValue(z)
+        self.box.addItem(item, ignoreBounds=True)
+        self.drawn.append(item)
+
+    def band(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, opacity: float) -> None:
+        """Fill the space between two curves."""
+        colour = QColor(self.theme.ctl if self.grey else self.theme.accent)
+        colour.setAlphaF(opacity)
+        curves = (pg.PlotCurveItem(x, one) for one in (low, high))
+        self.add(pg.FillBetweenItem(*curves, brush=QBrush(colour)), -5)
+
+    def curve(self, x: object, y: object, colour: str, width: float = 2.0, *, dashed: bool = False) -> None:
+        """Draw a curve."""
+        made = pg.PlotCurveItem(np.asarray(x, float), np.asarray(y, float), antialias=True)
+        made.setPen(self.stroke(colour, width, DASHED if dashed else None))
+        self.add(made, 2)
+
+    def zone(self, limit: Limit, first: float, last: float, *, upright: bool) -> None:
+        """Mark where a limit takes part of the force away."""
+        colour = QColor(limit_colour(self.theme, limit))
+        edge = colour.name()
+        colour.setAlphaF(0.16)
+        made = pg.LinearRegionItem(
+            (first, last), orientation="vertical" if upright else "horizontal", movable=False, brush=QBrush(colour),
+            pen=pen(edge, 1, DASHED),
+        )  # fmt: skip
+        self.add(made, -8)
+
+    def words(
+        self, text: str, x: float, y: float, colour: str, anchor: tuple[float, float], *, over: bool = False
+    ) -> None:
+        """Write words at a place; those ``over`` a line of the grid interrupt it."""
+        made = pg.TextItem(text, color=QColor(colour), anchor=anchor, fill=QColor(self.theme.surface) if over else None)
+        made.textItem.setFont(font("small", weight=600, tabular=True))
+        made.setPos(QPointF(x, y))
+        self.add(made, 5)
+
+
+class FunctionView(MeasurePlot):
+    """The psychometric function, the functions that were found, and how often each level is asked."""
+
+    def __init__(self) -> None:
+        super().__init__("Psychometric function")
+        self.apply_theme(LIGHT)
+
+    def show_observed(self, of: LevelBlock, found: Observed | None, *, grey: bool) -> None:
+        """Show what observers answered; None before the first answer."""
+        if found is None:
+            self.show_plot("Not known yet.")
+        else:
+            self.show_plot(function_sentence(of.words, found), of.words, found, of.clipped_from, grey=grey)
+
+    def draw(self, words: LevelWords, found: Observed, clipped_from: tuple[float, Limit] | None) -> None:
+        """Draw bands, function, mark and bars; places along x are in the coordinate of the levels, y in percent."""
+        theme, x = self.theme, np.array([words.at(level) for level in found.levels])
+        left, right = float(x[0]), float(x[-1])
+        planted, quantiles = 100 * np.array(found.planted), [100 * np.array(one) for one in found.found]
+        low = 10.0 * math.floor(10.0 * min(found.planted[0], *(one[0] for one in found.found)) + 1e-9)
+        bottom, top = low - 1.0, 101.5
+        self.band(x, quantiles[-1], quantiles[0], 0.18)
+        self.band(x, quantiles[-2], quantiles[1], 0.30)
+        self.curve(x, planted, theme.ctl if self.grey else theme.accent, 2.4)
+        at, percent = words.at(found.threshold), 100 * found.at_threshold
+        for xs, ys in (([left, at], [percent, percent]), ([at, at], [bottom, percent])):
+            self.curve(xs, ys, theme.text, 1.2, dashed=True)
+        dot = pg.ScatterPlotItem([at], [percent], size=9, pen=pen(theme.text, 2), brush=QBrush(QColor(theme.surface)))
+        self.add(dot, 4)
+        before = at > (left + right) / 2
+        self.words(words.words(found.threshold), at, percent, theme.text, (1.08, 1.0) if before else (-0.08, 0.0))
+        asked = np.array([(words.at(level), share) for level, share in found.asked]).reshape(-1, 2)
+        self._bars(asked[:, 0], asked[:, 1], right - left, (bottom, top), clipped_from)
+        if clipped_from is not None and clipped_from[0] < right:
+            self.zone(clipped_from[1], max(left, clipped_from[0]), right, upright=True)
+        self.show_ticks("left", [(one, f"{one:g}") for one in even_ticks(low, 100.0, 7)])
+        self.show_ticks("bottom", list(words.ticks()))
+        beyond = 0.03 * (right - left)
+        self.box.setXRange(left - beyond, right + beyond, padding=0)
+        self.box.setYRange(bottom, top, padding=0)
+
+    def _bars(
+        self,
+        places: Floats,
+        shares: Floats,
+        span: float,
+        ends: tuple[float, float],
+        clipped_from: tuple[float, Limit] | None,
+    ) -> None:
+        if not len(places) or shares.max() <= 0:
+            return
+        apart = float(np.min(np.diff(places))) if len(places) > 1 else 0.04 * span
+        heights = BARS * (ends[1] - ends[0]) * shares / shares.max()
+        first, limit = clipped_from or (math.inf, "norm")
+        clipped = places >= first
+        for some, ink in ((~clipped, self.theme.accent), (clipped, limit_colour(self.theme, limit))):
+            if some.any():
+                colour = QColor(self.theme.ctl if self.grey else ink)
+                colour.setAlphaF(0.6)
+                bars = pg.BarGraphItem(
+                    x=places[some], y0=ends[0], height=heights[some], width=0.72 * apart, brush=QBrush(colour),
+                    pen=QPen(Qt.PenStyle.NoPen),
+                )  # fmt: skip
+                self.add(bars, -2)
+
+
+class TrackView(MeasurePlot):
+    """The estimates after so many trials, and the trials of one observer."""
+
+    def __init__(self) -> None:
+        super().__init__("Expected track")
+        self.apply_theme(LIGHT)
+
+    def show_observed(self, of: LevelBlock, found: Observed | None, *, grey: bool) -> None:
+        """Show what observers answered; None before the first answer."""
+        if found is None or not found.course:
+            self.show_plot("Not known yet.")
+        else:
+            self.show_plot(track_sentence(of.words, found), of.words, found, of.clipped_from, grey=grey)
+
+    def draw(self, words: LevelWords, found: Observed, clipped_from: tuple[float, Limit] | None) -> None:
+        """Draw bands, median, planted threshold and trials; places along y are in the coordinate of the levels."""
+        theme, bottom, top = self.theme, words.at(found.levels[0]), words.at(found.levels[-1])
+        last, planted = _last_trial(found), words.at(found.threshold)
+        x = np.array([number for number, _ in found.course], float)
+        quantiles = np.array([[words.at(level) for level in one] for _, one in found.course]).T
+        self.band(x, quantiles[0], quantiles[-1], 0.18)
+        self.band(x, quantiles[1], quantiles[-2], 0.30)
+        self.curve(x, quantiles[len(quantiles) // 2], theme.ctl if self.grey else theme.accent, 2.4)
+        self.curve([0, last], [planted, planted], theme.text, 1.2, dashed=True)
+        ink = QColor(theme.ctl if self.grey else theme.trace_y)
+        for track in sorted({one.track for one in found.one}):
+            for success in (True, False):
+                some = [one for one in found.one if one.track == track and one.success == success]
+                points = pg.ScatterPlotItem(
+                    [one.trial for one in some], [words.at(one.level) for one in some], size=7,
+                    symbol=SYMBOLS[(track - 1) % len(SYMBOLS)], pen=pen(ink.name(), 1.2),
+                    brush=QBrush(ink) if success else QBrush(QColor(theme.surface)),
+                )  # fmt: skip
+                self.add(points, 3)
+        if clipped_from is not None and clipped_from[0] < top:
+            self.zone(clipped_from[1], max(bottom, clipped_from[0]), top, upright=False)
+        self.show_ticks("left", list(words.ticks()))
+        self.show_ticks("bottom", [(one or 1, f"{one or 1:g}") for one in even_ticks(0, last, 7)])
+        beyond = 0.04 * (top - bottom)
+        self.box.setXRange(-0.03 * last, 1.07 * last, padding=0)
+        self.box.setYRange(bottom - beyond, top + beyond, padding=0)
+
+
+class ForcesView(MeasurePlot):
+    """The force of each level: as sent, and dashed what the limits take away."""
+
+    def __init__(self) -> None:
+        super().__init__("Force at each level")
+        self.box.sigResized.connect(self._draw)
+        self.apply_theme(LIGHT)
+
+    def show_levels(self, of: LevelBlock) -> None:
+        """Show the levels of the highest standard; nothing where no force is known."""
+        shown = [one for one in of.shown if one.asked_n is not None]
+        if not shown or of.limits is None:
+            self.show_plot(forces_sentence(of))
+            return
+        bars = list(shown) if of.standard is None else [standard_of(of.protocol, of.block.id, of.standard), *shown]
+        values = [*([] if of.standard is None else [of.standard]), *(one.comparison for one in shown)]
+        limits: dict[Limit, float] = {"norm": of.protocol.device.force_limit_n}
+        if clipped := [one.sent_n or 0.0 for one in shown if one.clipped_by == "slope"]:
+            limits["slope"] = min(clipped)
+        self.show_plot(forces_sentence(of), tuple(bars), tuple(values), limits, of.standard is not None)
+
+    def draw(
+        self, bars: tuple[Level, ...], values: tuple[float, ...], limits: dict[Limit, float], has_standard: bool
+    ) -> None:
+        """Draw bars and limits; what is ``values`` of each bar is written below some."""
+        theme, count = self.theme, len(bars)
+        forces = [(bar.asked_n or 0.0, bar.sent_n or 0.0) for bar in bars]
+        top = max(limits["norm"], *(asked for asked, _ in forces))
+        step = max(1, math.ceil(count / MOST_LABELS))
+        self.show_ticks("left", [(one, f"{one:g}") for one in even_ticks(0.0, 1.02 * top, 5)])
+        self.show_ticks("bottom", [(float(at), rounded(values[at])) for at in range(0, count, step)])
+        for at, (bar, (asked, sent)) in enumerate(zip(bars, forces, strict=True)):
+            if bar.clipped_by and asked > sent:
+                lost = pg.BarGraphItem(
+                    x=[at], y0=sent, height=[asked - sent], width=0.62, brush=QBrush(Qt.BrushStyle.NoBrush),
+                    pen=pen(limit_colour(theme, bar.clipped_by), 1.2, (2.0, 2.0)),
+                )  # fmt: skip
+                self.add(lost, 1)
+        inks = [limit_colour(theme, bar.clipped_by) if bar.clipped_by else theme.accent for bar in bars]
+        inks[:1] = [theme.ctl] if has_standard else inks[:1]
+        for ink in dict.fromkeys(inks):
+            places = [at for at, one in enumerate(inks) if one == ink]
+            bars = pg.BarGraphItem(
+                x=places, y0=0.0, height=[forces[at][1] for at in places], width=0.62,
+                brush=QBrush(QColor(ink)), pen=QPen(Qt.PenStyle.NoPen),
+            )  # fmt: skip
+            self.add(bars, 0)
+        room = count * LIMITS_PX / max(LIMITS_PX + 1.0, self.box.width() - LIMITS_PX)
+        for name, force_n in limits.items():
+            ink, words = limit_colour(theme, name), f"{LIMIT_NAMES[name]} {force_n:.3g} N"
+            above = 0.5 if len(limits) == 1 else 1.0 if name == "norm" else 0.0  # the limits may be nearly equal
+            self.curve([-0.7, count - 0.3], [force_n, force_n], ink, 1.5, dashed=True)
+            self.words(words, count - 0.2, force_n, ink, (0.0, above), over=True)
+        self.box.setXRange(-0.8, count - 0.2 + room, padding=0)
+        self.box.setYRange(0.0, 1.16 * top, padding=0)
+
+
+def function_sentence(words: LevelWords, found: Observed) -> str:
+    """Return the psychometric function in a sentence."""
+    most, _ = max(found.asked, key=lambda pair: pair[1], default=(0.0, 0.0))
+    low, high = _middle(found)
+    return (
+        f"Share of answers that are {words.success}, over the {words.kind}: {100 * found.planted[0]:.0f} % at "
+        f"{words.words(found.levels[0])} to {100 * found.planted[-1]:.0f} % at {words.words(found.levels[-1])}, "
+        f"{100 * found.at_threshold:.0f} % at the simulated {words.name} of {words.words(found.threshold)}. "
+        f"Half of {found.observers} observers are estimated between {words.number(low)} and {words.words(high)}. "
+        f"The level presented most often is {words.words(most)}."
+    )
+
+
+def track_sentence(words: LevelWords, found: Observed) -> str:
+    """Return the expected track in a sentence."""
+    low, high = _middle(found)
+    return (
+        f"Estimates of the {words.name} over {_last_trial(found)} trials: after the last one half of the observers are "
+        f"between {words.number(low)} and {words.words(high)}, the simulated value is {words.words(found.threshold)}. "
+        f"One of them answered {sum(one.success for one in found.one)} of {len(found.one)} trials with success."
+    )
+
+
+def forces_sentence(of: LevelBlock) -> str:
+    """Return the force at each level of the highest standard in a sentence."""
+    shown = [one for one in of.shown if one.asked_n is not None]
+    if not shown or of.limits is None:
+        return NO_FORCES
+    clipped = sum(one.clipped_by is not None for one in of.levels)
+    least = shown[0].comparison if of.standard is None else of.standard
+    slope_n = min((one.sent_n or 0.0 for one in shown if one.clipped_by == "slope"), default=None)
+    slope = "" if slope_n is None else f", the {LIMIT_NAMES['slope']} {slope_n:.2f} N"
+    return (
+        f"Force at {len(shown)} levels from {rounded(least)} to {rounded(shown[-1].comparison)} "
+        f"{of.words.value_unit}: at most {max(one.asked_n or 0.0 for one in shown):.2f} N are requested; the "
+        f"{LIMIT_NAMES['norm']} is {of.protocol.device.force_limit_n:g} N{slope}. {len(of.levels) - clipped} of "
+        f"{len(of.levels)} levels are as requested, {clipped} are clipped."
+    )
+
+
+def _middle(found: Observed) -> tuple[float, float]:
+    """Return the 25 and 75 % quantiles of the estimates after all trials."""
+    quantiles = found.course[-1][1]
+    return quantiles[1], quantiles[3]
+
+
+def _last_trial(found: Observed) -> int:
+    return max((one.trial for one in found.one), default=1)
