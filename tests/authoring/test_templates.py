@@ -1,7 +1,9 @@
 """Templates: each is a study that works, and ``liquid-study new`` makes a study of one's own of it."""
 
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
@@ -12,12 +14,15 @@ from study_app.designer.document.toml_text import Refused
 from study_app.designer.new_study.known_answers import known_answers, simulated
 from study_app.designer.document.writer.refused import Refused
 from study_app.designer.new_study.new_study import Answers, answered, copy_of, template
-from study_app.designer.new_study.template_choices import known_answers, simulated
+from study_app.designer.new_study.template_choices import KnownAnswer, known_answers
 from study_app.designer.new_study.templates import FOLDER, QUESTIONS, templates
 from study_app.errors import StudyError
+from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.checks.warnings import level_warnings
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load
+from study_app.protocol.model import Protocol
+from study_app.psychophysics.precision import BETWEEN_PEOPLE
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify
@@ -74,6 +79,28 @@ def test_the_answers_are_edits_of_the_template() -> None:
     assert answered(before, Answers(languages=("en",))).text == before.text
     with pytest.raises(Refused, match="must be at least"):
         answered(before, Answers(values=((trials, 0),)))
+
+
+STUDIES, SEED = 100, 1
+
+
+def simulated(protocol: Protocol, planted: float, unit: str, source: str) -> KnownAnswer:
+    """Return what simulated studies of the first block with levels find: how the file of known answers is made.
+
+    The threshold of each person differs from ``planted`` by a factor of `BETWEEN_PEOPLE`.
+    """
+    plan = next(one for block in protocol.main_blocks if (one := threshold_plan(protocol, block)) is not None)
+    assert protocol.analysis is not None
+    people, share = protocol.analysis.participants, 100.0 if unit == "%" else 1.0
+    assert people is not None
+    assert plan.stimulus.spacing == "log"
+    rng = np.random.default_rng(SEED)
+    apart = math.log10(BETWEEN_PEOPLE) * rng.standard_normal((STUDIES, people))
+    estimates = plan.simulate((plan.stimulus.coordinate(planted / share) + apart).ravel(), rng)
+    means = 10.0 ** estimates.medians.reshape(STUDIES, people).mean(axis=1)
+    low, high = np.quantile(means, (0.05, 0.95))
+    figures = (round(share * round(float(one), 4), 4) for one in (means.mean(), low, high))
+    return KnownAnswer(planted, unit, source, people, *figures)
 
 
 @pytest.mark.slow

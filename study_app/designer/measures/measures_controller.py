@@ -34,6 +34,7 @@ from study_app.designer.problems.problems import ProblemRow, RepairSearch, probl
 from study_app.designer.problems.problem_rows import ProblemRow, problem_rows
 from study_app.designer.problems.repair_search import RepairSearch
 from study_app.gui.participant.page_widgets import parts_of
+from study_app.gui.widgets.background import delayed
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import words
@@ -74,10 +75,7 @@ class MeasuresController(QObject):
         self._found, self._failed = Simulated(), ""
         self._answers: OrderedDict[Simulation, Simulated] = OrderedDict()
         self._of_block: dict[str, Simulated] = {}
-        self.rest = QTimer(self)
-        self.rest.setSingleShot(True)
-        self.rest.setInterval(REST_MS)
-        self.rest.timeout.connect(self._order)
+        self.rest = delayed(self, REST_MS, self._order)
         self._look = QTimer(self)
         self._look.setInterval(LOOK_MS)
         self._look.timeout.connect(self._take)
@@ -88,13 +86,10 @@ class MeasuresController(QObject):
         self._lapses = LAPSES
         self._focus = Focus()
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
-        self._idle = QTimer(self)
-        self._idle.setSingleShot(True)
-        self._idle.setInterval(IDLE_MS)
-        self._idle.timeout.connect(self.show)
+        self._idle = delayed(self, IDLE_MS, self.show)
         editing.opened_other.connect(self._forget)
         editing.changed.connect(self._idle.start)
-        repairs.found.connect(self._take_repairs)
+        repairs.found.connect(self._repairs_found)
         self.fit.found.connect(self._idle.start)
         place.pane.tab_shown.connect(self._idle.start)
         place.entered.connect(self._idle.start)
@@ -262,7 +257,7 @@ class MeasuresController(QObject):
         if client is not None:
             client.close()
 
-    def _take_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
+    def _repairs_found(self, row: ProblemRow, words: tuple[str, ...]) -> None:
         self._repairs[row] = words
         self._idle.start()
 
@@ -302,10 +297,7 @@ class PageFit(QObject):
         super().__init__(parent)
         self._known: OrderedDict[tuple[QuestionnairePage, str], int] = OrderedDict()
         self._waiting: list[tuple[QuestionnairePage, str]] = []
-        self.rest = QTimer(self)
-        self.rest.setSingleShot(True)
-        self.rest.setInterval(FIT_REST_MS)
-        self.rest.timeout.connect(self._look)
+        self.rest = delayed(self, FIT_REST_MS, self._look)
 
     def parts(self, protocol: Protocol | None, focus: Focus, path: Path) -> int | None:
         """Return on how many parts the questions of an element stand at most; None: not known yet, or it asks none."""

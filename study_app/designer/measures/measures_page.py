@@ -135,7 +135,7 @@ class ForcesCard(Card):
     def __init__(self, plot: ForcesView) -> None:
         super().__init__(padding=14, gap=4)
         self.plot = plot
-        self.offered: tuple[ProblemRow, str] | None = None
+        self.offered: tuple[ProblemRow | None, str] = (None, "")
         self.unit = Elided("small", "text2")
         self.chips = [Chip(small=True), Chip(small=True)]
         head = hbox(label("Force at each level", "card"), (self.unit, 1), *self.chips)
@@ -143,7 +143,7 @@ class ForcesCard(Card):
         self.words = label("", "small", wraps=True)
         self.repair = ActionButton("", "Repair", height=34)
         self.repair.setProperty("dense", "true")
-        self.repair.clicked.connect(self._ask)
+        self.repair.clicked.connect(lambda: self.repair_asked.emit(*self.offered))
         parts = (Icon("warning", "warn", 18), (self.words, 1), self.repair)
         hbox(*parts, spacing=10, margins=(12, 6, 8, 6), parent=self.bar)
         add_parts(self.column, head, (plot, 1), self.bar)
@@ -173,15 +173,10 @@ class ForcesCard(Card):
         warning = clipped_sentence(of)
         self.bar.setVisible(bool(warning))
         self.words.setText(warning)
-        self.offered = next(((row, words[0]) for row, words in shown.problems if words), None)
-        self.repair.setVisible(self.offered is not None)
-        if self.offered is not None:
-            self.repair.show_action("", self.offered[1])
+        self.offered = next(((row, words[0]) for row, words in shown.problems if words), (None, ""))
+        self.repair.setVisible(self.offered[0] is not None)
+        self.repair.show_action("", self.offered[1])
         self.plot.show_levels(of)
-
-    def _ask(self) -> None:
-        if self.offered is not None:
-            self.repair_asked.emit(*self.offered)
 
 
 def clipped_sentence(of: LevelBlock) -> str:

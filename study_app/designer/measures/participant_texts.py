@@ -109,19 +109,14 @@ def _texts(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     if isinstance(value, Mapping):
         for key, inner in value.items():
             place = (*path, key)
-            if key in text_keys() and len(path) > 0 and _is_text(inner):
+            texts = inner.values() if isinstance(inner, Mapping) else (inner,)
+            if key in text_keys() and len(path) > 0 and all(isinstance(one, str) for one in texts):
                 yield place, inner
             else:
                 yield from _texts(inner, place)
     elif isinstance(value, tuple):
         for at, inner in enumerate(value):
             yield from _texts(inner, (*path, at))
-
-
-def _is_text(value: Any) -> bool:
-    if isinstance(value, Mapping):
-        return all(isinstance(one, str) for one in value.values())
-    return isinstance(value, str)
 
 
 @cache

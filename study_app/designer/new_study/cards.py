@@ -134,7 +134,11 @@ class TemplateButton(Themed, QAbstractButton):
         t, wide = self.theme, self._wide - 32
         painter.setPen(QColor(t.text))
         painter.setFont(font("strong"))
-        painter.drawText(QRectF(16, top + 10, wide, 24), Qt.AlignmentFlag.AlignVCenter, self._elided(painter, wide))
+        painter.drawText(
+            QRectF(16, top + 10, wide, 24),
+            Qt.AlignmentFlag.AlignVCenter,
+            painter.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, wide),
+        )
         painter.setPen(QColor(t.text2))
         painter.setFont(font("label", weight=400))
         words = Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop
@@ -181,6 +185,3 @@ class TemplateButton(Themed, QAbstractButton):
         painter.setFont(font("label", weight=400))
         words = Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
         painter.drawText(QRectF(28, 166, self._wide - 56, 80), words, self.choice.description)
-
-    def _elided(self, painter: QPainter, wide: int) -> str:
-        return painter.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, wide)

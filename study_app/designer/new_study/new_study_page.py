@@ -6,25 +6,11 @@ from typing import Any, Final
 
 from PySide6.QtCore import QPointF, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import (
-    QButtonGroup,
-    QGridLayout,
-    QHBoxLayout,
-    QLayout,
-    QLineEdit,
-    QScrollArea,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QButtonGroup, QGridLayout, QHBoxLayout, QLayout, QLineEdit, QVBoxLayout, QWidget
 
 from study_app.designer.new_study.cards import RING, TemplateButton
-from study_app.designer.new_study.template_choices import (
-    Answers,
-    OwnQuestion,
-    Recovery,
-    TemplateChoice,
-    languages_offered,
-)
+from study_app.designer.new_study.new_study import Answers
+from study_app.designer.new_study.template_choices import KnownAnswer, OwnQuestion, TemplateChoice, languages_offered
 from study_app.designer.place.designer_view import StudyChoice
 from study_app.designer.place.tab_order import lead_by_tab
 from study_app.designer.problems.card import NameRefusal
@@ -33,7 +19,7 @@ from study_app.designer.problems.repair_button import NameRefusal
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule
+from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.dialogs import choose_protocol
 from study_app.gui.widgets.labels import Elided, figures, label
@@ -47,20 +33,14 @@ TICKS = 4
 class RecoveryBar(Themed, QWidget):
     """An axis from 0 with the middle 90 % of what is found as a bar, and the planted value as a line."""
 
-    def __init__(self) -> None:
+    def __init__(self, shown: KnownAnswer) -> None:
         super().__init__()
-        self.shown: Recovery | None = None
+        self.shown = shown
         self.setFixedHeight(46)
         self.setAccessibleName("Known answer")
-
-    def show_recovery(self, shown: Recovery) -> None:
-        self.shown = shown
         self.setAccessibleDescription(shown.sentence)
-        self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        if self.shown is None:
-            return
         t, painter, shown = self.theme, QPainter(self), self.shown
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         left, wide = 12.0, self.width() - 44.0
@@ -265,16 +245,12 @@ class ChosenCard(Card):
         self.title = label("", "card")
         self.refusal = NameRefusal("Make")
         self.make = ActionButton("plus", "Make study", cap="Enter", role="primary", height=44)
-        self.area = QScrollArea()
-        self.area.setWidgetResizable(True)
-        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         inside = QWidget()
         self.about, self.details, self.begin = QWidget(), QWidget(), QWidget()
         _column(self.begin, label("Begin with", "strong"), self.questions)
         parts = (self.about, self.details, self.begin, STRETCH)
         self.inside = vbox(*parts, spacing=10, margins=(0, 0, 8, 0), parent=inside)
-        self.area.setWidget(inside)
+        self.area = scrolled(inside)
         foot = label("Nothing is written until you save it.", "small", "text2")
         foot.setAlignment(Qt.AlignmentFlag.AlignCenter)
         add_parts(self.column, self.title, (self.area, 1), self.refusal, self.make, foot)
@@ -297,10 +273,14 @@ class ChosenCard(Card):
             good = choice.recovery.recovered
             state = ("ok", "check", "recovered") if good else ("warn", "warning", "not recovered")
             chip = Chip(*state, small=True)  # type: ignore[arg-type]  # a tone
-            bar = RecoveryBar()
-            bar.show_recovery(choice.recovery)
             head = hbox(label("Known answer", "strong"), STRETCH, chip)
-            add_parts(column, head, bar, label(choice.recovery.sentence, "small", "text2", wraps=True), Rule())
+            add_parts(
+                column,
+                head,
+                RecoveryBar(choice.recovery),
+                label(choice.recovery.sentence, "small", "text2", wraps=True),
+                Rule(),
+            )
         for old, new in zip(before, (self.about, self.details), strict=True):
             apply_theme_within(new, self.theme)
             at = self.inside.indexOf(old)
@@ -347,10 +327,7 @@ class NewStudyPage(Themed, QWidget):
         self.file.clicked.connect(self._open_file)
         parts = (self.back, label("New study", "title"), (aside, 1), self.file)
         head = hbox(*parts, spacing=12, margins=(SHADOW, 0, SHADOW, 0))
-        self.area = QScrollArea()
-        self.area.setWidgetResizable(True)
-        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.area = scrolled(QWidget())
         self.card = ChosenCard()
         vbox(head, (hbox((self.area, 1), self.card, spacing=12), 1), spacing=12, margins=0, parent=self)
         self.card.make.clicked.connect(self._begin)

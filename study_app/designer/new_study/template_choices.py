@@ -1,7 +1,6 @@
 """What a new study can begin as: templates and copies, their sessions and questions, and known answers."""
 
 import json
-import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -9,40 +8,33 @@ from functools import cache
 from typing import Any, Final
 
 import numpy as np
-
 from study_app.designer.document.elements import study_title, title_of
 from study_app.designer.document.fields import row_at, unit_of
 from study_app.designer.document.names import Document
 from study_app.designer.document.study import Study
 from study_app.designer.new_study.known_answers import KnownAnswer, known_answers
 from study_app.designer.new_study.new_study import Answers
+from study_app.designer.document.edited_study import Study
 from study_app.designer.new_study.templates import FOLDER, QUESTIONS
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.number_text import counted, duration
 from study_app.number_text import counted
-from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.wording.languages import LANGUAGES
-from study_app.psychophysics.precision import BETWEEN_PEOPLE
 from study_app.viewmodels.number_words import duration
 
 FILE: Final = FOLDER / "known_answers.json"
-STUDIES: Final = 100
-SEED: Final = 1
-MIDDLE: Final = (0.05, 0.95)
 
 
 @dataclass(frozen=True, slots=True)
 class KnownAnswer:
-    """A planted threshold, and what simulated studies find of it.
+    """A planted threshold (mean of ``people``), and what simulated studies find of it, in ``unit``.
 
-    ``planted``: mean threshold of the simulated people, in the unit of the levels; ``unit``: that unit; "" of a Weber
-    fraction; ``source``: where the planted threshold is from; ``people``: how many take part in each study; ``found``,
-    ``low``, ``high``: mean of the studies' thresholds, and the ends of the middle 90 % of them.
+    ``found`` is the mean of the studies' thresholds, ``low`` and ``high`` the ends of the middle 90 % of them.
     """
 
     planted: float
@@ -58,6 +50,20 @@ class KnownAnswer:
         """Whether the mean is within 10 % of the planted threshold, which is among the middle 90 %."""
         return abs(self.found / self.planted - 1) <= 0.1 and self.low <= self.planted <= self.high
 
+    @property
+    def most(self) -> float:
+        """The end of an axis from 0."""
+        return 10.0 * (1 + int(1.5 * max(self.planted, self.high)) // 10)
+
+    @property
+    def sentence(self) -> str:
+        """All of it in words."""
+        return (
+            f"Simulated: {self.planted:g} {self.unit} at 75 % correct (after {self.source}). Estimated: "
+            f"{self.found:.3g} {self.unit}; in 9 of 10 simulated studies of {self.people} people {self.low:.3g} to "
+            f"{self.high:.3g} {self.unit}. A model, not measured."
+        )
+
 
 @cache
 def known_answers() -> dict[str, KnownAnswer]:
@@ -65,31 +71,6 @@ def known_answers() -> dict[str, KnownAnswer]:
     found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
     return {name: KnownAnswer(**values) for name, values in found.items()}
 
-
-def simulated(protocol: Protocol, planted: float, unit: str, source: str) -> KnownAnswer:
-    """Simulate studies of a protocol's first block with levels, and return what they find.
-
-    ``protocol``: the study; its plan says how many people take part; ``planted``: mean threshold of the people; each
-    person's own differs from it by a factor of `BETWEEN_PEOPLE`; ``unit``, ``source``: unit of the levels, and where
-    the planted threshold is from. Raises ValueError if the study has no thresholds, or does not say how many people
-    take part.
-    """
-    plan = next((one for block in protocol.main_blocks if (one := threshold_plan(protocol, block)) is not None), None)
-    people = protocol.analysis.participants if protocol.analysis is not None else None
-    if plan is None or people is None or plan.stimulus.spacing != "log":
-        raise ValueError("the study has no thresholds on logarithmic levels, or does not say how many take part")
-    rng = np.random.default_rng(SEED)
-    apart = math.log10(BETWEEN_PEOPLE) * rng.standard_normal((STUDIES, people))
-    estimates = plan.simulate((plan.stimulus.coordinate(planted) + apart).ravel(), rng)
-    means = 10.0 ** estimates.medians.reshape(STUDIES, people).mean(axis=1)
-    low, high = np.quantile(means, MIDDLE)
-    figures = (round(float(one), 4) for one in (means.mean(), low, high))
-    return KnownAnswer(planted, unit, source, people, *figures)
-
-
-__all__ = [
-    "Answers", "OwnQuestion", "Recovery", "TemplateChoice", "copy_choice", "languages_offered", "template_choice",
-]  # fmt: skip
 
 COPY: Final = "copy"
 TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
@@ -135,24 +116,6 @@ class OwnQuestion:
 
 
 @dataclass(frozen=True, slots=True)
-class Recovery:
-    """The known answer of a template, for a bar from 0 to ``most``.
-
-    ``planted``, ``low``, ``high``, ``most``: the planted threshold, the ends of the middle 90 % of what
-    studies find, and the end of the axis, as shown; ``unit``: their unit: "%", "ms"; ``recovered``: whether the planted
-    threshold is found; ``sentence``: all of it in words.
-    """
-
-    planted: float
-    low: float
-    high: float
-    most: float
-    unit: str
-    recovered: bool
-    sentence: str
-
-
-@dataclass(frozen=True, slots=True)
 class TemplateChoice:
     """What a new study can begin as.
 
@@ -171,7 +134,7 @@ class TemplateChoice:
     figures: tuple[tuple[str, str], ...] = ()
     tags: tuple[tuple[str, str], ...] = ()
     session: tuple[tuple[str, str, str], ...] = ()
-    recovery: Recovery | None = None
+    recovery: KnownAnswer | None = None
     name: str = ""
     study_title: str = ""
     languages: tuple[str, ...] = ()
@@ -193,9 +156,9 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
     """Return what is shown of a template."""
     title, words = _described(study.document)
     shown, question = TEMPLATES.get(name, (name, words))
-    answer, protocol = known_answers().get(name), study.protocol
+    protocol = study.protocol
     found = TemplateChoice(
-        f"template:{name}", shown, question, recovery=None if answer is None else _recovery(answer),
+        f"template:{name}", shown, question, recovery=known_answers().get(name),
         study_title=title, languages=_languages(study.document), questions=tuple(_questions(name, study)),
     )  # fmt: skip
     if protocol is None:
@@ -211,7 +174,9 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
         for section in STEPS
         if step in names(document, section)
     )
-    return replace(found, figures=tuple(_figures(protocol)), tags=_tags(protocol), session=tuple(session))
+    blind = "Double-blind" if protocol.study.blinding == "double" else "Single-blind"
+    tags = (("device", f"Up to {protocol.device.force_limit_n:g} N"), ("lock", blind))
+    return replace(found, figures=tuple(_figures(protocol)), tags=tags, session=tuple(session))
 
 
 def copy_choice(source: str, document: Document, note: str, name: str) -> TemplateChoice:
@@ -241,23 +206,6 @@ def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:
     if people is not None:
         yield "people", f"{people}{PLANNED}"
     yield "layers", counted(trials, "trial")
-
-
-def _tags(protocol: Protocol) -> tuple[tuple[str, str], ...]:
-    blind = "Double-blind" if protocol.study.blinding == "double" else "Single-blind"
-    return (("device", f"Up to {protocol.device.force_limit_n:g} N"), ("lock", blind))
-
-
-def _recovery(answer: KnownAnswer) -> Recovery:
-    share = 100.0 if not answer.unit else 1.0
-    unit = answer.unit or "%"
-    planted, found, low, high = (share * one for one in (answer.planted, answer.found, answer.low, answer.high))
-    sentence = (
-        f"Simulated: {planted:g} {unit} at 75 % correct (after {answer.source}). Estimated: {found:.3g} {unit}; in 9 "
-        f"of 10 simulated studies of {answer.people} people {low:.3g} to {high:.3g} {unit}. A model, not measured."
-    )
-    most = 10.0 * (1 + int(1.5 * max(planted, high)) // 10)
-    return Recovery(planted, low, high, most, unit, answer.recovered, sentence)
 
 
 def _questions(name: str, study: Study) -> Iterator[OwnQuestion]:

@@ -13,7 +13,7 @@ from study_app.designer.document.elements import words_sought
 from study_app.designer.outline.addable import Addable
 from study_app.designer.document.edited_study import Study
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import Row, label_of, row_at, rows
+from study_app.designer.document.fields import label_of, row_at, rows
 from study_app.designer.document.initial_values import singular
 from study_app.designer.document.languages import languages_of
 from study_app.designer.document.names import named_at
@@ -98,7 +98,11 @@ def _questions(study: Study, around: Path) -> Iterator[Addable]:
 def _series(study: Study, selected: Path) -> Iterator[Addable]:
     """Yield a series of the selected element, and of those that its lists name, where there can be one."""
     lists = (row for row in rows(study.document, selected) if row.kind == "references" and len(selected) == 2)
-    listed = (named_at(study.document, place) for row in lists for place in _entries(row))
+    listed = (
+        named_at(study.document, (*row.path, at))
+        for row in lists
+        for at in range(len(row.value if isinstance(row.value, tuple) else ()))
+    )
     for path in dict.fromkeys((selected, *(one for one in listed if one is not None))):
         if numbers := number_rows(study.document, path):
             words, help_ = f"Series of {title_of(study.document, path)} …", ", ".join(row.label for row in numbers)
@@ -130,11 +134,6 @@ def _instruments() -> tuple[Addable, ...]:
         words = f"Instrument: {name.upper()}, {len(source['items'])} questions"
         found.append(Addable(words, "list", AddInstrument(name), help_))
     return tuple(found)
-
-
-def _entries(row: Row) -> Iterator[Path]:
-    """Yield the place of each entry of a list."""
-    yield from ((*row.path, at) for at in range(len(row.value if isinstance(row.value, tuple) else ())))
 
 
 def _of_list(study: Study, path: Path) -> Iterator[Addable]:

@@ -65,7 +65,10 @@ class Feeling(QObject):
         if not names:
             self.place.message.emit("It cannot be opened in the lab", "It has no liquid.")
             return
-        settings = [_setting(protocol, study.document, name) for name in (names[0], names[-1])]
+        titled = [
+            (title_of(study.document, ("liquids", name)), protocol.scene_of(name)) for name in (names[0], names[-1])
+        ]
+        settings = [Setting(title, scene, scene) for title, scene in titled]
         self._sides = {"A": settings[0].scene.liquids[0], "B": settings[1].scene.liquids[0]}
         self._file = opened.file
         self.asked.emit(LabLiquids(settings[0], settings[1], "" if opened.read_only else opened.file.stem))
@@ -114,11 +117,6 @@ def _liquids(protocol: Protocol, path: Path) -> tuple[str, ...]:
     conditions = protocol.conditions_in(name) if section == "blocks" else (name,)
     found = (liquid for condition in conditions for liquid in protocol.conditions[condition].liquid_ids)
     return tuple(dict.fromkeys(found))[:2]
-
-
-def _setting(protocol: Protocol, document: Mapping[str, Any], name: str) -> Setting:
-    scene = protocol.scene_of(name)
-    return Setting(title_of(document, ("liquids", name)), scene, scene)
 
 
 def _values(liquid: Liquid) -> dict[str, Any]:

@@ -97,7 +97,7 @@ class PlayControls(QWidget):
         self.menu.setFont(font("label"))
         hbox(self.play, self.device, spacing=6, margins=0, parent=self)
         self.play.clicked.connect(self.asked)
-        self.device.clicked.connect(self._show_menu)
+        self.device.clicked.connect(lambda: self.menu.popup(self.device.mapToGlobal(self.device.rect().bottomLeft())))
 
     def show_devices(self, devices: PlayDevices) -> None:
         """Offer devices, of which one is chosen."""
@@ -121,9 +121,6 @@ class PlayControls(QWidget):
     def show_wide(self, wide: bool) -> None:
         """Show the full text of the button, or the short one."""
         self.play.show_action("play", PLAY if wide else PLAY_NARROW)
-
-    def _show_menu(self) -> None:
-        self.menu.popup(self.device.mapToGlobal(self.device.rect().bottomLeft()))
 
 
 INKS: dict[str, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}

@@ -70,18 +70,13 @@ def sound_part(study: Study, before: Mapping[str, Any]) -> Protocol | None:
 
 def last_valid(opened: OpenStudy) -> Study | None:
     """Return the study as its file or the newest kept version of it has it, of those without faults."""
-    for text in _earlier(opened):
+    earlier = (kept_content(version.hash) or b"" for version in reversed(kept_versions(opened.file)[-MOST_EARLIER:]))
+    for text in (opened.saved.encode(), *(unbundled(content)[0] for content in earlier)):
         with suppress(Refused):
             study = read(text, opened.study.folder)
             if study.protocol is not None:
                 return study
     return None
-
-
-def _earlier(opened: OpenStudy) -> Iterator[bytes]:
-    yield opened.saved.encode()
-    for version in list(reversed(kept_versions(opened.file)))[:MOST_EARLIER]:
-        yield unbundled(kept_content(version.hash) or b"")[0]
 
 
 def _mended(

@@ -4,7 +4,7 @@ import time
 from collections.abc import Mapping
 from typing import Final
 
-from PySide6.QtCore import QObject, Qt, QTimer
+from PySide6.QtCore import QObject, Qt
 
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.study import Study
@@ -32,6 +32,10 @@ from study_app.designer.place.view import DesignerPlace
 from study_app.gui.display.screens import choose_screens
 from study_app.gui.kit.commands import add_commands, tip
 from study_app.gui.kit.devices import screen_number, settings_here, text_scale_on
+from study_app.gui.kit.workstation import screen_number, settings_here, text_scale_on
+from study_app.gui.widgets.background import delayed
+from study_app.gui.widgets.keys import tip
+from study_app.gui.widgets.main_view import make_shortcuts
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
@@ -75,9 +79,7 @@ class ParticipantPreview(QObject):
         self._ball_of: object = None
         self._since_s = 0.0
         self._photodiode = True
-        self._after_form = QTimer(self)  # of another selection the form is painted first
-        self._after_form.setSingleShot(True)
-        self._after_form.timeout.connect(self._follow)
+        self._after_form = delayed(self, 0, self._follow)  # of another selection the form is painted first
         editing.opened_other.connect(self._begin)
         editing.changed.connect(self._after_form.start)
         editing.edited.connect(self._follow)
@@ -233,7 +235,8 @@ class ParticipantPreview(QObject):
         elif selected != self._selected or self._found is None:
             found = showing(self._protocol, selected)
             if found is None and self._found is None:
-                found = _beginning(self._protocol)
+                shown = preview(self._protocol)
+                found = Found(shown, 0) if shown.schedule.steps else None
             if found is not None:
                 self._found = found if not self._is_shown(found) else self._found
             if (side := side_of(selected)) is not None and selected != self._selected:
@@ -362,9 +365,3 @@ class ParticipantPreview(QObject):
     def _move_ball(self) -> None:
         if self._ball is not None:
             self.tab.show_tank(self._ball.view(time.monotonic() - self._since_s))
-
-
-def _beginning(study: Protocol) -> Found | None:
-    """Return the first step of the first session."""
-    shown = preview(study)
-    return Found(shown, 0) if shown.schedule.steps else None

@@ -33,6 +33,9 @@ from study_app.designer.place.steps import Step, delete_prompt, series_prompt, s
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
 from study_app.designer.versions.changes_controller import ChangesController
+from study_app.designer.problems.problem_rows import ProblemRow, problem_rows, warning_rows
+from study_app.designer.problems.repair_search import RepairSearch
+from study_app.designer.versions.changes import Changes
 from study_app.designer.versions.known_runs import KnownRuns
 from study_app.designer.versions.renaming import Renaming
 from study_app.errors import StudyError
@@ -59,7 +62,7 @@ class DesignerController(QObject):
         self.editing = editing = Editing(results, self)
         self.runs = KnownRuns(editing)
         self.saving = Saving(editing, place, self.runs)
-        self.changes = ChangesController(editing, place, self.runs)
+        self.changes = Changes(editing, place, self.runs)
         self.feeling = Feeling(editing, place)
         Renaming(editing, place, self.runs)
         self._others: dict[Path, OpenStudy] = {}

@@ -12,9 +12,9 @@ from study_app.designer.place.designer_view import Banner, BannerAction
 from study_app.designer.place.editing import Editing, OpenStudy, why_read_only
 from study_app.designer.place.prompts import DiscardCard
 from study_app.designer.place.view import DesignerPlace
-from study_app.designer.versions.changes_controller import SaveCard, compare, newest, version_of
+from study_app.designer.versions.changes import SaveCard, compare, newest, version_of
 from study_app.designer.versions.known_runs import FileWatch, KnownRuns
-from study_app.designer.versions.version_rows import FILE, Comparison, Standing, check_version, save_prompt
+from study_app.designer.versions.version_rows import FILE, Comparison, Standing, check_version
 from study_app.errors import StudyError
 from study_app.gui.home.study_facts import time_words
 from study_app.number_text import counted
@@ -183,7 +183,7 @@ class Saving(QObject):
         run = newest(self.runs.known)
         found = Comparison() if run is None else compare(version_of(opened, run), opened.study)
         problems = len(opened.study.faults)
-        self.card = card = SaveCard(save_prompt(standing, self.runs.known, found, problems))
+        self.card = card = SaveCard(standing, self.runs.known, found, problems)
         card.save_asked.connect(self.save_as_version)
         card.another_asked.connect(self.save_as_another)
         card.changes_asked.connect(self.place.close_prompt)

@@ -6,13 +6,13 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import QFileSystemWatcher, QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QFileSystemWatcher, QObject, Qt, Signal
 from PySide6.QtGui import QGuiApplication
 
 from study_app.designer.place.editing import Editing
 from study_app.designer.versions.version_rows import Standing, VersionChip, version_chip
 from study_app.errors import StoreError
-from study_app.gui.widgets.background import Background
+from study_app.gui.widgets.background import Background, delayed
 from study_app.store.study_runs import Run, keep_what_was_run, recorded_items, runs
 
 REST_MS: Final = 150
@@ -31,10 +31,7 @@ class FileWatch(QObject):
         super().__init__(editing)
         self.editing = editing
         self._watcher = QFileSystemWatcher(self)
-        self._resting = QTimer(self)
-        self._resting.setInterval(REST_MS)
-        self._resting.setSingleShot(True)
-        self._resting.timeout.connect(self._touch)
+        self._resting = delayed(self, REST_MS, self._touch)
         self._watcher.fileChanged.connect(lambda _path: self._resting.start())
         self._watcher.directoryChanged.connect(lambda _path: self._resting.start())
         editing.opened_other.connect(self.watch)
@@ -78,10 +75,7 @@ class KnownRuns(QObject):
         self.chip = VersionChip()
         self._reader = Background(self)
         self._reader.done.connect(self._take)
-        self._resting = QTimer(self)
-        self._resting.setInterval(REST_MS)
-        self._resting.setSingleShot(True)
-        self._resting.timeout.connect(self._stand)
+        self._resting = delayed(self, REST_MS, self._stand)
         editing.opened_other.connect(self._begin)
         editing.edited.connect(self._resting.start)
 

@@ -9,7 +9,7 @@ from study_app.designer.document.toml_text import Comment, comments_naming
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.requests import RenameElement, Request
 from study_app.designer.place.view import DesignerPlace
-from study_app.designer.versions.changes_controller import CommentsCard, UnlockCard, title_of
+from study_app.designer.versions.changes import CommentsCard, UnlockCard, title_of
 from study_app.designer.versions.known_runs import KnownRuns
 from study_app.number_text import counted
 from study_app.protocol.source.document import Path, value_at

@@ -118,39 +118,6 @@ class Comparison:
     note: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class SavePrompt:
-    """What is asked before a study that was run is saved with other content.
-
-    ``version`` is proposed, ``explanation`` names the sessions of each version, ``problems`` says what is wrong with
-    the study, "" where nothing is.
-    """
-
-    version: str
-    explanation: str
-    difference: Comparison
-    problems: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class VersionChoice:
-    """A version to compare with: its key, its words, and whether sessions were run with it."""
-
-    key: str
-    words: str
-    run: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class ChangesView:
-    """The tab: the versions, the key of the chosen one ("" without any), and whether it can be restored."""
-
-    versions: tuple[VersionChoice, ...] = ()
-    chosen: str = ""
-    difference: Comparison = Comparison()
-    can_restore: bool = False
-
-
 def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     """Return the chip of a study that stands so to what was run."""
     known = tuple(known)
@@ -176,33 +143,18 @@ def counts(run: Run) -> str:
     return ", ".join(counted(number, word) for number, word in numbers if number)
 
 
-def save_prompt(standing: Standing, known: Iterable[Run], difference: Comparison, problems: int) -> SavePrompt:
-    """Return what is asked before saving."""
-    ran = [run for run in known if run.sessions]
-    sessions = "; ".join(f"{counts(run)} with version {run.version}" for run in ran)
-    explanation = (
-        f"This study was run: {sessions}. A version that was run is never overwritten: the study is saved under "
-        "another number."
-    )
-    are = "it is" if problems == 1 else "they are"
-    wrong = f"{counted(problems, 'problem')}: new sessions are refused until {are} solved." if problems else ""
-    return SavePrompt(standing.version, explanation, difference, wrong)
+def version_choices(
+    known: Sequence[Run], kept: Iterable[Kept], file: str, now: datetime
+) -> tuple[tuple[str, str], ...]:
+    """Return key and words of what a study can be compared with: its file, what was run, what was saved, newest first.
 
-
-def version_choices(known: Sequence[Run], kept: Iterable[Kept], file: str, now: datetime) -> tuple[VersionChoice, ...]:
-    """Return what a study can be compared with: its file, what was run, and what was saved, the newest first.
-
-    ``known``: what was run; ``kept``: what was saved; ``file``: what is said of the file; "" where it does not differ
-    from the study; ``now``: for "Today 14:02".
+    ``file`` is what is said of the file, "" where it does not differ from the study; ``now`` is for "Today 14:02".
     """
-    found = [VersionChoice(FILE, file)] if file else []
+    found = [(FILE, file)] if file else []
     ran = {run.hash for run in known}
-    found += [
-        VersionChoice(run.hash, f"{run.version}: {counts(run)}, last {_when(run.last, now)}", run=True)
-        for run in reversed(known)
-    ]
+    found += [(run.hash, f"{run.version}: {counts(run)}, last {_when(run.last, now)}") for run in reversed(known)]
     saved = [one for one in kept if one.hash not in ran][-MOST_KEPT:]
-    found += [VersionChoice(one.hash, _kept_words(one, now)) for one in reversed(saved)]
+    found += [(one.hash, _kept_words(one, now)) for one in reversed(saved)]
     return tuple(found)
 
 

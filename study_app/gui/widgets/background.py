@@ -40,6 +40,15 @@ def _ends() -> _Ends:
     return _Ends()
 
 
+def delayed(owner: QObject, milliseconds: int, run: Callable[[], Any]) -> QTimer:
+    """Return a timer that runs something once, so long after it was last started."""
+    made = QTimer(owner)
+    made.setSingleShot(True)
+    made.setInterval(milliseconds)
+    made.timeout.connect(run)
+    return made
+
+
 class Background(QObject):
     """Runs one job at a time in a thread; ``done`` carries what the last job that was asked for returned.
 

@@ -27,7 +27,7 @@ from study_app.designer.versions.versions_page import DifferenceText
 from study_app.designer.document.edited_study import read
 from study_app.designer.place.designer_header import DesignerHeader
 from study_app.designer.problems.problems_card import ProblemsCard
-from study_app.designer.versions.changes_controller import DifferenceText
+from study_app.designer.versions.changes import DifferenceText
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import shipped_file
 from study_app.store.drafts import draft_of

@@ -124,9 +124,9 @@ def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, 
     study = kept(qtbot, likert)
     qtbot.waitUntil(lambda: likert.place.header.version.words == "Piloted")
     qtbot.mouseClick(likert.place.header.version, Qt.MouseButton.LeftButton)
-    changes = likert.controller.changes.card
+    changes = likert.controller.changes
     assert changes.version.currentText().startswith("1.0: 1 pilot, last today")
-    assert changes.view.note == "The study does not differ from this version."
+    assert changes.note.text() == "The study does not differ from this version."
     lines = lines_of(study)
     (shown,) = sessions(likert.results, {})
     played = datetime.fromisoformat(next(line["at"] for line in lines if line["event"] == "session_resumed"))

@@ -50,5 +50,5 @@ def click(qtbot: Any, part: Any) -> None:
 
 def lines(designer: Any) -> list[str]:
     """The lines of the difference that is shown, without its context."""
-    shown = designer.controller.changes.card.difference.toPlainText().splitlines()
+    shown = designer.controller.changes.difference.toPlainText().splitlines()
     return [line.partition("  #")[0].rstrip() for line in shown if line[:1] in {"-", "+"}]

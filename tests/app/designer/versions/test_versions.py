@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.app.main_controller import MainController
 from study_app.designer.place.controller import DesignerController
@@ -53,9 +53,10 @@ def test_a_study_that_was_run_is_saved_under_the_next_version(ran: Any, qtbot: A
     qtbot.keyClick(ran.window, Qt.Key.Key_S, Qt.KeyboardModifier.ControlModifier)
     card = ran.place.prompt
     assert ran.file.read_bytes() == before
-    assert "2 sessions, 1 pilot with version 1.0" in card.asked.explanation
+    said = " ".join(one.text() for one in card.findChildren(QLabel))
+    assert "2 sessions, 1 pilot with version 1.0" in said
     assert '+title = "Hello"' in card.difference.toPlainText()
-    assert "new sessions are refused" in card.asked.problems
+    assert "new sessions are refused" in said
     card.version.selectAll()
     qtbot.keyClicks(card.version, "1.0")
     qtbot.keyClick(card.version, Qt.Key.Key_Return)
@@ -137,7 +138,7 @@ def test_a_change_by_another_program_is_noticed_while_the_place_is_shown(designe
     other.replace(designer.file)
     qtbot.waitUntil(designer.place.banner.isVisible)
     click(qtbot, designer.place.banner.buttons[2])
-    assert designer.controller.changes.card.view.chosen == "file"
+    assert designer.controller.changes.chosen == "file"
     assert '-title = "Another look"' in lines(designer)
     click(qtbot, designer.place.banner.buttons[1])
     assert "Another look" in designer.text
@@ -261,8 +262,8 @@ def test_changes_shows_what_differs_and_restores_a_version(ran: Any, qtbot: Any)
     ran.editing.ask(SetText(("pages", "welcome", "title"), "en", "Hello"))
     click(qtbot, ran.place.header.version)
     assert ran.place.pane.tab == "changes"
-    card = ran.controller.changes.card
-    assert card.view.versions[0].words == "The file, without the edits"
+    card = ran.controller.changes
+    assert card.version.itemText(0) == "The file, without the edits"
     assert "2 sessions, 1 pilot" in card.version.currentText()
     assert lines(ran) == ['-title = "A first look"', '+title = "Hello"']
     click(qtbot, card.restore)
@@ -287,9 +288,9 @@ def test_changes_begin_with_the_last_session_where_no_participant_was_run(
     qtbot.waitUntil(lambda: bool(designer.controller.runs.known))
     designer.editing.ask(SetValue(REPETITIONS, 3))
     designer.place.show_tab("changes")
-    view = designer.controller.changes.card.view
-    assert view.versions[0].words == "The file, without the edits"
-    assert view.chosen == protocol_hash(source)
+    changes = designer.controller.changes
+    assert changes.version.itemText(0) == "The file, without the edits"
+    assert changes.chosen == protocol_hash(source)
 
 
 def test_of_a_version_without_a_copy_the_receipt_says_what_differs(ran: Any, qtbot: Any) -> None:
@@ -302,7 +303,7 @@ def test_of_a_version_without_a_copy_the_receipt_says_what_differs(ran: Any, qtb
     ran.controller.enter()
     qtbot.waitUntil(lambda: len(ran.controller.runs.known) == 2)
     ran.controller.changes.compare_with(protocol_hash(source))
-    card = ran.controller.changes.card
+    card = ran.controller.changes
     assert "No copy of this version is kept" in card.note.text()
     assert card.difference.toPlainText() == 'study.version: "0.9" before, "1.0" now'
     assert not card.restore.isEnabled()
@@ -338,8 +339,8 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     assert visit.window.here == "designer"
     qtbot.waitUntil(lambda: both.designer is not None and both.designer.place.isVisible(), timeout=20_000)
     assert both.designer is not None
-    changes = both.designer.changes.card
-    assert changes.view.chosen == protocol_hash(source)
+    changes = both.designer.changes
+    assert changes.chosen == protocol_hash(source)
     assert changes.version.currentText().startswith("1.0: 1 session")
     assert both.designer.place.pane.tab == "changes"
     visit.window.close()

@@ -8,9 +8,9 @@ from difflib import unified_diff
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from PySide6.QtCore import QObject, QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QFontDatabase, QSyntaxHighlighter, QTextCharFormat
-from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QScrollArea, QWidget
+from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.designer.document.study import Study
 from study_app.designer.place.arrangement import PanePage
@@ -25,21 +25,16 @@ from study_app.designer.place.right_pane import PanePage
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems.repair_button import NameRefusal
 from study_app.designer.versions.known_runs import KnownRuns
-from study_app.designer.versions.version_rows import (
-    FILE,
-    ChangesView,
-    Comparison,
-    SavePrompt,
-    VersionChoice,
-    version_choices,
-)
+from study_app.designer.versions.version_rows import FILE, Comparison, Standing, counts, version_choices
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.background import delayed
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Card, Icon
+from study_app.gui.widgets.cards import Card, Icon, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
+from study_app.number_text import counted
 from study_app.protocol.differences import differences
 from study_app.protocol.source.files import unbundled, with_liquid_files
 from study_app.store.folders import SessionFolder
@@ -99,52 +94,6 @@ class DifferenceText(Themed, QPlainTextEdit):
         self._colours.rehighlight()
 
 
-class ChangesCard(Card):
-    """Draws a `ChangesView`; ``version_chosen`` carries a key."""
-
-    version_chosen = Signal(str)
-    restore_asked = Signal()
-
-    def __init__(self) -> None:
-        super().__init__(padding=14, gap=8)
-        self.setAccessibleName("Changes")
-        self.view = ChangesView()
-        self.version = Choice()
-        self.version.setFont(font("label"))
-        self.version.setAccessibleName("Version to compare with")
-        self.version.setMinimumWidth(120)
-        self.restore = ActionButton("undo", "Restore", height=34)
-        self.restore.setProperty("dense", "true")
-        self.restore.setToolTip("Give the study the text of this version, as one step")
-        self.note = label("", "label", "text2", wraps=True)
-        self.difference = DifferenceText()
-        self.top = QWidget()
-        of = label("Compare with", "label")
-        hbox(of, (self.version, 1), self.restore, spacing=10, margins=0, parent=self.top)
-        self.nothing = label(NOTHING, "body", "text2", wraps=True)
-        add_parts(self.column, self.top, self.nothing, self.note, (self.difference, 1))
-        self.setFocusProxy(self.version)
-        self.version.activated.connect(lambda at: self.version_chosen.emit(str(self.version.itemData(at))))
-        self.restore.clicked.connect(self.restore_asked)
-        self.show_view(self.view)
-
-    def show_view(self, view: ChangesView) -> None:
-        before, self.view = self.view, view
-        if view.versions != before.versions or view.chosen != before.chosen:
-            with QSignalBlocker(self.version):
-                self.version.clear()
-                for one in view.versions:
-                    self.version.addItem(one.words, one.key)
-                self.version.setCurrentIndex(self.version.findData(view.chosen) if view.chosen else -1)
-        self.top.setVisible(bool(view.versions))
-        self.difference.setVisible(bool(view.difference.lines))
-        self.nothing.setVisible(not view.versions)
-        self.note.setText(view.difference.note)
-        self.note.setVisible(bool(view.difference.note))
-        self.restore.setEnabled(view.can_restore)
-        self.difference.show_lines(view.difference.lines)
-
-
 class SaveCard(Prompt):
     """Signals: ``save_asked`` (version), ``another_asked`` (name), ``changes_asked``."""
 
@@ -152,17 +101,24 @@ class SaveCard(Prompt):
     another_asked = Signal(str)
     changes_asked = Signal()
 
-    def __init__(self, asked: SavePrompt) -> None:
-        super().__init__("Save another version", asked.explanation)
-        self.asked = asked
+    def __init__(self, standing: Standing, known: Iterable[Run], difference: Comparison, problems: int) -> None:
+        sessions = "; ".join(f"{counts(run)} with version {run.version}" for run in known if run.sessions)
+        super().__init__(
+            "Save another version",
+            f"This study was run: {sessions}. A version that was run is never overwritten: the study is saved under "
+            "another number.",
+        )
         self.difference = DifferenceText()
-        self.difference.show_lines(asked.difference.lines)
+        self.difference.show_lines(difference.lines)
         self.column.addWidget(self.difference, 1)
-        self.difference.setVisible(bool(asked.difference.lines))
-        for icon, words in (("info", asked.difference.note), ("warning", asked.problems)):
+        self.difference.setVisible(bool(difference.lines))
+        are = "it is" if problems == 1 else "they are"
+        wrong = f"{counted(problems, 'problem')}: new sessions are refused until {are} solved." if problems else ""
+        for icon, ink, words in (("info", "text2", difference.note), ("warning", "warn", wrong)):
             if words:
-                self.column.addWidget(_line(icon, words))
-        self.version = _field("Version to save as", asked.version, 110)
+                sign = Icon(icon, ink, 18)  # type: ignore[arg-type]  # an ink
+                add_layout(self.column, hbox(sign, (label(words, "label", wraps=True), 1), spacing=8))
+        self.version = _field("Version to save as", standing.version, 110)
         self.name = _field("Short name of the other study", "", 220)
         self.name.setPlaceholderText("small letters and digits")
         self.refusal = NameRefusal("Save as")
@@ -224,13 +180,6 @@ def _field(name: str, text: str, width: int) -> QLineEdit:
     return made
 
 
-def _line(icon: str, words: str) -> QWidget:
-    made = QWidget()
-    parts = (Icon(icon, "warn" if icon == "warning" else "text2", 18), (label(words, "label", wraps=True), 1))
-    hbox(*parts, spacing=8, margins=0, parent=made)
-    return made
-
-
 class UnlockCard(Prompt):
     """What another id of a question breaks; ``answered`` comes where it is to be changed all the same."""
 
@@ -258,7 +207,8 @@ class CommentsCard(Prompt):
         column = vbox(spacing=2, margins=0, parent=inside)
         self.lines: list[ActionButton] = []
         for line, text in comments:
-            made = ActionButton("", f"Line {line}:  {_cut(text)}", role="plain", height=34)
+            cut = text if len(text) <= 90 else f"{text[:89].rstrip()}…"
+            made = ActionButton("", f"Line {line}:  {cut}", role="plain", height=34)
             made.setProperty("dense", "true")
             made.setAccessibleName(f"Go to line {line}: {text}")
             made.setToolTip(text)
@@ -266,10 +216,7 @@ class CommentsCard(Prompt):
             column.addWidget(made, 0, Qt.AlignmentFlag.AlignLeft)
             self.lines.append(made)
         column.addStretch()
-        area = QScrollArea()
-        area.setWidgetResizable(True)
-        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        area.setWidget(inside)
+        area = scrolled(inside)
         area.setMinimumHeight(min(160, 38 * len(comments) + 6))
         self.column.addWidget(area, 1)
         self.cancel.setText("Close")
@@ -281,10 +228,6 @@ def title_of(name: str, comments: Sequence[tuple[int, str]]) -> str:
     """Return how many comments mention a name."""
     count = "1 comment mentions" if len(comments) == 1 else f"{len(comments)} comments mention"
     return f"{count} “{name}”"
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= 90 else f"{text[:89].rstrip()}…"
 
 
 TAB: Final = "changes"
@@ -353,33 +296,50 @@ def newest(known: Iterable[Run]) -> Run | None:
     return next((run for run in reversed(ran) if run.sessions), ran[-1] if ran else None)
 
 
-class ChangesController(QObject):
-    """Shows how the open study differs from a version, while its tab is shown."""
+class Changes(Card):
+    """The tab: how the open study differs from a version, while it is shown."""
 
     def __init__(self, editing: Editing, place: DesignerPlace, runs: KnownRuns) -> None:
-        super().__init__(editing)
+        super().__init__(padding=14, gap=8)
         self.editing, self.place, self.runs = editing, place, runs
-        self.card = ChangesCard()
-        self._chosen = ""
+        self.chosen = ""
+        """The key of the version that is compared with: its hash, or that of the file."""
+        self._wanted = ""
         self._asked: Run | None = None
-        place.pane.add_page(PanePage(TAB, "Changes", self.card, with_facts=False))
-        self._resting = QTimer(self)
-        self._resting.setInterval(REST_MS)
-        self._resting.setSingleShot(True)
-        self._resting.timeout.connect(self.show)
-        place.pane.tab_shown.connect(lambda _tab: self.show())
+        self._choices: tuple[tuple[str, str], ...] = ()
+        self.setAccessibleName("Changes")
+        self.version = Choice()
+        self.version.setFont(font("label"))
+        self.version.setAccessibleName("Version to compare with")
+        self.version.setMinimumWidth(120)
+        self.restore = ActionButton("undo", "Restore", height=34)
+        self.restore.setProperty("dense", "true")
+        self.restore.setToolTip("Give the study the text of this version, as one step")
+        self.note = label("", "label", "text2", wraps=True)
+        self.difference = DifferenceText()
+        self.top = QWidget()
+        of = label("Compare with", "label")
+        hbox(of, (self.version, 1), self.restore, spacing=10, margins=0, parent=self.top)
+        self.nothing = label(NOTHING, "body", "text2", wraps=True)
+        add_parts(self.column, self.top, self.nothing, self.note, (self.difference, 1))
+        self.setFocusProxy(self.version)
+        for part in (self.top, self.note, self.difference):
+            part.hide()
+        place.pane.add_page(PanePage(TAB, "Changes", self, with_facts=False))
+        self._resting = delayed(self, REST_MS, self.compare_now)
+        place.pane.tab_shown.connect(lambda _tab: self.compare_now())
         place.header.version.clicked.connect(lambda: self.compare_with(""))
         editing.opened_other.connect(self._begin)
         editing.edited.connect(self._resting.start)
-        runs.changed.connect(self.show)
-        self.card.version_chosen.connect(self.compare_with)
-        self.card.restore_asked.connect(self.restore)
+        runs.changed.connect(self.compare_now)
+        self.version.activated.connect(lambda at: self.compare_with(str(self.version.itemData(at))))
+        self.restore.clicked.connect(self._restore)
 
     def compare_with(self, key: str) -> None:
         """Show the tab with a version by its hash, the file ("file"), by default that of the last session."""
-        self._chosen = key or self._chosen
+        self._wanted = key or self._wanted
         self.place.show_tab(TAB)
-        self.show()
+        self.compare_now()
 
     def compare_with_session(self, study: str, folder: Path) -> None:
         """Show the tab with the version that a session was run with, if its study is the one that is open."""
@@ -391,26 +351,36 @@ class ChangesController(QObject):
         self.compare_with(run.hash)
 
     def _begin(self) -> None:
-        self._chosen, self._asked = "", None
+        self._wanted, self._asked = "", None
         self._resting.start()
 
-    def show(self) -> None:
+    def compare_now(self) -> None:
         """Compare anew, where the tab is shown."""
         opened = self.editing.opened
         if opened is None or self.place.pane.tab != TAB:
             return
-        choices = self._choices(opened)
-        keys = [one.key for one in choices]
-        chosen = self._chosen if self._chosen in keys else self._default(keys)
-        if not chosen:
-            self.card.show_view(ChangesView())
-            return
-        version = self._version(opened, chosen)
-        found = compare(version, opened.study)
-        can_restore = not opened.read_only and version.text not in {None, opened.study.text}
-        self.card.show_view(ChangesView(choices, chosen, found, can_restore))
+        before, self._choices = (self._choices, self.chosen), self._found_choices(opened)
+        keys = [key for key, _ in self._choices]
+        newest_run = newest(self.runs.known)
+        preferred = (self._wanted, "" if newest_run is None else newest_run.hash, *keys)
+        self.chosen = next((key for key in preferred if key in keys), "")
+        if (self._choices, self.chosen) != before:
+            with QSignalBlocker(self.version):
+                self.version.clear()
+                for key, words in self._choices:
+                    self.version.addItem(words, key)
+                self.version.setCurrentIndex(self.version.findData(self.chosen) if self.chosen else -1)
+        version = self._version(opened, self.chosen) if self.chosen else Version(None)
+        found = compare(version, opened.study) if self.chosen else Comparison()
+        self.top.setVisible(bool(keys))
+        self.nothing.setVisible(not keys)
+        self.note.setText(found.note)
+        self.note.setVisible(bool(found.note))
+        self.difference.setVisible(bool(found.lines))
+        self.difference.show_lines(found.lines)
+        self.restore.setEnabled(not opened.read_only and version.text not in {None, opened.study.text})
 
-    def _choices(self, opened: OpenStudy) -> tuple[VersionChoice, ...]:
+    def _found_choices(self, opened: OpenStudy) -> tuple[tuple[str, str], ...]:
         file = ""
         with suppress(StoreError):  # a file that cannot be read is no version to compare with
             if opened.base and opened.file.exists():
@@ -427,22 +397,16 @@ class ChangesController(QObject):
         asked = self._asked
         return known if asked is None or any(run.hash == asked.hash for run in known) else (asked, *known)
 
-    def _default(self, keys: list[str]) -> str:
-        run = newest(self.runs.known)
-        return run.hash if run is not None and run.hash in keys else keys[0] if keys else ""
-
     def _version(self, opened: OpenStudy, key: str) -> Version:
         if key == FILE:
             return file_version(opened.file)
         run = next((one for one in self._known() if one.hash == key), None)
         return kept_version(key) if run is None else version_of(opened, run)
 
-    def restore(self) -> None:
-        """Give the study the text of the version, as one step."""
+    def _restore(self) -> None:
         self.place.flush()
-        opened, chosen = self.editing.writable, self.card.view.chosen
-        text = None if opened is None else self._version(opened, chosen).text
+        opened = self.editing.writable
+        text = None if opened is None else self._version(opened, self.chosen).text
         if text is not None:
-            words = next(one.words for one in self.card.view.versions if one.key == chosen)
-            self.editing.type_text(f"Restore {words}", text)
-            self.show()
+            self.editing.type_text(f"Restore {dict(self._choices)[self.chosen]}", text)
+            self.compare_now()
