@@ -18,7 +18,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
 
@@ -324,21 +324,10 @@ PREPARING: Final = "Loading the force model …"
 NAMES: Final = {DRAG: ("drag_coefficient",), WAKE: ("drag_coefficient", "length", "scaling")}
 
 
-class Lab(Protocol):
-    """What an estimation needs of the lab."""
-
-    bench: Workbench
-    live: Live | None
-
-    def feel(self, bench: Workbench) -> None: ...
-
-    def fail(self, error: BaseException) -> None: ...
-
-
 class LabEstimation(QObject):
     """An estimation for the lab's selected setting: `poll` with each frame, `shown` for its view, `close` to end."""
 
-    def __init__(self, place: LabPlace, lab: Lab) -> None:
+    def __init__(self, place: LabPlace, lab: LabController) -> None:
         super().__init__()
         self._lab = lab
         self._executor: ThreadPoolExecutor | None = None

@@ -17,13 +17,14 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.app.failures import ThreadExceptions, UncaughtExceptions, guarded_session_slot
-from study_app.app.session.operator import OperatorMonitor, OperatorRequests, Parts, Reconnection, WatchedJournal
+from study_app.app.session.operator import OperatorMonitor, Parts, Reconnection, WatchedJournal
 from study_app.app.session.timing import FrameBudget, ThreadPriority, freeze_garbage, unfreeze_garbage
 from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError, DisplayError, ServoFault, StudyError, VideoError
 from study_app.gui.display.screens import Frames, has_card, place
 from study_app.gui.operator.operator_view import OperatorView, Session, stages
+from study_app.gui.operator.plots import ForceCard
 from study_app.gui.operator.session_panels import Strip
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
@@ -41,10 +42,14 @@ from study_app.session.simulated.observers import Hand, hand_for, rest
 from study_app.session.transitions.events import (
     Begin,
     Continue,
+    EndRequested,
     Event,
     ForceStopped,
+    Note,
     PauseRequested,
     Reconnected,
+    RepeatRequested,
+    ResumeRequested,
     broken,
 )
 from study_app.store.blinded.allocation import session_protocol
@@ -113,9 +118,6 @@ class SessionBridge(QObject):
         self.runner = Runner(
             parts.session.protocol, parts.session.schedule, parts.key, ports, parts.language, parts.start, parts.secret
         )
-        self.requests = OperatorRequests(
-            parts, self.runner, participant, operator, strip=self.strip, fail=self.fail, parent=self
-        )
         self.reconnection = None if parts.reconnect is None else Reconnection(parts.reconnect)
         self._hand: Hand | None = None
         self._gone = False
@@ -135,10 +137,22 @@ class SessionBridge(QObject):
 
     def _connect(self) -> None:
         operator, participant = self.operator, self.participant
-        operator.close_asked.connect(self._close)
-        operator.diagnose_asked.connect(self._diagnose)
-        operator.reconnect_asked.connect(self._reconnect)
-        operator.panels.failed.connect(self._panel_failed)
+        for asked, slot in (
+            (operator.stop_asked, self._stop_force),
+            (operator.fade_in_asked, self._resume),
+            (operator.resume_asked, self._resume),
+            (operator.pause_asked, self._pause),
+            (operator.repeat_asked, self._repeat),
+            (operator.end_asked, self._end),
+            (operator.note_written, self._note),
+            (operator.mark_set, self._mark),
+            (operator.exclude_asked, self._exclude),
+            (operator.close_asked, self._close),
+            (operator.diagnose_asked, self._diagnose),
+            (operator.reconnect_asked, self._reconnect),
+            (operator.panels.failed, self._panel_failed),
+        ):
+            asked.connect(slot)
         if self.reconnection is not None:
             self.reconnection.connected.connect(self._reconnected)
             self.reconnection.failed.connect(self._not_reconnected)
@@ -146,6 +160,7 @@ class SessionBridge(QObject):
         participant.event.connect(self._event)
         participant.left.connect(operator.come_forward)
         if self.strip is not None:
+            self.strip.stop.pressed.connect(self._stop_force)
             self.strip.operator.clicked.connect(operator.come_forward)
             operator.header.page.show()
             operator.page_asked.connect(participant.come_forward)
@@ -244,13 +259,13 @@ class SessionBridge(QObject):
     def _panel_failed(self, name: str, error: Exception) -> None:
         """Log it and note it; the panel itself says so to the operator."""
         log.error("the panel %r failed and was disabled: %s", name, error, exc_info=error)
-        self.requests.record_note(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
+        self.record_note(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
 
     @guarded_session_slot
     def _tell_of_thread(self, what: str) -> None:
         """Tell the operator, and log it: from now on, the work of that thread is missing."""
         self.operator.show_message("A part of the program ended", f"{what}. All answers are kept.")
-        self.requests.record_note(f"a thread of the program ended: {what}")
+        self.record_note(f"a thread of the program ended: {what}")
 
     def _now(self) -> float:
         return self.parts.clock()
@@ -284,16 +299,38 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def show_traces(self) -> None:
-        self.monitor.show_traces(self.operator)
+        operator = self.operator
+
+        def draw() -> None:
+            operator.show_traces(self.monitor.health, self._now())
+            operator.position.plot.paint_now()
+
+        operator.panels.draw(operator.position, draw)
 
     @guarded_session_slot
     def show_forces(self) -> None:
         """Draw the newest forces, where the operator may see them."""
-        self.monitor.show_forces(self.operator)
+        forces, card = self.monitor.forces, self.operator.force
+        if forces is None or not isinstance(card, ForceCard):
+            return
+
+        def draw() -> None:
+            self.operator.show_forces(forces, self.parts.servo.now_ns())
+            for plot in (card.plot, card.wake):
+                plot.paint_now()
+
+        self.operator.panels.draw(card, draw)
 
     @guarded_session_slot
     def show_tiles(self) -> None:
-        self.monitor.show_lateness(self.operator)
+        operator, health = self.operator, self.monitor.health
+        health.overruns = self.parts.servo.overruns
+
+        def draw() -> None:
+            operator.show_lateness(health)
+            operator.lateness.plot.paint_now()
+
+        operator.panels.draw(operator.lateness, draw)
         self._show()
 
     def _changed(self) -> None:
@@ -349,6 +386,55 @@ class SessionBridge(QObject):
         if self.reconnection is not None and self.runner.state.lost_device:
             self.reconnection.begin()
             self._show()
+
+    def record_note(self, text: str) -> None:
+        """Write a note to the journal while the session runs; after its end do nothing."""
+        if not self.runner.finished:
+            self._post(Note(self._now(), "note", text))
+
+    @guarded_session_slot
+    def _stop_force(self) -> None:
+        self.parts.servo.stop_force()  # before anything that could fail or wait for the disk
+        self._post(ForceStopped(self._now(), "operator"))
+
+    @guarded_session_slot
+    def _resume(self) -> None:
+        self._post(ResumeRequested(self._now(), "operator"))
+        if self.strip is not None:
+            self.participant.come_forward()
+
+    @guarded_session_slot
+    def _pause(self) -> None:
+        self._post(PauseRequested(self._now(), "operator"))
+
+    @guarded_session_slot
+    def _repeat(self, reason: str) -> None:
+        self._post(RepeatRequested(self._now(), reason))
+
+    @guarded_session_slot
+    def _note(self, text: str) -> None:
+        self._post(Note(self._now(), "note", text))
+
+    @guarded_session_slot
+    def _mark(self) -> None:
+        self._post(Note(self._now(), "mark", ""))
+
+    @guarded_session_slot
+    def _exclude(self, trial: object, reason: str) -> None:
+        """Exclude a trial or the session; if that fails, the session continues, and a message appears."""
+        if self.parts.exclude is None:
+            return
+        try:
+            self.parts.exclude(trial if isinstance(trial, int) else None, reason)
+        except StudyError as error:
+            self.operator.show_message("It was not excluded", f"{error}.")
+        else:
+            what = f"trial {trial}" if isinstance(trial, int) else "the session"
+            self.record_note(f"excluded from the analysis: {what}: {reason}")
+
+    @guarded_session_slot
+    def _end(self, status: str, reason: str) -> None:
+        self._post(EndRequested(self._now(), "withdrawn" if status == "withdrawn" else "aborted", reason))
 
     def tell_of_device(self, line: str) -> None:
         """Show what the device asks for while it is connected again."""

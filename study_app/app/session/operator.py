@@ -8,27 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Signal
 
-from study_app.app.failures import guarded_session_slot
 from study_app.errors import StudyError
 from study_app.gui.operator.operator_view import OperatorView, Session, operator_view
-from study_app.gui.operator.plots import ForceCard
 from study_app.gui.operator.servo_health import Forces, ServoHealth
-from study_app.gui.operator.session_panels import Strip
-from study_app.gui.operator.window import OperatorWindow
-from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.widgets.background import Background
 from study_app.session.pages import Page
 from study_app.session.ports import JournalPort
 from study_app.session.resume import FIRST, Start
 from study_app.session.runner import Runner
-from study_app.session.transitions.events import (
-    EndRequested,
-    ForceStopped,
-    Note,
-    PauseRequested,
-    RepeatRequested,
-    ResumeRequested,
-)
+from study_app.session.transitions.events import EndRequested, ForceStopped, Note, PauseRequested, RepeatRequested, ResumeRequested
 from study_app.store.journals.journal_events import Event, SessionEnded
 from study_app.store.progress import Progress
 from study_app.video.sources import Videos
@@ -133,38 +121,6 @@ class OperatorMonitor:
             self.forces.take(samples)
         self.health.hand(self._parts.clock(), self._parts.aim_m())
 
-    def show_traces(self, operator: OperatorWindow) -> None:
-        """Draw the hand's place, at once."""
-
-        def draw() -> None:
-            operator.show_traces(self.health, self._parts.clock())
-            operator.position.plot.paint_now()
-
-        operator.panels.draw(operator.position, draw)
-
-    def show_forces(self, operator: OperatorWindow) -> None:
-        """Draw the force and the wake where they are seen, at once."""
-        forces, card = self.forces, operator.force
-        if forces is None or not isinstance(card, ForceCard):
-            return
-
-        def draw() -> None:
-            operator.show_forces(forces, self._parts.servo.now_ns())
-            for plot in (card.plot, card.wake):
-                plot.paint_now()
-
-        operator.panels.draw(card, draw)
-
-    def show_lateness(self, operator: OperatorWindow) -> None:
-        """Draw how late ticks were, at once."""
-        self.health.overruns = self._parts.servo.overruns
-
-        def draw() -> None:
-            operator.show_lateness(self.health)
-            operator.lateness.plot.paint_now()
-
-        operator.panels.draw(operator.lateness, draw)
-
     def view(self, trouble: str, stalled: str | None) -> OperatorView:
         """Return what the operator is to see now; ``stalled`` is why the disk takes nothing, None while it does."""
         parts = self._parts
@@ -190,100 +146,6 @@ class OperatorMonitor:
         faulty = self._parts.servo.fault is not None
         self._faults += faulty and not self._faulty
         self._faulty = faulty
-
-
-class OperatorRequests(QObject):
-    """Connects the operator's window, and the strip if there is one, to the runner.
-
-    Parameters
-    ----------
-    strip : the state in the participant's window, if both windows share one screen
-    fail : is called with every exception of a request; ends in zero force
-    """
-
-    def __init__(
-        self,
-        parts: Parts,
-        runner: Runner,
-        participant: ParticipantWindow,
-        operator: OperatorWindow,
-        *,
-        strip: Strip | None,
-        fail: Callable[[BaseException], None],
-        parent: QObject,
-    ) -> None:
-        super().__init__(parent)
-        self._parts = parts
-        self._runner = runner
-        self._participant = participant
-        self._operator = operator
-        self._strip = strip
-        self._fail = fail
-        operator.stop_asked.connect(self._stop_force)
-        operator.fade_in_asked.connect(self._resume)
-        operator.resume_asked.connect(self._resume)
-        operator.pause_asked.connect(self._pause)
-        operator.repeat_asked.connect(self._repeat)
-        operator.end_asked.connect(self._end)
-        operator.note_written.connect(self._note)
-        operator.mark_set.connect(self._mark)
-        operator.exclude_asked.connect(self._exclude)
-        if strip is not None:
-            strip.stop.pressed.connect(self._stop_force)
-
-    def fail(self, error: BaseException) -> None:
-        self._fail(error)
-
-    def record_note(self, text: str) -> None:
-        """Write a note to the journal while the session runs; after its end do nothing."""
-        if not self._runner.finished:
-            self._runner.post(Note(self._parts.clock(), "note", text))
-
-    @guarded_session_slot
-    def _stop_force(self) -> None:
-        self._parts.servo.stop_force()  # before anything that could fail or wait for the disk
-        self._runner.post(ForceStopped(self._parts.clock(), "operator"))
-
-    @guarded_session_slot
-    def _resume(self) -> None:
-        self._runner.post(ResumeRequested(self._parts.clock(), "operator"))
-        if self._strip is not None:
-            self._participant.come_forward()
-
-    @guarded_session_slot
-    def _pause(self) -> None:
-        self._runner.post(PauseRequested(self._parts.clock(), "operator"))
-
-    @guarded_session_slot
-    def _repeat(self, reason: str) -> None:
-        self._runner.post(RepeatRequested(self._parts.clock(), reason))
-
-    @guarded_session_slot
-    def _note(self, text: str) -> None:
-        self._runner.post(Note(self._parts.clock(), "note", text))
-
-    @guarded_session_slot
-    def _mark(self) -> None:
-        self._runner.post(Note(self._parts.clock(), "mark", ""))
-
-    @guarded_session_slot
-    def _exclude(self, trial: object, reason: str) -> None:
-        """Exclude a trial or the session; if that fails, the session continues, and a message appears."""
-        if self._parts.exclude is None:
-            return
-        try:
-            self._parts.exclude(trial if isinstance(trial, int) else None, reason)
-        except StudyError as error:
-            self._operator.show_message("It was not excluded", f"{error}.")
-        else:
-            what = f"trial {trial}" if isinstance(trial, int) else "the session"
-            self.record_note(f"excluded from the analysis: {what}: {reason}")
-
-    @guarded_session_slot
-    def _end(self, status: str, reason: str) -> None:
-        self._runner.post(
-            EndRequested(self._parts.clock(), "withdrawn" if status == "withdrawn" else "aborted", reason)
-        )
 
 
 PATIENCE_S = 20.0

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent
+from PySide6.QtGui import QGuiApplication, QPaintEvent
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLineEdit, QProgressBar, QWidget
 
 from study_app.devices.doctor import Finding, Report, State, lines
@@ -15,7 +15,7 @@ from study_app.errors import StoreError
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
-from study_app.gui.widgets.cards import Card, Chip, Icon, Rule, scrolled
+from study_app.gui.widgets.cards import Card, Chip, Icon, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label, set_ink
 from study_app.store.support import NAME, write_support
@@ -127,11 +127,8 @@ class FindingRow(Themed, QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         if not self.found:
             return
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(self.theme.bad_bg))
-        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+        painter = smooth_painter(self)
+        fill_rounded(painter, QRectF(self.rect()), RADIUS_CONTROL, self.theme.bad_bg)
 
 
 LOOK_MS = 100

@@ -18,7 +18,7 @@ from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import RADIUS_CARD, TANK, font
 from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.boxes import add_layout, add_parts, grid, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon
+from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Clamped, Elided, label, set_ink
 from study_app.number_text import counted
@@ -74,8 +74,7 @@ class LabCard(Card):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         body = QRectF(self.rect()).adjusted(SHADOW, SHADOW - 1, -SHADOW, -SHADOW - 1).adjusted(1, 1, -1, -1)
         card = QPainterPath()
         card.addRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
@@ -142,8 +141,7 @@ class ResumeBanner(Themed, QWidget):
         self.resume.setAccessibleName(f"Resume {session.participant}")
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(self.theme.warn_bg))
         strip = QRectF(self.rect()).adjusted(SHADOW, 0, -SHADOW, 0)

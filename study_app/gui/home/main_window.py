@@ -23,7 +23,7 @@ from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import DARK, LIGHT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
-from study_app.gui.widgets.cards import Logo
+from study_app.gui.widgets.cards import Logo, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
 from study_app.gui.widgets.dialogs import Notice, Question
 from study_app.gui.widgets.labels import label
@@ -99,8 +99,7 @@ class RailButton(Themed, PressedByEnter):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         painter.setPen(Qt.PenStyle.NoPen)
         rect = QRectF(self.rect())
         if self.here or self.underMouse():

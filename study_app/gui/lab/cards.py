@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtGui import QColor, QFontMetricsF, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QStackedLayout, QVBoxLayout, QWidget
 
 from study_app.gui.lab.lab_state import (
@@ -27,7 +27,7 @@ from study_app.gui.theme.theme import LIGHT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
-from study_app.gui.widgets.cards import Bar, Card, Icon, MaskedPanel, Rule
+from study_app.gui.widgets.cards import Bar, Card, Icon, MaskedPanel, Rule, fill_rounded, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_ink
 from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, number, pen
@@ -97,8 +97,7 @@ class Legend(Themed, QWidget):
         return places
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         painter.setFont(self._font)
         for (style, words), place in zip(self._entries, self._places(), strict=True):
             ink = style.colour(self.theme)
@@ -429,12 +428,9 @@ class LimiterLine(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         if self._state == "acting":
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(QColor(t.warn_bg))
-            painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+            fill_rounded(painter, QRectF(self.rect()), RADIUS_CONTROL, t.warn_bg)
         mark = QRectF(12, self.height() / 2 - 6, 12, 12)
         ink = QColor(t.text3 if self._state == "quiet" else t.warn)
         painter.setPen(ink)

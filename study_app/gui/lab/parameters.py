@@ -9,7 +9,7 @@ from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
-from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, scrolled
+from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, CompactStop, IconButton, Toggle
 from study_app.gui.widgets.labels import Clamped, label
 from study_app.gui.widgets.numbers import NumberField, Range, Slider, read_number, write_number
@@ -53,8 +53,7 @@ class Badge(Themed, QWidget):
             self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         draw_badge(painter, QRectF(self.rect()).center(), self.theme, self._side, self._side)
 
 
@@ -90,8 +89,7 @@ class Segment(Themed, QAbstractButton):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         body = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         if self.isChecked() or self.underMouse():
             painter.setPen(QPen(QColor(t.accent), 1.6) if self.isChecked() else Qt.PenStyle.NoPen)
@@ -137,11 +135,8 @@ class SideSwitch(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(t.sunk))
-        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL + 2, RADIUS_CONTROL + 2)
+        painter = smooth_painter(self)
+        fill_rounded(painter, QRectF(self.rect()), RADIUS_CONTROL + 2, t.sunk)
         cap = QRectF(self.width() - 28, self.height() / 2 - 10, 20, 20)
         painter.setPen(QPen(QColor(t.ctl), 1))
         painter.setBrush(QColor(t.surface))

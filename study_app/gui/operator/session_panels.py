@@ -10,7 +10,7 @@ from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, Tone, TypeRole, font
 from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, add_parts, grid, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Bar, Card, Chip, Icon, Logo, Rule, scrolled
+from study_app.gui.widgets.cards import SHADOW, Bar, Card, Chip, Icon, Logo, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, CompactStop
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
 from study_app.number_text import minutes
@@ -68,8 +68,7 @@ class PartsBar(Themed, QWidget):
             self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         painter.setPen(Qt.PenStyle.NoPen)
         room = self.width() - PARTS_GAP * (len(self.main_trials) - 1)
         x = 0.0
@@ -176,8 +175,7 @@ class Banner(Themed, QWidget):
         self.setVisible(bool(view.trouble))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(self.theme.bad_bg))
         strip = QRectF(self.rect()).adjusted(SHADOW, 0, -SHADOW, 0)
@@ -370,8 +368,7 @@ class StepLine(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         middle = QPointF(12, self.height() / 2)
         reached = self.row.state != "open"
         if not self.first:

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QAccessible, QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QAccessible, QCloseEvent, QColor, QKeyEvent, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractSlider, QLabel, QProgressBar, QScrollArea, QWidget
 
 from study_app.devices.descriptor import NOT_AVAILABLE, Backend
@@ -19,7 +19,7 @@ from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import describe_plot, give_role
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
-from study_app.gui.widgets.cards import Bar, Card, Chip, Rule, scrolled
+from study_app.gui.widgets.cards import Bar, Card, Chip, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, Number
 from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import Ink, figures, label
@@ -234,8 +234,7 @@ class CheckRow(Themed, QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
         icon, ink, _ = LOOKS[self.check.verdict]
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         tint = QColor(getattr(t, f"{ink}_bg"))
         if self.check.verdict != "ok":
             painter.fillRect(self.rect().adjusted(4, 0, -4, 0), tint)

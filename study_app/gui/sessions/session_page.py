@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QDialog, QLineEdit, QScrollArea, QSizePolicy, QWidget
 
 from study_app.devices.registry import discover
@@ -28,7 +28,7 @@ from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within, 
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, insert_layout, vbox
-from study_app.gui.widgets.cards import Card, Chip, Icon
+from study_app.gui.widgets.cards import Card, Chip, Icon, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import label, set_ink
@@ -438,8 +438,7 @@ class MotionPlot(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme = self.theme
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         painter.setFont(font("small", tabular=True))
         if not len(self._times_s):
             painter.setPen(QColor(theme.text2))

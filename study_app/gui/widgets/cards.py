@@ -63,13 +63,23 @@ def scrolled(content: QWidget | QLayout) -> QScrollArea:
     return area
 
 
-def paint_ground(part: QWidget, colour: str) -> None:
-    """Paint the ground of a part with rounded corners."""
+def smooth_painter(part: QWidget) -> QPainter:
+    """Return a painter of a part whose edges are smoothed."""
     painter = QPainter(part)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    return painter
+
+
+def fill_rounded(painter: QPainter, body: QRectF, radius: float, colour: str) -> None:
+    """Fill a rectangle with rounded corners, without an outline."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(colour))
-    painter.drawRoundedRect(QRectF(part.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+    painter.drawRoundedRect(body, radius, radius)
+
+
+def paint_ground(part: QWidget, colour: str) -> None:
+    """Paint the ground of a part with rounded corners."""
+    fill_rounded(smooth_painter(part), QRectF(part.rect()), RADIUS_CONTROL, colour)
 
 
 class Rule(Themed, QWidget):
@@ -127,8 +137,7 @@ class Chip(Themed, QWidget):
         return self.sizeHint()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         body = QRectF(QPointF(), self.sizeHint().toSizeF())
         paint_chip(painter, body, self.theme, self.tone, self.icon, self.word, small=self._small)
 
@@ -146,9 +155,7 @@ def paint_chip(painter: QPainter, body: QRectF, t: Theme, tone: Tone, icon: str,
     """Paint a chip's pill, icon and word into ``body``."""
     fills = {"ok": t.ok_bg, "warn": t.warn_bg, "bad": t.bad_bg, "accent": t.selected, "neutral": t.sunk}
     inks = {"ok": t.ok, "warn": t.warn, "bad": t.bad, "accent": t.accent, "neutral": t.text2}
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(fills[tone]))
-    painter.drawRoundedRect(body, body.height() / 2, body.height() / 2)
+    fill_rounded(painter, body, body.height() / 2, fills[tone])
     draw_icon(painter, icon, QRectF(body.left() + 10, body.center().y() - 7, 14, 14), inks[tone], 2.2)
     painter.setPen(QColor(inks[tone]))
     painter.setFont(_chip_font(small=small))
@@ -171,8 +178,7 @@ class Bar(Themed, QWidget):
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         painter.setPen(Qt.PenStyle.NoPen)
         track = QRectF(0, 3, self.width(), self._bar)
         radius = self._bar / 2
@@ -211,8 +217,7 @@ class MaskedPanel(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         field = QPainterPath()
         field.addRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
         painter.fillPath(field, QColor(t.sunk))

@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import smooth_painter
 
 STOP_HEIGHT = 44
 
@@ -49,8 +50,7 @@ class Cap(Themed, QWidget):
         return cap_size(self.words)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         paint_cap(painter, QPointF(), self.words, self.theme.text, self.theme.ctl)
 
 
@@ -290,8 +290,7 @@ class Toggle(Check):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         painter.setPen(QColor(t.text if self.isEnabled() else t.text3))
         painter.setFont(self.font())
         words = QRectF(46, 0, self.width() - 46, self.height())

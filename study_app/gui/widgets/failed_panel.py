@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator, Mapping
 from traceback import clear_frames
 from types import FrameType, TracebackType
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGraphicsItem, QWidget
 
 from study_app.gui.theme.theme import LIGHT, RADIUS_CARD
 from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.boxes import hbox
-from study_app.gui.widgets.cards import SHADOW, Card, Icon
+from study_app.gui.widgets.cards import SHADOW, Card, Icon, fill_rounded
 from study_app.gui.widgets.labels import label
 
 LEAST_WIDTH = 140  # of a panel that has room for the line; the sign alone has a tip that says it
@@ -52,9 +52,8 @@ class FailedPanel(Themed, QWidget):
             return
         painter.fillRect(self.rect(), QColor(self.theme.window))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(self.theme.bad_bg))
-        painter.drawRoundedRect(self.rect().adjusted(SHADOW, SHADOW, -SHADOW, -SHADOW), RADIUS_CARD, RADIUS_CARD)
+        body = QRectF(self.rect()).adjusted(SHADOW, SHADOW, -SHADOW, -SHADOW)
+        fill_rounded(painter, body, RADIUS_CARD, self.theme.bad_bg)
 
 
 class Panels(QObject):

@@ -4,21 +4,12 @@ import math
 from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import (
-    QColor,
-    QFocusEvent,
-    QKeyEvent,
-    QKeySequence,
-    QMouseEvent,
-    QPainter,
-    QPaintEvent,
-    QPen,
-    QWheelEvent,
-)
+from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent, QKeySequence, QMouseEvent, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QSlider
 
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import smooth_painter
 from study_app.number_text import MINUS, number_of
 
 NUMERALS = set("0123456789.,+-eE \u00a0\u2009\u202f" + MINUS)
@@ -291,8 +282,7 @@ class Slider(Themed, QSlider):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         middle, x = self.height() / 2, self._x(self._value)
         painter.setPen(Qt.PenStyle.NoPen)
         for colour, end in ((t.border, self.width() - MARGIN + KNOB), (t.accent if self.isEnabled() else t.ctl, x)):

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.cards import chip_size, paint_chip
+from study_app.gui.widgets.cards import chip_size, fill_rounded, paint_chip
 
 ROW_HEIGHT = 43
 MARGIN = 12
@@ -146,9 +146,7 @@ class Table(Themed, QTableView):
             body = self._row(row)
             chosen = self.selectionModel().isRowSelected(row, QModelIndex())
             if chosen or self.model().index(row, 0).data(CARE_ROLE):
-                painter.setPen(Qt.PenStyle.NoPen)
-                painter.setBrush(QColor(self.theme.selected if chosen else self.theme.hover))
-                painter.drawRoundedRect(body, RADIUS_CONTROL, RADIUS_CONTROL)
+                fill_rounded(painter, body, RADIUS_CONTROL, self.theme.selected if chosen else self.theme.hover)
             painter.setPen(QPen(QColor(self.theme.grid), 1))
             under = body.bottom() + 1
             painter.drawLine(MARGIN, int(under), self.viewport().width() - MARGIN, int(under))

@@ -25,6 +25,7 @@ from PySide6.QtWidgets import QAbstractButton, QGroupBox, QLineEdit, QPushButton
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
 from study_app.gui.widgets.boxes import grid
+from study_app.gui.widgets.cards import fill_rounded
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import Progress
 
@@ -333,9 +334,7 @@ class GoButton(LitButton, QPushButton):
         flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
         radius = RADIUS_CONTROL * scale
         lit = self.underMouse() and not self.isDown()
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.accent_hover if lit else theme.accent))
-        painter.drawRoundedRect(body, radius, radius)
+        fill_rounded(painter, body, radius, theme.accent_hover if lit else theme.accent)
         if self.hasFocus() and self.ringed:
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(theme.text), 2))
