@@ -253,8 +253,7 @@ class LabAndDesigner(QObject):
 
     Parameters
     ----------
-    results
-        Folder that holds the studies' folders; it need not exist.
+    results : folder that holds the studies' folders; it need not exist
     """
 
     go_asked = Signal(str)

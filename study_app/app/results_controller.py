@@ -91,8 +91,7 @@ class ResultsController(QObject):
 
     Parameters
     ----------
-    results
-        Folder that holds the studies' folders; it need not exist.
+    results : folder that holds the studies' folders; it need not exist
     """
 
     def __init__(

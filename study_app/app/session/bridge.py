@@ -90,8 +90,7 @@ class SessionBridge(QObject):
 
     Parameters
     ----------
-    refresh_hz
-        Frames a second of the participant's screen.
+    refresh_hz : frames a second of the participant's screen
     """
 
     done = Signal()

@@ -99,8 +99,7 @@ class OperatorMonitor:
 
     Parameters
     ----------
-    refresh_hz
-        Frames a second of the participant's screen.
+    refresh_hz : frames a second of the participant's screen
     """
 
     def __init__(self, parts: Parts, refresh_hz: float) -> None:
@@ -159,8 +158,7 @@ class Reconnection(QObject):
 
     Parameters
     ----------
-    reconnect
-        Opens and homes the device and starts its servo at zero force; returns what describes it.
+    reconnect : opens and homes the device and starts its servo at zero force; returns what describes it
     """
 
     connected = Signal(object)

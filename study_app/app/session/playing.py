@@ -145,8 +145,7 @@ class Playing(QObject):
 
     Parameters
     ----------
-    designer
-        Controller of the study designer, whose open study is played.
+    designer : controller of the study designer, whose open study is played
     """
 
     kept = Signal(object)

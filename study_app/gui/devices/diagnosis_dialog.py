@@ -146,12 +146,9 @@ class DiagnosisDialog(QDialog):
 
     Parameters
     ----------
-    name
-        Which device: as ``--device`` takes it.
-    note
-        What else should be known, in a sentence.
-    begin
-        Starts an examination; it takes name and options.
+    name : which device: as ``--device`` takes it
+    note : what else should be known, in a sentence
+    begin : starts an examination; it takes name and options
     """
 
     over = Signal(bool)

@@ -248,16 +248,11 @@ class FileCard(Card):
 
     Parameters
     ----------
-    facts
-        What is said of it.
-    title
-        What it is called; of two lines at most.
-    copies
-        Whether it is not edited but copied.
-    first
-        Whether its draft is the one that was edited last.
-    sign
-        An icon before the title, "" for none.
+    facts : what is said of it
+    title : what it is called; of two lines at most
+    copies : whether it is not edited but copied
+    first : whether its draft is the one that was edited last
+    sign : an icon before the title, "" for none
     """
 
     edit = Signal(object)

@@ -47,10 +47,8 @@ class RehearsalDialog(QDialog):
 
     Parameters
     ----------
-    facts
-        The protocol.
-    results
-        Folder that holds the studies' folders; the rehearsal gets one of its own.
+    facts : the protocol
+    results : folder that holds the studies' folders; the rehearsal gets one of its own
     """
 
     def __init__(
@@ -209,12 +207,9 @@ class NewSessionDialog(QDialog):
 
     Parameters
     ----------
-    facts
-        The protocol to run.
-    results
-        Folder that holds the studies' folders; the study's own is suggested.
-    machine
-        What is set for this machine: device, its options and screen to begin with.
+    facts : the protocol to run
+    results : folder that holds the studies' folders; the study's own is suggested
+    machine : what is set for this machine: device, its options and screen to begin with
     """
 
     def __init__(

@@ -130,8 +130,7 @@ class Rail(Themed, QWidget):
 
     Parameters
     ----------
-    names
-        The places there are, of `DESTINATIONS`.
+    names : the places there are, of `DESTINATIONS`
     """
 
     go_asked = Signal(str)
@@ -190,8 +189,7 @@ class MainWindow(QMainWindow):
 
     Parameters
     ----------
-    makers
-        What makes each place, by its name; the first is where one begins.
+    makers : what makes each place, by its name; the first is where one begins
 
     ``closed`` comes when the operator is done, ``theme_changed`` with the `Theme` that was asked for here.
     """

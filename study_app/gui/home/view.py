@@ -71,10 +71,8 @@ class HomePlace(Place):
 
     Parameters
     ----------
-    results
-        Folder that holds the studies' folders; it need not exist.
-    draft_words
-        Loads what describes a draft.
+    results : folder that holds the studies' folders; it need not exist
+    draft_words : loads what describes a draft
     """
 
     session_asked = Signal(object)

@@ -26,14 +26,10 @@ class Field:
 
     Attributes
     ----------
-    options
-        What can be chosen, and its words.
-    limits
-        Of a count.
-    hint
-        The line below; ``aside`` stands at the right of the label.
-    parse, write
-        Read what is typed (a ValueError says what is wrong with it), and its inverse.
+    options : what can be chosen, and its words
+    limits : of a count
+    hint : the line below; ``aside`` stands at the right of the label
+    parse, write : read what is typed (a ValueError says what is wrong with it), and its inverse
     """
 
     name: str

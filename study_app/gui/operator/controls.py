@@ -101,10 +101,8 @@ class ReasonQuestion(Question):
 
     Parameters
     ----------
-    choices
-        Each value that can be chosen and its words; the last is chosen at first, unless ``first`` is.
-    about
-        What it is about: the answer to a question about something else would hit the wrong thing.
+    choices : each value that can be chosen and its words; the last is chosen at first, unless ``first`` is
+    about : what it is about: the answer to a question about something else would hit the wrong thing
     """
 
     def __init__(

@@ -135,14 +135,10 @@ class OperatorWindow(QMainWindow):
 
     Parameters
     ----------
-    lateness_limit_s
-        The protocol's limit of the 99th percentile of lateness [s].
-    reach_m
-        Half of the longest edge of the tank [m], for the scale of the position plot.
-    pointer
-        Whether positions are of the mouse pointer.
-    force_limit_n
-        Largest force on the hand [N] in a single-blind study; None where the force is hidden.
+    lateness_limit_s : the protocol's limit of the 99th percentile of lateness [s]
+    reach_m : half of the longest edge of the tank [m], for the scale of the position plot
+    pointer : whether positions are of the mouse pointer
+    force_limit_n : largest force on the hand [N] in a single-blind study; None where the force is hidden
     """
 
     stop_asked = Signal()

@@ -44,12 +44,9 @@ class WriteDialog(QDialog):
 
     Parameters
     ----------
-    to
-        The folder that is suggested.
-    extras
-        What can be written in addition.
-    opens
-        The words on the button that opens what was written.
+    to : the folder that is suggested
+    extras : what can be written in addition
+    opens : the words on the button that opens what was written
     """
 
     write_asked = Signal(object, object)

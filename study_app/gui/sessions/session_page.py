@@ -326,12 +326,9 @@ class LeaveOutDialog(Decision):
 
     Parameters
     ----------
-    sessions
-        Those that are not left out yet.
-    trials
-        Of each session (participant, number) the main trials and the words for them.
-    chosen
-        The session to begin with.
+    sessions : those that are not left out yet
+    trials : of each session (participant, number) the main trials and the words for them
+    chosen : the session to begin with
     """
 
     def __init__(

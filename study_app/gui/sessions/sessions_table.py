@@ -117,8 +117,7 @@ class SessionsTable(QWidget):
 
     Parameters
     ----------
-    none
-        The sentence in place of rows where there are none.
+    none : the sentence in place of rows where there are none
     """
 
     opened = Signal(object)

@@ -47,10 +47,8 @@ class FrameTimes:
 
     Parameters
     ----------
-    refresh_hz
-        How often the screen shows one, as the system says.
-    least_s
-        So long frames are taken before anything is said of them.
+    refresh_hz : how often the screen shows one, as the system says
+    least_s : so long frames are taken before anything is said of them
     """
 
     def __init__(self, refresh_hz: float, least_s: float = LEAST_S) -> None:
@@ -249,12 +247,9 @@ class DisplayTest(QWidget):
 
     Parameters
     ----------
-    screen_words
-        Which screen it is, for the heading.
-    refresh_hz
-        How often it shows a frame, as the system says.
-    least_s
-        So long frames are counted before anything is said of them.
+    screen_words : which screen it is, for the heading
+    refresh_hz : how often it shows a frame, as the system says
+    least_s : so long frames are counted before anything is said of them
     """
 
     kept = Signal(float, float, str)

@@ -139,8 +139,7 @@ class TracePlot(Plot):
 
     Parameters
     ----------
-    reach
-        Values from −reach to reach are shown; where a curve goes beyond, the plot widens.
+    reach : values from −reach to reach are shown; where a curve goes beyond, the plot widens
     """
 
     def __init__(self, span_s: float, reach: float, names: Sequence[str] = NAMES) -> None:

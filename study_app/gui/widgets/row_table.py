@@ -76,8 +76,7 @@ class Table(Themed, QTableView):
 
     Parameters
     ----------
-    widths
-        Of each column the share of the width and the least width [px].
+    widths : of each column the share of the width and the least width [px]
     """
 
     opened = Signal(QModelIndex)
