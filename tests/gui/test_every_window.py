@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtGui import QAccessible
 from PySide6.QtWidgets import QApplication
 
-from tests.gui.walk import cut, dead, settle, unnamed, unreached
+from tests.gui.walk import cut, dead, misnamed, settle, unnamed, unreached
 from tests.gui.windows import WINDOWS, two_screens
 
 pytestmark = pytest.mark.slow
@@ -34,6 +34,7 @@ def test_nothing_is_cut_everything_has_a_name_and_no_button_is_dead(qtbot: Any, 
         qtbot.waitUntil(fits)
         assert size is None or window.size().toTuple() == size
     assert unnamed(window) == []
+    assert misnamed(window) == []
     assert unreached(window) == []
     assert dead(window) == []
     if name.startswith(("opening", "preflight")):

@@ -80,6 +80,16 @@ def unnamed(window: QWidget) -> list[str]:
     return found
 
 
+def misnamed(window: QWidget) -> list[str]:
+    """Return what is spoken otherwise than the visible label next to it says: voice control would not find it."""
+    found = []
+    for shown in window.findChildren(QLabel):
+        part = shown.buddy()
+        if part is not None and shown.isVisible() and not part.accessibleName().startswith(shown.text()):
+            found.append(f"{shown.text()!r}: {part.accessibleName()!r}")
+    return found
+
+
 def unreached(window: QWidget) -> list[str]:
     """Return what takes the keyboard but is not in the chain of the Tab key."""
     chain, part = set(), window.nextInFocusChain()

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.home import dialogs
-from study_app.gui.home.dialogs import NewSessionDialog
+from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.home.study_facts import study_facts
 from study_app.gui.widgets.background import Background
 from study_app.protocol.load import source_bytes
@@ -73,7 +73,13 @@ def test_a_free_id_is_suggested(opened, results):
     use(results, "P001")
     use(results, "P004")
     made = opened()
-    assert int(made.editors["seed"].control.text()) in range(1, MAX_SEED + 1)
+    seed, rehearsed = made.editors["seed"], RehearsalDialog(made.facts, results, parent=made).seed
+    assert seed.value in range(1, MAX_SEED + 1)
+    for number, permitted in ((0, True), (MAX_SEED, True), (MAX_SEED + 1, False)):
+        seed.control.setText(str(number))
+        assert made.begin.isEnabled() == permitted
+    assert (rehearsed.control.minimum(), rehearsed.control.maximum()) == (0, MAX_SEED), "the same in both dialogs"
+    seed.control.setText("7")
     assert not made.editors["row_of"].control.isVisible(), "no rows are assigned in this study"
     assert made.editors["windowed"].control.isChecked(), "there is one screen for both windows"
     assert made.editors["participant"].control.text() == "P005"
