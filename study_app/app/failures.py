@@ -49,7 +49,6 @@ class UncaughtExceptions:
         self.remove()
 
     def hook(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        """Handle an exception; its signature is that of ``sys.excepthook``."""
         if not self._handle(error):
             self.previous(kind, error, trace)
 

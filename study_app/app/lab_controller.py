@@ -293,7 +293,6 @@ class LabSaving(QObject):
         self._before.start()
 
     def _write(self, before: threading.Thread | None, write: Callable[[], str], at_hand: tuple[str, ...]) -> None:
-        """Write, in a thread of its own, after the one before."""
         if before is not None:
             before.join()
         try:
@@ -342,7 +341,6 @@ class LabEstimation(QObject):
         place.estimate_follow_asked.connect(self._follow)
 
     def fail(self, error: BaseException) -> None:
-        """End with zero force; the lab ends the estimation, too."""
         self._lab.fail(error)
 
     def poll(self) -> None:

@@ -86,7 +86,6 @@ class WorkstationController(QObject):
         self.place: MachinePlace | None = None
 
     def make_place(self) -> MachinePlace:
-        """Return the machine's place, which shows what is set from now on."""
         place = self.place = MachinePlace()
         place.changed.connect(self.change)
         place.offset_measured.connect(self.measured)
@@ -95,7 +94,6 @@ class WorkstationController(QObject):
         return place
 
     def change(self, values: dict[str, Any]) -> None:
-        """Set values by their names, and keep them."""
         made = MachineSettings.model_validate(_plain(self.settings) | values)
         if made == self.settings:
             self._show()
@@ -176,7 +174,6 @@ class DevicesController(QObject):
 
     @property
     def preferred(self) -> DeviceShown:
-        """The device that sessions begin with, as it was found."""
         return device_named(self._workstation.settings.device, self.shown)
 
     def make_place(self) -> DevicesPlace:
@@ -191,7 +188,6 @@ class DevicesController(QObject):
         return place
 
     def look(self) -> None:
-        """Look at the machine, in the background."""
         if self.looking.busy or self._ended:
             return
         if self.place is not None:
@@ -214,7 +210,6 @@ class DevicesController(QObject):
         self.dialog.show()
 
     def end_diagnosis(self) -> None:
-        """Close the diagnosis, which ends it."""
         if self.dialog is not None:
             self.dialog.reject()
 
@@ -272,7 +267,6 @@ class LabAndDesigner(QObject):
         self._loading.run(load_modules)
 
     def make_lab(self) -> LabPlace:
-        """Return the lab's place, with its controller."""
         self._loading.wait()  # two threads that load modules of one cycle may see them half loaded
         from study_app.app.lab_controller import LabController  # noqa: PLC0415 - pyqtgraph: only once it is needed
         from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
@@ -284,7 +278,6 @@ class LabAndDesigner(QObject):
         return made
 
     def make_designer(self) -> DesignerPlace:
-        """Return the study designer's place, with its controller."""
         self._loading.wait()
         from study_app.app.session.playing import Playing  # noqa: PLC0415 - only once they are needed
         from study_app.designer.place.controller import DesignerController  # noqa: PLC0415
@@ -329,7 +322,6 @@ class LabAndDesigner(QObject):
             self.lab.study = ""
 
     def _put_back(self, side: Side, setting: Setting) -> None:
-        """Put a liquid back into the study that is edited, and go there."""
         if self.designer is not None:
             self.designer.feeling.put_back(side, setting)
 
@@ -339,7 +331,6 @@ class LabAndDesigner(QObject):
             self.designer.editing.results = results
 
     def end(self, patience: Patience) -> None:
-        """End what plays, and let go of the lab's device."""
         if self.playing is not None:
             self.playing.end(patience)
         if self.lab is not None:
@@ -474,7 +465,6 @@ class MainController(QObject):
         self.check_computer()
 
     def check_computer(self) -> None:
-        """Open the check of this computer, and measure."""
         from study_app.app.session.preflight_controller import ComputerCheck  # noqa: PLC0415 - only where it is asked for
 
         screens = QGuiApplication.screens()
@@ -542,7 +532,6 @@ class MainController(QObject):
         return self.help
 
     def show_help(self) -> None:
-        """Go to the page of the documentation that is about the place one is at."""
         here = self.window.here
         self.window.place("help")
         assert self.help is not None  # noqa: S101 - made with its place

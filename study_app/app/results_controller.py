@@ -154,7 +154,6 @@ class ResultsController(QObject):
         self.view = ResultsView(studies=self.view.studies, chosen=folder)
 
     def close(self) -> None:
-        """End the processes at once."""
         self._listening.stop()
         for process in (self.reader, self._writer):
             if process is not None:

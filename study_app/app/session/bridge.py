@@ -171,7 +171,6 @@ class SessionBridge(QObject):
 
     @property
     def paced(self) -> str:
-        """What the participant's frames follow now, in words."""
         return self.frames.paced
 
     def present(self, page: Page) -> None:
@@ -256,7 +255,6 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def _panel_failed(self, name: str, error: Exception) -> None:
-        """Log it and note it; the panel itself says so to the operator."""
         log.error("the panel %r failed and was disabled: %s", name, error, exc_info=error)
         self.record_note(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
 
@@ -436,7 +434,6 @@ class SessionBridge(QObject):
         self._post(EndRequested(self._now(), "withdrawn" if status == "withdrawn" else "aborted", reason))
 
     def tell_of_device(self, line: str) -> None:
-        """Show what the device asks for while it is connected again."""
         if self.reconnection is not None and self.reconnection.under_way:
             self.reconnection.line = line
             self._show()
@@ -481,7 +478,6 @@ class SessionBridge(QObject):
         self._post(ForceStopped(self._now(), "operator"))
 
     def _leave(self) -> None:
-        """Let the windows go, once."""
         if self._gone:
             return
         self._gone = True

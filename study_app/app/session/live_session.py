@@ -293,7 +293,6 @@ class LiveSession(QObject):
             self.note.show_compiled(share)
 
     def _say(self, line: str) -> None:
-        """Tell what the device asks for while it is being opened."""
         if self.settings.sound:
             QApplication.beep()
         if self._progress is not None:

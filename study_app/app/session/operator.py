@@ -43,7 +43,6 @@ class WatchedJournal:
 
     @property
     def fingerprint(self) -> str:
-        """The session's fingerprint; empty until it has ended."""
         return self._store.fingerprint
 
     def check_flushed(self) -> None:
@@ -112,7 +111,6 @@ class OperatorMonitor:
         self.forces = Forces(study.device.force_limit_n) if study.study.blinding == "single" else None
 
     def look(self) -> None:
-        """Take what the servo did since the last look, and where the hand is."""
         self._count_faults()
         samples = self._reader.read()
         self.health.take(samples)
@@ -176,7 +174,6 @@ class Reconnection(QObject):
         return self._job.busy
 
     def begin(self) -> None:
-        """Begin, unless it is under way."""
         if not self._job.busy:
             self.line = "Connecting the device …"
             self._job.run(self._run)

@@ -56,7 +56,6 @@ class PlayedSession(LiveSession):
         return self._shown
 
     def open_windows(self, made: object) -> Iterator[None]:
-        """Open the participant's window alone, and go on without a question."""
         yield from super().open_windows(made)
         assert self.bridge is not None  # noqa: S101 - just made
         self._shown = True
@@ -73,7 +72,6 @@ class PlayedSession(LiveSession):
 
     @property
     def status(self) -> str | None:
-        """How the session ended; None where it did not."""
         return None if self.bridge is None else self.bridge.parts.journal.progress.ended
 
     def stop(self) -> None:

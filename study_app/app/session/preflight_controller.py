@@ -70,7 +70,6 @@ class Appraisal:
 
     @property
     def over(self) -> bool:
-        """Whether there is nothing to wait for any more."""
         return not self._waiting or not self.appraiser.works
 
     def look(self) -> bool:
@@ -295,7 +294,6 @@ class ComputerCheck(QObject):
         self._closed = False
 
     def measure(self) -> None:
-        """Measure, in a thread."""
         self.window.show_measuring()
         self._background.run(self._look)
 

@@ -159,7 +159,6 @@ class ThreadPriority:
         return True
 
     def restore(self) -> None:
-        """Let this thread be one among others again."""
         if sys.platform == "win32":
             _prefer(NORMAL)
         elif sys.platform != "darwin" and self._before is not None:

@@ -229,7 +229,6 @@ class DiagnosisDialog(QDialog):
         self.close_button.setDefault(True)
 
     def examine(self) -> None:
-        """Begin, or begin anew."""
         self._let_go()
         self.report = None
         self._say(PREPARING, "text2", "pulse", "accent")
@@ -282,7 +281,6 @@ class DiagnosisDialog(QDialog):
         self._order(self.rows)
 
     def _show_findings(self, report: Report) -> None:
-        """Show every mode as it was found; what is found stands first."""
         for row, finding in zip(self.rows, report.findings, strict=True):
             row.show_finding(finding)
         self._order([self.rows[finding.number - 1] for finding in report.in_order])

@@ -196,7 +196,6 @@ class Frames(QObject):
         self._arm()
 
     def stop(self) -> None:
-        """Ask for no more."""
         self._timer.stop()
 
     def swapped(self) -> None:

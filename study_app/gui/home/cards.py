@@ -130,7 +130,6 @@ class ResumeBanner(Themed, QWidget):
         self.hide()
 
     def show_interrupted(self, session: Interrupted | None) -> None:
-        """Offer to go on with a session, or nothing."""
         self._shown = session
         self.setVisible(session is not None)
         if session is None:
@@ -371,7 +370,6 @@ class CardGrid(QWidget):
         self._grid.setContentsMargins(0, 0, width, 0)
 
     def event(self, event: QEvent) -> bool:
-        """Tell when cards came that are shown now."""
         done = super().event(event)
         if event.type() == QEvent.Type.LayoutRequest:
             self.laid_out.emit()

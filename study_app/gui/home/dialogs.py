@@ -130,7 +130,6 @@ class RehearsalDialog(QDialog):
                 self._fail(answer.sentence)
 
     def _show_done(self) -> None:
-        """Show how many participants are done, and what was said of the last one."""
         self.progress.setValue(len(self._done))
         counted = f"{len(self._done)} of {self.participants.value}"
         self.said.setText(f"{counted}: {self._done[-1]}" if self._done else f"{counted}: rehearsing …")

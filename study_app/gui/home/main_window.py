@@ -92,7 +92,6 @@ class RailButton(Themed, PressedByEnter):
         self.update()
 
     def say(self, icon: str, word: str, short: str) -> None:
-        """Offer something else from now on."""
         self.icon_name, self.word, self.short = icon, word, short
         self.setAccessibleName(word)
         self.narrow(self._narrow)
@@ -150,7 +149,6 @@ class Rail(Themed, QWidget):
         return made
 
     def mark(self, name: str) -> None:
-        """Show at which place one is."""
         for other, button in self.buttons.items():
             button.here = other == name
 

@@ -310,7 +310,6 @@ class HomePlace(Place):
         dialog.accepted.connect(lambda: self.results_asked.emit(dialog.folder))
 
     def _open_session(self, session: SessionFacts) -> None:
-        """Show a session's page; what changes there is read again."""
         page = SessionPage(self, self.theme, session, open_here)
         page.changed.connect(self.show_sessions)
         self._open(page)

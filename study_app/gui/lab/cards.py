@@ -130,7 +130,6 @@ class CurvePlot(Plot):
         self.apply_theme(LIGHT)
 
     def sizeHint(self) -> QSize:
-        """Return a small size: a plot takes what is left."""
         return QSize(240, 120)
 
     def show_curves(self, t_s: Floats, values: tuple[Floats, ...], limit: float | None = None) -> None:
@@ -608,7 +607,6 @@ class FlowCurvePlot(Plot):
         self.apply_theme(LIGHT)
 
     def sizeHint(self) -> QSize:
-        """Return a small size: a plot takes what is left."""
         return QSize(240, 120)
 
     def show_stresses(self, stresses_pa: tuple[Floats | None, ...]) -> None:

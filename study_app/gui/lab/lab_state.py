@@ -175,7 +175,6 @@ class FormRow:
 
     @property
     def changed(self) -> bool:
-        """Whether it is something else than it was."""
         return self.value != self.preset
 
 

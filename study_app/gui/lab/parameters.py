@@ -166,7 +166,6 @@ class Picker(Choice):
         self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
 
     def show_choices(self, choices: Choices, chosen: str) -> None:
-        """Offer ``choices`` (value, words), of which one is chosen."""
         if choices != self._choices:
             self._choices = choices
             self.clear()
@@ -300,7 +299,6 @@ class ParameterRow(QWidget):
 
     @property
     def refused(self) -> str:
-        """Why what was asked for last cannot be, or nothing."""
         return self._refused
 
     def show_row(self, row: FormRow) -> None:
@@ -317,7 +315,6 @@ class ParameterRow(QWidget):
         self.show_refused("")
 
     def parts(self) -> tuple[QWidget, ...]:
-        """Return what takes the keyboard, in its order."""
         raise NotImplementedError
 
 
@@ -373,7 +370,6 @@ class NumberRow(ParameterRow):
             self.field.setAccessibleDescription(why)
 
     def let_go(self) -> None:
-        """Let go of the knob, too."""
         super().let_go()
         self.slider.let_go()
 
@@ -431,7 +427,6 @@ class ChoiceRow(ParameterRow):
         add_parts(self.line, self.name, (self.choice, 1))
 
     def show_row(self, row: FormRow) -> None:
-        """Show which it is; changed ones are bold with an accent edge."""
         if row.value != self._value:
             self.show_refused("")
         self._value = row.value
@@ -465,7 +460,6 @@ class SwitchRow(ParameterRow):
         add_parts(self.line, self.toggle, STRETCH)
 
     def show_row(self, row: FormRow) -> None:
-        """Show whether it is on; changed ones are bold."""
         if (row.value == ON) != self.toggle.isChecked():
             self.show_refused("")
         self.toggle.setChecked(row.value == ON)

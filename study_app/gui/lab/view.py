@@ -172,7 +172,6 @@ class LabPlace(Place):
 
     @property
     def view(self) -> LabView | None:
-        """What is shown; None before the first."""
         return self._view
 
     def show_view(self, view: LabView) -> None:
@@ -252,7 +251,6 @@ class LabPlace(Place):
             self.tank.let_go()
 
     def wants_narrow_rail(self) -> bool:
-        """Return that it does: parameters, tank and readings stand side by side."""
         return True
 
     def showEvent(self, event: QShowEvent) -> None:

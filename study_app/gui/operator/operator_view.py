@@ -121,7 +121,6 @@ class OperatorView:
 
     @property
     def trials_line(self) -> str:
-        """How far the session is: "2 of 10 trials"."""
         done, of = (sum(counts) for counts in zip(*self.main_trials, strict=True)) if self.main_trials else (0, 0)
         return f"{done} of {of} {'trial' if of == 1 else 'trials'}"
 

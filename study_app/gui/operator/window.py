@@ -243,7 +243,6 @@ class OperatorWindow(QMainWindow):
         self._view = view
 
     def show_traces(self, health: ServoHealth, now_s: float) -> None:
-        """Draw the hand's position (30 times a second)."""
         self.position.show_health(health, now_s)
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
@@ -252,7 +251,6 @@ class OperatorWindow(QMainWindow):
             self.force.show_forces(forces, now_ns)
 
     def show_lateness(self, health: ServoHealth) -> None:
-        """Draw the histogram (twice a second)."""
         self.lateness.show_health(health)
 
     def ask_to_repeat(self) -> None:

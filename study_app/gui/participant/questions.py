@@ -474,7 +474,6 @@ class SliderField(QuestionField):
         self._tell_line()
 
     def show_answer(self, value: Value) -> None:
-        """Put the handle where it was."""
         self.kept(value)
         if isinstance(value, int | float):
             self.line.show_step(round((value - self._slider.least) / self._slider.step))

@@ -302,7 +302,6 @@ class TankWidget(QWidget):
         self.things = self._frame()
 
     def _placed_targets(self, centres_m: tuple[Point, ...]) -> tuple[TargetPlace, ...]:
-        """Return where targets around these centres [m, hand] are drawn."""
         todo = self._page.task
         if self.camera is None or isinstance(todo, Explore):
             return ()
@@ -380,7 +379,6 @@ class TankWidget(QWidget):
             sprites.draw(painter, sprite, ball.middle)
 
     def patch_area(self) -> QRectF:
-        """Return where the photodiode's patch is."""
         return patch_place(self.width(), self.height())
 
     def _paint_patch(self, painter: QPainter, region: QRegion) -> None:

@@ -345,7 +345,6 @@ class ParticipantWindow(QWidget):
         self._ahead.start()
 
     def show_view(self, view: TankView) -> None:
-        """Draw a view in the tank, while it is shown."""
         if self.tank is not None:
             self.tank.show_view(view)
 

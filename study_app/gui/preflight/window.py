@@ -63,7 +63,6 @@ class PreflightView:
 
     @property
     def passed(self) -> str:
-        """How many passed: "8 of 9 passed"."""
         well = len(self.checks) - self.warnings - self.failures
         return f"{well} of {len(self.checks)} passed"
 
@@ -376,7 +375,6 @@ class PreflightWindow(QWidget):
         return tuple(self._values.values())
 
     def _start(self) -> None:
-        """Begin, once."""
         if not self._done and self.start.isEnabled():
             self._done = True
             self.start_asked.emit()

@@ -132,19 +132,16 @@ class ResultsView:
 
     @property
     def kind(self) -> Literal["", "simulated", "pilot"]:
-        """What the chosen study is where it holds no participants' data."""
         return next((study.kind for study in self.studies if study.folder == self.chosen), "")
 
     @property
     def without_sessions(self) -> str:
-        """What stands in place of sessions where none are shown."""
         if self.listed:
             return "No sessions."
         return "" if self.trouble is not None else "Reading the sessions …"
 
     @property
     def can_be_written(self) -> bool:
-        """Whether there is a study that tables and a report can be made of."""
         return self.chosen is not None and bool(self.sessions)
 
 

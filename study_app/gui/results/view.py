@@ -386,7 +386,6 @@ class ResultsPlace(Place):
         self._handed_to = folder
 
     def enter(self) -> None:
-        """Look again at what there is."""
         self.entered.emit()
 
     def leave(self) -> None:
@@ -460,7 +459,6 @@ class ResultsPlace(Place):
         self._open(dialog)
 
     def _open_session(self, session: SessionFacts) -> None:
-        """Show a session's page; what changes there is read again."""
         page = SessionPage(self, self.theme, session, self.open_asked.emit)
         page.changed.connect(self.entered)
         self._open(page)

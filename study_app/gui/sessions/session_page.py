@@ -284,7 +284,6 @@ class Decision(Question):
         self.add_buttons("Cancel", go_on)
 
     def accept(self) -> None:
-        """Go on, or say what is missing and lead there."""
         for field, what in ((self.by, "a name"), (self.reason, "a reason")):
             if not field.text().strip():
                 self.missing.setText(f"Please enter {what}; it is recorded.")
@@ -583,7 +582,6 @@ class SessionPage(QDialog):
         self.read()
 
     def read(self) -> None:
-        """Read the session's folder again."""
         self._reader.run(partial(_result, read_record, self.facts.folder))
 
     def _lay_out(self) -> None:

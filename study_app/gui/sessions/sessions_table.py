@@ -143,7 +143,6 @@ class SessionsTable(QWidget):
 
     @property
     def chosen(self) -> SessionFacts | None:
-        """The session whose row is chosen; None where none is."""
         row = self.table.chosen_row
         return None if row is None else self.model.shown[row]
 

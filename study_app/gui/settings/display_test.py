@@ -318,7 +318,6 @@ class DisplayTest(QWidget):
         return hbox(*fields, (words, 3), spacing=16)
 
     def _foot(self) -> QBoxLayout:
-        """Return the patch's interval and the offset, left of where the patch is."""
         self.why = label("", "label", "bad", wraps=True)
         titles = label("Photodiode's patch", "card"), label("Interval, ms", "label", "text2")
         toggling = vbox(*titles, self.interval, self.why, STRETCH, spacing=6)
@@ -362,7 +361,6 @@ class DisplayTest(QWidget):
         self.offset.show_offset(offset, screen)
 
     def patch_area(self) -> QRect:
-        """Return where the photodiode's patch is."""
         return patch_place(self.width(), self.height()).toAlignedRect()
 
     def _set_interval(self, value: float) -> None:

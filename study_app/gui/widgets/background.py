@@ -67,7 +67,6 @@ class Background(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether something was asked for and has not come."""
         return self._wanted is not None
 
     def run(self, job: Callable[[], Any]) -> None:

@@ -87,7 +87,6 @@ class ActionButton(Themed, PressedByEnter):
             self.setShortcut(key)
 
     def show_action(self, icon: str, text: str) -> None:
-        """Say another action from now on; the key stays."""
         if (icon, text) == (self._icon, self.text()):
             return
         self._icon = icon
@@ -192,7 +191,6 @@ class IconButton(Themed, PressedByEnter):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def minimumSizeHint(self) -> QSize:
-        """Return the square; there are no words to make room for."""
         return self.minimumSize()
 
     def paintEvent(self, event: QPaintEvent) -> None:

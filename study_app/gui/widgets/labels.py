@@ -59,7 +59,6 @@ class Elided(QLabel):
         self.whole = ""
 
     def show_text(self, text: str) -> None:
-        """Show ``text``, as much of it as there is room for."""
         if text != self.whole:
             self.whole = text
             self.setAccessibleName(text)
@@ -111,7 +110,6 @@ class Clamped(QLabel):
         self._cut()
 
     def show_text(self, text: str) -> None:
-        """Show ``text``, as much of it as there is room for."""
         if text != self.whole:
             self.whole = text
             self.setAccessibleName(text)

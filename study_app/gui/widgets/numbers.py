@@ -231,7 +231,6 @@ class Slider(Themed, QSlider):
         self.update()
 
     def step(self, steps: int) -> None:
-        """Go some steps to the right, or to the left where ``steps`` is negative."""
         self._move(self._stepped(steps), held=False)
 
     def sizeHint(self) -> QSize:

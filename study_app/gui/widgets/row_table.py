@@ -111,7 +111,6 @@ class Table(Themed, QTableView):
 
     @property
     def chosen_row(self) -> int | None:
-        """The row that is chosen; None where none is."""
         chosen = self.selectionModel().selectedRows()
         return chosen[0].row() if chosen else None
 

@@ -220,7 +220,6 @@ class QuestionField(QWidget):
 
     @property
     def answer_keys(self) -> str:
-        """The keys that answer it, as they stand on their caps."""
         return self.view.keys
 
     def put(self, answer: QWidget) -> None:
@@ -287,7 +286,6 @@ class QuestionField(QWidget):
             self.answered.emit(value)
 
     def take_back(self) -> None:
-        """Have no answer again."""
         if self.is_answered:
             self.value, self.is_answered = None, False
             self._tell()
@@ -300,7 +298,6 @@ class QuestionField(QWidget):
         self._tell()
 
     def clear(self) -> None:
-        """Show no answer."""
         raise NotImplementedError
 
     def kept(self, value: Value) -> None:
@@ -448,7 +445,6 @@ class OptionLook(Button):
     place = -1
 
     def prepare(self, text: str, name: str, description: str, look: Look = "words") -> None:
-        """Show ``text``; a screen reader says ``name`` and ``description``."""
         self._words = text
         self._look = look
         self._scale = 1.0
@@ -582,7 +578,6 @@ class OptionsField(QuestionField):
     pointed_at = Signal(int)
 
     def hold(self, options: Sequence[OptionLook]) -> None:
-        """Take the options, in the order of their digits."""
         self.options = options
         self._group = QButtonGroup(self, exclusive=not self.several)
         # Not the methods themselves: Qt would forget the role of this widget (`give_role`).
@@ -607,7 +602,6 @@ class OptionsField(QuestionField):
         raise NotImplementedError
 
     def value_at(self, place: int) -> Value:
-        """Return the answer that an option alone is."""
         raise NotImplementedError
 
     def show_answer(self, value: Value) -> None:
@@ -615,7 +609,6 @@ class OptionsField(QuestionField):
         self._check()
 
     def clear(self) -> None:
-        """Show no option as chosen."""
         self._group.setExclusive(False)
         self._check()
         self._group.setExclusive(not self.several)

@@ -236,14 +236,12 @@ class QuestionsPage(PageWidget):
 
     @property
     def asked(self) -> tuple[QuestionField, ...]:
-        """The questions that the answers so far leave shown, on whatever part."""
         answers = {field.view.id: field.value for field in self.fields if field.is_answered}
         names = shown(self._page.items, answers)
         return tuple(field for field in self.fields if field.view.id in names)
 
     @property
     def missing(self) -> tuple[int, ...]:
-        """Numbers of the required questions without an answer."""
         return tuple(field.view.number for field in self.asked if field.view.required and not field.is_answered)
 
     @property
@@ -280,7 +278,6 @@ class QuestionsPage(PageWidget):
         return self.height() - head - higher - self.foot.height()
 
     def focus_first(self) -> None:
-        """Put the keyboard on the first question without an answer."""
         self.go_to(self._first)
 
     @property

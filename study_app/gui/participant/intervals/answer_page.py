@@ -46,7 +46,6 @@ class AnswerPage(PageWidget):
         self._column = vbox(self._progress, (STRETCH, 2), self.question, 36, parent=self)
 
     def lay_out(self, scale: float) -> None:
-        """Write the question as large as words must be read."""
         margin = round((40 if self.width() >= 1100 else 24) * scale)
         self._column.setContentsMargins(margin, round(20 * scale), margin, margin)
         self._progress.set_scale(self.words_scale)
@@ -110,7 +109,6 @@ class ChoiceWidget(AnswerPage):
         add_parts(self._column, row, 28, hbox(STRETCH, self._cap, self._hint, STRETCH), (STRETCH, 3))
 
     def lay_out(self, scale: float) -> None:
-        """Make the buttons as large as they must be at least."""
         super().lay_out(scale)
         for button in self.buttons:
             button.setMinimumSize(*(round(side * scale) for side in CHOICE_BUTTON_PX))
@@ -268,7 +266,6 @@ class NumberWidget(AnswerPage):
         add_parts(self._column, *above, 24, (self.button, 0, CENTRED), (STRETCH, 3))
 
     def lay_out(self, scale: float) -> None:
-        """Make field and keys as large as they must be at least."""
         super().lay_out(scale)
         words = self.words_scale
         self.field.setFixedSize(*(round(side * scale) for side in FIELD_PX))

@@ -110,7 +110,6 @@ class PageWidget(QWidget):
         """Place everything for the present size."""
 
     def focus_first(self) -> None:
-        """Put the keyboard where the page begins."""
         self.setFocus()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

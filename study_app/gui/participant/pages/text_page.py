@@ -277,7 +277,6 @@ class TextWidget(ReadingPage):
 
     @property
     def count(self) -> str:
-        """The words of the count, "" when it is over."""
         return self.count_label.text()
 
     def tick(self) -> None:
@@ -306,7 +305,6 @@ class TextWidget(ReadingPage):
             self.button.setFocus()
 
     def lay_out(self, scale: float) -> None:
-        """Place the count where the button will be."""
         super().lay_out(scale)
         self.count_label.setFont(font("card", scale=self.words_scale * 1.125, weight=500, tabular=True))
         self.count_label.adjustSize()
@@ -462,7 +460,6 @@ class NoticeWidget(ReadingPage):
         super().__init__(column, words, clock, button=button, parent=parent, text_scale=text_scale)
 
     def focus_first(self) -> None:
-        """Put the keyboard on the button, where there is one."""
         (self.button or self).setFocus()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -380,7 +380,6 @@ class VideoLayer:
         self._image = QImage()
 
     def show(self, frame: VideoFrame | None) -> None:
-        """Take the frame of a view; None where there is none yet."""
         if frame is not None and (self._frame is None or frame.pixels is not self._frame.pixels):
             size = frame.width, frame.height
             self._image = QImage(frame.pixels, *size, frame.stride, QImage.Format.Format_RGB32)
