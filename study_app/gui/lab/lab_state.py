@@ -12,10 +12,8 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.haptics.model.effect import Parameter, Value
-from study_app.lab.ab_comparison import Setting, Side, Workbench
+from study_app.lab.ab_comparison import Side, Workbench
 from study_app.lab.live import LimiterCount
-from study_app.lab.parameters import sections
 from study_app.lab.presets import Choice
 from study_app.lab.shadow import Tail
 
@@ -163,35 +161,3 @@ class LabView:
     @property
     def tail(self) -> Tail | None:
         return self.tail_a if self.felt == "A" else self.tail_b
-
-
-@dataclass(frozen=True, slots=True)
-class FormRow:
-    """A parameter as it is, and as it was when the liquid was chosen."""
-
-    parameter: Parameter
-    value: Value
-    preset: Value
-
-    @property
-    def changed(self) -> bool:
-        return self.value != self.preset
-
-
-@dataclass(frozen=True, slots=True)
-class FormSection:
-    """Parameters that stand under one heading."""
-
-    title: str
-    rows: tuple[FormRow, ...]
-
-
-def form(setting: Setting) -> tuple[FormSection, ...]:
-    """Return every parameter of a setting with its value."""
-    return tuple(
-        FormSection(
-            section.title,
-            tuple(FormRow(it, setting.value(it.name), setting.chosen_value(it.name)) for it in section.parameters),
-        )
-        for section in sections(setting.scene)
-    )

@@ -1,10 +1,12 @@
 """The lab's header and the form of a liquid's parameters."""
 
+from dataclasses import dataclass
+
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy, QStackedLayout, QWidget
 
-from study_app.gui.lab.lab_state import SIDES, Choices, FormRow, FormSection, LabView, form
+from study_app.gui.lab.lab_state import SIDES, Choices, LabView
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
@@ -15,7 +17,7 @@ from study_app.gui.widgets.labels import Clamped, label
 from study_app.gui.widgets.numbers import NumberField, Range, Slider, read_number, write_number
 from study_app.haptics.model.effect import Parameter, Value
 from study_app.lab.ab_comparison import Setting, Side, other
-from study_app.lab.parameters import OFF, ON
+from study_app.lab.parameters import OFF, ON, Section, sections
 
 SWITCH_HEIGHT = 44
 WIDEST = 190
@@ -274,6 +276,19 @@ HEIGHT = 36
 SWITCHED = {OFF, ON}
 
 
+@dataclass(frozen=True, slots=True)
+class FormRow:
+    """A parameter as it is, and as it was when the liquid was chosen."""
+
+    parameter: Parameter
+    value: Value
+    preset: Value
+
+    @property
+    def changed(self) -> bool:
+        return self.value != self.preset
+
+
 class ParameterRow(QWidget):
     """What every row has: ``changed(name, value, held)``, and a line below for why something was refused."""
 
@@ -496,9 +511,9 @@ HIDDEN = "Hidden during a blind comparison"
 class SectionBlock(QWidget):
     """A heading with its rows, and how many of them are changed; two switches share a line."""
 
-    def __init__(self, section: FormSection) -> None:
+    def __init__(self, section: Section) -> None:
         super().__init__()
-        self.rows = {row.parameter.name: row_for(row.parameter) for row in section.rows}
+        self.rows = {it.name: row_for(it) for it in section.parameters}
         self.count = label("", "small", "text2")
         head = hbox(label(section.title, "strong", heading=True), STRETCH, self.count)
         cells = grid(8, 2, margins=0)
@@ -513,11 +528,12 @@ class SectionBlock(QWidget):
             cells.addWidget(row, line, 0, 1, 2)
             line += 1
 
-    def show_section(self, section: FormSection) -> None:
-        for row in section.rows:
+    def show_section(self, section: Section, setting: Setting) -> None:
+        found = [FormRow(it, setting.value(it.name), setting.chosen_value(it.name)) for it in section.parameters]
+        for row in found:
             self.rows[row.parameter.name].show_row(row)
-        changed = sum(row.changed for row in section.rows)
-        self.count.setText(f"{changed} of {len(section.rows)} changed" if changed else "")
+        changed = sum(row.changed for row in found)
+        self.count.setText(f"{changed} of {len(found)} changed" if changed else "")
 
 
 class FormPanel(Card):
@@ -579,7 +595,7 @@ class FormPanel(Card):
         if setting != self._setting or bench.presented != self._side:
             refused = self._side != bench.presented
             self._setting, self._side = setting, bench.presented
-            self._show_form(form(setting), forget=refused)
+            self._show_form(setting, forget=refused)
         if view.refused is not self._refused:
             self._refused = view.refused
             name, why = view.refused or ("", "")
@@ -601,22 +617,23 @@ class FormPanel(Card):
         words = f"Copy to {other(bench.presented)}"
         self.copy.show_action("copy", words)
 
-    def _show_form(self, sections: tuple[FormSection, ...], *, forget: bool) -> None:
-        shape = [(section.title, tuple(row.parameter.name for row in section.rows)) for section in sections]
+    def _show_form(self, setting: Setting, *, forget: bool) -> None:
+        found = sections(setting.scene)
+        shape = [(section.title, tuple(it.name for it in section.parameters)) for section in found]
         if shape != [(title, tuple(block.rows)) for title, block in self.blocks.items()]:
-            self._make(sections)
+            self._make(found)
         elif forget:
             for row in self.rows.values():
                 row.let_go()
-        for section in sections:
-            self.blocks[section.title].show_section(section)
+        for section in found:
+            self.blocks[section.title].show_section(section, setting)
 
-    def _make(self, sections: tuple[FormSection, ...]) -> None:
+    def _make(self, found: tuple[Section, ...]) -> None:
         """Make the rows anew; the keyboard stays in the row that has it, and what is read in its place."""
         rows = self.rows.items()
         focused = [(name, at) for name, row in rows for at, part in enumerate(row.parts()) if part.hasFocus()]
         scrolled_px = self.area.verticalScrollBar().value()
-        self.blocks = {section.title: SectionBlock(section) for section in sections}
+        self.blocks = {section.title: SectionBlock(section) for section in found}
         self.rows = {name: row for block in self.blocks.values() for name, row in block.rows.items()}
         for row in self.rows.values():
             row.changed.connect(self.changed)
