@@ -8,7 +8,10 @@ their folder (``haptics.model.effects.EFFECTS``).
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+
+if TYPE_CHECKING:
+    from study_app.haptics.model import gate, scene
 
 Value: TypeAlias = "float | str | None"
 Choices: TypeAlias = tuple[tuple[str, str], ...]
@@ -61,79 +64,10 @@ class Flow(NamedTuple):
     shear_per_s: float
 
 
-class LiquidLike(Protocol):
-    """The part of a ``liquid.Liquid`` that descriptors read; the class itself imports them for their tables."""
-
-    @property
-    def density_kg_m3(self) -> float: ...
-    @property
-    def viscosity_pa_s(self) -> float | None: ...
-    @property
-    def region(self) -> Any: ...
-    def __getattr__(self, name: str) -> Any: ...  # an effect's table
-
-
-class BodyLike(Protocol):
-    """The part of a ``scene.Body`` that descriptors read."""
-
-    @property
-    def diameter_m(self) -> float: ...
-    @property
-    def drag_coefficient(self) -> float: ...
-    @property
-    def volume_m3(self) -> float: ...
-
-
-class SceneLike(Protocol):
-    """The part of a ``scene.Scene`` that descriptors read."""
-
-    @property
-    def scale(self) -> float: ...
-    @property
-    def rate_hz(self) -> float: ...
-    @property
-    def body(self) -> BodyLike: ...
-    @property
-    def velocity(self) -> Any: ...
-    @property
-    def accuracy(self) -> Any: ...
-
-
-class ExtremesLike(Protocol):
-    """The part of the ``bounds.Extremes`` of the motion in one liquid that descriptors read."""
-
-    @property
-    def scene(self) -> SceneLike: ...
-    @property
-    def liquid(self) -> LiquidLike: ...
-    @property
-    def has_top(self) -> bool: ...
-    @property
-    def depth_m(self) -> tuple[float, float]: ...
-    @property
-    def relative_mps(self) -> float: ...
-    @property
-    def speed_mps(self) -> float: ...
-    @property
-    def acceleration_mps2(self) -> float: ...
-    @property
-    def flow(self) -> Flow: ...
-    @property
-    def reynolds(self) -> float: ...
-    @property
-    def radius_m(self) -> float: ...
-    @property
-    def volume_m3(self) -> float: ...
-    @property
-    def lift_n(self) -> float: ...
-    @property
-    def weight_n(self) -> float: ...
-    def drag_by_flow_n(self, flow_mps: float) -> float: ...
-    def inertial_n(self, accelerated_n: Callable[[Any, float, float], float]) -> float: ...
-    def sheared_n(self) -> float: ...
-    def total_n(self, extent: str) -> float: ...
-    def submerged(self, depth_m: float) -> float: ...
-    def doubtful_shares(self) -> tuple[float, float]: ...
+Liquid: TypeAlias = "scene.Liquid"
+Scene: TypeAlias = "scene.Scene"
+Extremes: TypeAlias = "gate.Extremes"
+"""Of modules that import the descriptors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,11 +80,11 @@ class Rows:
 
     words: str
     arrays: Mapping[str, Fields]
-    needed: Callable[[LiquidLike, float], int]
+    needed: Callable[[Liquid, float], int]
     most: Callable[[float], int] | None = None
 
 
-def _nothing_to_fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
+def _nothing_to_fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
     """Write nothing: the effect has no parameters."""
 
 
@@ -228,16 +162,16 @@ class Effect:
     name: str
     label: str
     bit: int
-    bound_n: Callable[[ExtremesLike], float | None]
-    exerted_n: Callable[[ExtremesLike], float | None] | None = None
+    bound_n: Callable[[Extremes], float | None]
+    exerted_n: Callable[[Extremes], float | None] | None = None
     extent: Literal["area", "volume", ""] = ""
-    accelerated_n: Callable[[ExtremesLike, float, float], float] | None = None
+    accelerated_n: Callable[[Extremes, float, float], float] | None = None
     flow: Callable[[Any], Flow] | None = None
     format: int = 1
     automatic: bool = True
-    bars: Callable[[ExtremesLike], tuple[tuple[str, ...], str]] | None = None
-    choose: Callable[[ExtremesLike], tuple[Any, str]] | None = None
-    note: Callable[[LiquidLike], str] | None = None
+    bars: Callable[[Extremes], tuple[tuple[str, ...], str]] | None = None
+    choose: Callable[[Extremes], tuple[Any, str]] | None = None
+    note: Callable[[Liquid], str] | None = None
     model: Any = None
     default: Any = None
     missing: str = ""
@@ -247,13 +181,13 @@ class Effect:
     problem: Callable[[Any], str | None] | None = None
     parameters: Fields | None = None
     state: Fields | None = None
-    fill: Callable[[Any, LiquidLike, SceneLike, Mapping[str, int]], None] = _nothing_to_fill
+    fill: Callable[[Any, Liquid, Scene, Mapping[str, int]], None] = _nothing_to_fill
     rows: tuple[Rows, ...] = ()
     damping_nspm: Callable[[Any, float], float] | None = None
     adjustable: bool = True
     controls: tuple[Parameter, ...] = ()
     with_liquid: bool = False
-    open_values: Mapping[str, Callable[[SceneLike], float]] = field(default_factory=dict)
+    open_values: Mapping[str, Callable[[Scene], float]] = field(default_factory=dict)
     start: Callable[[str, tuple[float, float, float], float], Mapping[str, Any]] | None = None
     thresholds: tuple[str, ...] = ()
 

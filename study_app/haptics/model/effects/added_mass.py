@@ -9,11 +9,11 @@ from pydantic import Field
 from study_app.haptics.model.effect import (
     FLOAT,
     Effect,
-    ExtremesLike,
+    Extremes,
     Fields,
-    LiquidLike,
+    Liquid,
     Parameter,
-    SceneLike,
+    Scene,
     rate_per_s,
     smoothing_s,
 )
@@ -36,19 +36,19 @@ class AddedMass(Frozen):
     )
 
 
-def _accelerated_n(extremes: ExtremesLike, acceleration_mps2: float, change_mps: float) -> float:
+def _accelerated_n(extremes: Extremes, acceleration_mps2: float, change_mps: float) -> float:
     """Return C_a ρ V a."""
     liquid = extremes.liquid
     mass_kg = float(liquid.added_mass.coefficient * liquid.density_kg_m3 * extremes.volume_m3)
     return mass_kg * acceleration_mps2
 
 
-def _bound_n(extremes: ExtremesLike) -> float:
+def _bound_n(extremes: Extremes) -> float:
     """Return C_a ρ V (a + s v), s the shear of the current."""
     return extremes.inertial_n(_accelerated_n)
 
 
-def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
     mass = liquid.added_mass
     record.mass_kg = mass.coefficient * liquid.density_kg_m3 * scene.body.volume_m3
     record.filter_per_s = rate_per_s(smoothing_s(scene.velocity, mass.filter_s, SMOOTHING_S))

@@ -3,17 +3,17 @@
 from collections.abc import Mapping
 from typing import Any
 
-from study_app.haptics.model.effect import FLOAT, GRAVITY_MPS2, Effect, ExtremesLike, Fields, LiquidLike, SceneLike
+from study_app.haptics.model.effect import FLOAT, GRAVITY_MPS2, Effect, Extremes, Fields, Liquid, Scene
 
 BIT = 1 << 4
 
 
-def _bound_n(extremes: ExtremesLike) -> float:
+def _bound_n(extremes: Extremes) -> float:
     """Return g |ρ V_sub − ρ_body V|, at the worse end of the depth range."""
     return max(abs(extremes.lift_n * extremes.submerged(depth) - extremes.weight_n) for depth in extremes.depth_m)
 
 
-def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
     record.lift_n = liquid.density_kg_m3 * scene.body.volume_m3 * GRAVITY_MPS2
 
 

@@ -7,17 +7,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 from pydantic import Field
 
 from study_app.haptics.model import ranges
-from study_app.haptics.model.effect import (
-    FLOAT,
-    INT,
-    Effect,
-    ExtremesLike,
-    Fields,
-    Flow,
-    LiquidLike,
-    Parameter,
-    SceneLike,
-)
+from study_app.haptics.model.effect import FLOAT, INT, Effect, Extremes, Fields, Flow, Liquid, Parameter, Scene
 from study_app.haptics.model.ranges import Extent, Frozen, Metres, within
 
 BIT = 1 << 3
@@ -76,7 +66,7 @@ def flow(current: Current) -> Flow:
     raise TypeError(f"no bound is known for a current of kind {current!r}")
 
 
-def _bound_n(extremes: ExtremesLike) -> float | None:
+def _bound_n(extremes: Extremes) -> float | None:
     """Return F(v + u) − F(v) at its greatest speed u, and what inertial effects make of its shear s.
 
     To the ball that moves through it the liquid changes its velocity by up to u, at up to s v.
@@ -96,7 +86,7 @@ def _start(kind: str, centre_m: tuple[float, float, float], reach_m: float) -> M
     return {"kind": kind, **begun[kind]}
 
 
-def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
     current: Current = liquid.current
     if isinstance(current, Uniform):
         record.kind = CURRENT_UNIFORM

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
-from study_app.haptics.model.effect import FLOAT, INT, Effect, ExtremesLike, Fields, LiquidLike, Parameter, SceneLike
+from study_app.haptics.model.effect import FLOAT, INT, Effect, Extremes, Fields, Liquid, Parameter, Scene
 from study_app.haptics.model.laws import LAWS, Law, drag_n
 from study_app.haptics.model.ranges import Frozen, later, within
 
@@ -64,7 +64,7 @@ class Drag(Frozen):
         return self
 
 
-def resistance_n(scene: SceneLike, liquid: LiquidLike, relative_mps: float, law: Law | None = None) -> float:
+def resistance_n(scene: Scene, liquid: Liquid, relative_mps: float, law: Law | None = None) -> float:
     """Return the size of the drag [N] on the scene's body at a relative speed; by default by the most accurate law.
 
     A damper always uses its own law.
@@ -81,7 +81,7 @@ def resistance_n(scene: SceneLike, liquid: LiquidLike, relative_mps: float, law:
     )
 
 
-def cheapest_law(extremes: ExtremesLike) -> Law:
+def cheapest_law(extremes: Extremes) -> Law:
     """Return the cheapest law of drag within the accuracy target of the reference law, at every speed of the motion."""
     if extremes.liquid.viscosity_pa_s is None:
         return "constant"
@@ -89,7 +89,7 @@ def cheapest_law(extremes: ExtremesLike) -> Law:
     return next((law for law in candidates if _is_true_enough(extremes, law)), REFERENCE)
 
 
-def _is_true_enough(extremes: ExtremesLike, law: Law) -> bool:
+def _is_true_enough(extremes: Extremes, law: Law) -> bool:
     """Return whether a law stays within the accuracy target of the reference law's force at each speed."""
     scene, liquid = extremes.scene, extremes.liquid
     for k in range(1, _SPEEDS + 1):
@@ -101,7 +101,7 @@ def _is_true_enough(extremes: ExtremesLike, law: Law) -> bool:
     return True
 
 
-def _choose(extremes: ExtremesLike) -> tuple[Drag, str]:
+def _choose(extremes: Extremes) -> tuple[Drag, str]:
     if extremes.liquid.drag.law == "linear":
         return extremes.liquid.drag, "law linear, as the file says"
     law, accuracy = cheapest_law(extremes), extremes.scene.accuracy
@@ -112,13 +112,13 @@ def _choose(extremes: ExtremesLike) -> tuple[Drag, str]:
     return Drag(law=law), f"law {law}, within {100 * accuracy.relative:g} % or {accuracy.absolute_n:g} N of {REFERENCE}"
 
 
-def _problem(liquid: LiquidLike) -> str | None:
+def _problem(liquid: Liquid) -> str | None:
     if liquid.drag.law not in {"constant", "linear"} and liquid.viscosity_pa_s is None:
         return f'the drag law "{liquid.drag.law}" needs the liquid\'s viscosity_pa_s'
     return None
 
 
-def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
     body = scene.body
     record.law = _LAWS[liquid.drag.law]
     record.factor_kg_m = 0.5 * liquid.density_kg_m3 * body.drag_coefficient * math.pi / 4 * body.diameter_m**2
@@ -129,12 +129,12 @@ def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str,
         record.reynolds_spm = liquid.density_kg_m3 * body.diameter_m / liquid.viscosity_pa_s
 
 
-def _bound_n(extremes: ExtremesLike) -> float:
+def _bound_n(extremes: Extremes) -> float:
     """Return F(v), by the reference law where the liquid has a viscosity."""
     return resistance_n(extremes.scene, extremes.liquid, extremes.speed_mps)
 
 
-def _exerted_n(extremes: ExtremesLike) -> float:
+def _exerted_n(extremes: Extremes) -> float:
     """Return the drag by the liquid's own law, of a body moving against the selected current."""
     return resistance_n(extremes.scene, extremes.liquid, extremes.relative_mps, extremes.liquid.drag.law)
 

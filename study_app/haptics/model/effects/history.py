@@ -10,12 +10,12 @@ from study_app.haptics.model.effect import (
     FLOAT,
     INT,
     Effect,
-    ExtremesLike,
+    Extremes,
     Fields,
-    LiquidLike,
+    Liquid,
     Parameter,
     Rows,
-    SceneLike,
+    Scene,
     rate_per_s,
     smoothing_s,
 )
@@ -49,7 +49,7 @@ class History(Frozen):
     )
 
 
-def _accelerated_n(extremes: ExtremesLike, acceleration_mps2: float, change_mps: float) -> float:
+def _accelerated_n(extremes: Extremes, acceleration_mps2: float, change_mps: float) -> float:
     """Return 12 R² √(2π ρ µ a v).
 
     The Basset integral for a body that moved at −v and reversed to v at a, the greatest of any motion in the box.
@@ -59,12 +59,12 @@ def _accelerated_n(extremes: ExtremesLike, acceleration_mps2: float, change_mps:
     return per_root * math.sqrt(acceleration_mps2 * change_mps)
 
 
-def _bound_n(extremes: ExtremesLike) -> float | None:
+def _bound_n(extremes: Extremes) -> float | None:
     """Return H(a, v) + H(s v, u) with H of `_accelerated_n`, s the shear of the current and u its speed."""
     return None if extremes.liquid.viscosity_pa_s is None else extremes.inertial_n(_accelerated_n)
 
 
-def _problem(liquid: LiquidLike) -> str | None:
+def _problem(liquid: Liquid) -> str | None:
     return 'the effect "history" needs the liquid\'s viscosity_pa_s' if liquid.viscosity_pa_s is None else None
 
 
@@ -73,7 +73,7 @@ def _intervals(window_s: float, rate_hz: float) -> int:
     return math.ceil(window_s * rate_hz) + 4
 
 
-def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
     history = liquid.history
     record.row = first["intervals"]
     record.rows = _intervals(history.window_s, scene.rate_hz)

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from study_app.haptics.model.effect import FLOAT, INT, Effect, Fields, LiquidLike, Parameter, Rows, SceneLike
+from study_app.haptics.model.effect import FLOAT, INT, Effect, Fields, Liquid, Parameter, Rows, Scene
 from study_app.haptics.model.effects.wake import fill_tail, start_tail, tail_bound_n, within_scaling
 from study_app.haptics.model.ranges import Decay, Exponent, Extent, Frozen, TailLength, TailScaling, within
 
@@ -39,7 +39,7 @@ class LocalWake(Frozen):
         return within_scaling(self)
 
 
-def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
     wake, diameter_m = liquid.local_wake, scene.body.diameter_m
     fill_tail(record, wake, scene.rate_hz, first["cells"])
     record.cell_m = diameter_m

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from study_app.haptics.model import laws
-from study_app.haptics.model.effect import FLOAT, INT, Effect, ExtremesLike, Fields, LiquidLike, Parameter, SceneLike
+from study_app.haptics.model.effect import FLOAT, INT, Effect, Extremes, Fields, Liquid, Parameter, Scene
 
 BIT = 1 << 9
 
@@ -35,22 +35,20 @@ _START: Final[dict[str, dict[str, float]]] = {
 _NOT_MODELLED: Final = "not modelled: thixotropy, impact, fracture, yielding by unsteady flow"
 
 
-def steady_n(
-    scene: SceneLike, liquid: LiquidLike, speed_mps: float, steepest_nspm: float = math.inf
-) -> tuple[float, float]:
+def steady_n(scene: Scene, liquid: Liquid, speed_mps: float, steepest_nspm: float = math.inf) -> tuple[float, float]:
     """Return the force [N] in uniform motion: that of the yield stress, and the viscous part."""
     diameter_m = scene.body.diameter_m
     return laws.even_n(liquid.non_newtonian, liquid.density_kg_m3, diameter_m, speed_mps, steepest_nspm)
 
 
-def _bound_n(extremes: ExtremesLike) -> float | None:
+def _bound_n(extremes: Extremes) -> float | None:
     """Return F(v) of uniform motion."""
     if extremes.liquid.non_newtonian is None:
         return None
     return sum(steady_n(extremes.scene, extremes.liquid, extremes.speed_mps)) if extremes.speed_mps > 0 else 0.0
 
 
-def _exerted_n(extremes: ExtremesLike) -> float | None:
+def _exerted_n(extremes: Extremes) -> float | None:
     """Return the force of a body moving against the selected current; strokes shorter than λ build up less stress."""
     rheology = extremes.liquid.non_newtonian
     if rheology is None:
@@ -61,7 +59,7 @@ def _exerted_n(extremes: ExtremesLike) -> float | None:
     return even_motion_n / math.hypot(1.0, rheology.relaxation_time_s * extremes.acceleration_mps2 / extremes.speed_mps)
 
 
-def _problem(liquid: LiquidLike) -> str | None:
+def _problem(liquid: Liquid) -> str | None:
     if liquid.viscosity_pa_s is None:
         return None
     return (
@@ -69,7 +67,7 @@ def _problem(liquid: LiquidLike) -> str | None:
     )
 
 
-def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
     rheology, diameter_m = liquid.non_newtonian, scene.body.diameter_m
     record.inertia_kg_m = 3 * math.pi * liquid.density_kg_m3 * diameter_m**2
     if isinstance(rheology, laws.HerschelBulkley):

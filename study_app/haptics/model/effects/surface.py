@@ -1,11 +1,11 @@
 """Surface: the submerged share of the ball, for the effects that depend on it."""
 
-from study_app.haptics.model.effect import FLOAT, Effect, ExtremesLike, Fields, LiquidLike
+from study_app.haptics.model.effect import FLOAT, Effect, Extremes, Fields, Liquid
 
 BIT = 1 << 5
 
 
-def _bound_n(extremes: ExtremesLike) -> float | None:
+def _bound_n(extremes: Extremes) -> float | None:
     """Return the sum of the other effects if the centre can cross the surface: without it the ball is in or out."""
     if not extremes.has_top:
         return None
@@ -13,7 +13,7 @@ def _bound_n(extremes: ExtremesLike) -> float | None:
     return area * extremes.total_n("area") + volume * (extremes.total_n("volume") + extremes.lift_n)
 
 
-def _problem(liquid: LiquidLike) -> str | None:
+def _problem(liquid: Liquid) -> str | None:
     if liquid.region.kind == "everywhere":
         return 'the effect "surface" needs a region with a top: a box or a cylinder'
     return None

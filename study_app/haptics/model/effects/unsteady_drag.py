@@ -4,16 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from study_app.haptics.model.effect import (
-    FLOAT,
-    Effect,
-    ExtremesLike,
-    Fields,
-    LiquidLike,
-    SceneLike,
-    rate_per_s,
-    smoothing_s,
-)
+from study_app.haptics.model.effect import FLOAT, Effect, Extremes, Fields, Liquid, Scene, rate_per_s, smoothing_s
 from study_app.haptics.model.effects import added_mass, drag, history
 from study_app.haptics.model.laws import finite_reynolds
 
@@ -28,7 +19,7 @@ HIGHEST_REYNOLDS: Final = 1000.0
 _IN_PLACE_OF: Final = (drag.EFFECT, added_mass.EFFECT, history.EFFECT)
 
 
-def even_n(scene: SceneLike, liquid: LiquidLike, speed_mps: float) -> tuple[float, float]:
+def even_n(scene: Scene, liquid: Liquid, speed_mps: float) -> tuple[float, float]:
     """Return the force [N] in uniform motion, and its Stokes part, which acts at once."""
     viscosity_pa_s = liquid.viscosity_pa_s or 0.0
     stokes_n = 3 * math.pi * viscosity_pa_s * scene.body.diameter_m * speed_mps
@@ -36,14 +27,14 @@ def even_n(scene: SceneLike, liquid: LiquidLike, speed_mps: float) -> tuple[floa
     return stokes_n * finite_reynolds(reynolds), stokes_n
 
 
-def _bound_n(extremes: ExtremesLike) -> float | None:
+def _bound_n(extremes: Extremes) -> float | None:
     """Return the sum of the bounds of the effects that it replaces."""
     if extremes.liquid.viscosity_pa_s is None or extremes.liquid.drag.law == "linear":
         return None
     return sum(effect.bound_n(extremes) or 0.0 for effect in _IN_PLACE_OF)
 
 
-def _bars(extremes: ExtremesLike) -> tuple[tuple[str, ...], str]:
+def _bars(extremes: Extremes) -> tuple[tuple[str, ...], str]:
     """Bar the effects it replaces if the Reynolds number permits it; else itself, and the history of creeping flow."""
     reynolds = f"Re is up to {extremes.reynolds:.3g}"
     if extremes.reynolds <= HIGHEST_REYNOLDS:
@@ -53,11 +44,11 @@ def _bars(extremes: ExtremesLike) -> tuple[tuple[str, ...], str]:
     return ("unsteady_drag", "history"), f"{reynolds}, over {HIGHEST_REYNOLDS:g}: no solution of the flow confirms it"
 
 
-def _problem(liquid: LiquidLike) -> str | None:
+def _problem(liquid: Liquid) -> str | None:
     return 'the effect "unsteady_drag" needs the liquid\'s viscosity_pa_s' if liquid.viscosity_pa_s is None else None
 
 
-def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
     diameter_m, viscosity_pa_s = scene.body.diameter_m, liquid.viscosity_pa_s or 0.0
     record.stokes_nspm = 3 * math.pi * viscosity_pa_s * diameter_m
     record.reynolds_spm = liquid.density_kg_m3 * diameter_m / viscosity_pa_s

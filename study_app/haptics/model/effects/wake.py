@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -11,14 +11,17 @@ from study_app.haptics.model.effect import (
     INT,
     TAIL_RATE_HZ,
     Effect,
-    ExtremesLike,
+    Extremes,
     Fields,
-    LiquidLike,
+    Liquid,
     Parameter,
     Rows,
-    SceneLike,
+    Scene,
 )
 from study_app.haptics.model.ranges import Decay, Exponent, Frozen, TailLength, TailScaling, within
+
+if TYPE_CHECKING:
+    from study_app.haptics.model.effects import local_wake
 
 BIT = 1 << 1
 
@@ -63,21 +66,7 @@ class Wake(Frozen):
         return within_scaling(self)
 
 
-class Tail(Protocol):
-    """Common parameters of both wakes."""
-
-    @property
-    def length(self) -> int: ...
-    @property
-    def scaling(self) -> float: ...
-    @property
-    def exponent(self) -> float: ...
-    @property
-    def decay(self) -> float: ...
-    @property
-    def axes(self) -> str: ...
-
-
+Tail: TypeAlias = "Wake | local_wake.LocalWake"
 W = TypeVar("W", bound=Tail)
 
 
@@ -106,7 +95,7 @@ def fill_tail(record: Any, wake: Tail, rate_hz: float, row: int) -> None:
     record.vertical = 1.0 if wake.axes == "xyz" else 0.0
 
 
-def tail_bound_n(extremes: ExtremesLike, wake: Tail | None) -> float | None:
+def tail_bound_n(extremes: Extremes, wake: "Tail | None") -> float | None:
     """Return F(v + u) − F(v), with u = v (N/S)^y the greatest speed of the wake.
 
     The laws are convex, so this exceeds the force that a wake removes.
@@ -121,7 +110,7 @@ def start_tail(kind: str, centre_m: tuple[float, float, float], reach_m: float) 
     return {"length": 1700, "scaling": 1700.0}
 
 
-def _fill(record: Any, liquid: LiquidLike, scene: SceneLike, first: Mapping[str, int]) -> None:
+def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:
     wake = liquid.wake
     fill_tail(record, wake, scene.rate_hz, first["elements"])
     record.breaking_cosine = math.cos(math.radians(wake.breaking_angle_deg))
