@@ -89,7 +89,7 @@ class WorkstationController(QObject):
         place = self.place = MachinePlace()
         place.changed.connect(self.change)
         place.offset_measured.connect(self.measured)
-        place.undo.clicked.connect(self.undo)
+        place.undo_asked.connect(self.undo)
         self._show()
         return place
 
@@ -475,7 +475,7 @@ class MainController(QObject):
 
     def _machine(self) -> MachinePlace:
         made = self.machine.make_place()
-        made.check.clicked.connect(self.check_computer)
+        made.check_asked.connect(self.check_computer)
         return made
 
     def _home(self) -> HomePlace:

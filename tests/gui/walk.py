@@ -85,7 +85,7 @@ def misnamed(window: QWidget) -> list[str]:
     found = []
     for shown in window.findChildren(QLabel):
         part = shown.buddy()
-        if part is not None and shown.isVisible() and not part.accessibleName().startswith(shown.text()):
+        if part is not None and shown.isVisible() and shown.text() not in part.accessibleName():
             found.append(f"{shown.text()!r}: {part.accessibleName()!r}")
     return found
 

@@ -154,12 +154,14 @@ class MachinePlace(Place):
     """What is set, under headings.
 
     ``changed(values)`` carries new values by their names in `MachineSettings`; ``offset_measured(mean [ms], spread
-    [ms], how, screen)`` what a photodiode said of a screen; ``undo`` takes the last change back;
-    ``check`` opens the check of this computer.
+    [ms], how, screen)`` what a photodiode said of a screen; ``undo_asked`` takes the last change back;
+    ``check_asked`` opens the check of this computer.
     """
 
     changed = Signal(dict)
     offset_measured = Signal(float, float, str, str)
+    undo_asked = Signal()
+    check_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -194,6 +196,8 @@ class MachinePlace(Place):
         self.devices.clicked.connect(lambda: self.go_asked.emit("devices"))
         self.change.clicked.connect(self._choose_folder)
         self._save_offset_of(self.offset)
+        self.undo.clicked.connect(self.undo_asked)
+        self.check.clicked.connect(self.check_asked)
         QShortcut(QKeySequence.StandardKey.Undo, self, self.undo.click, context=Qt.ShortcutContext.WindowShortcut)
 
     def _lay_out(self) -> None:
