@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from study_app.protocol.load import load
+from study_app.protocol.simulated import TrialFeatures
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.session.simulated.rehearsal import ConditionFeatures, TrialFeatures
+from study_app.session.simulated.rehearsal import ConditionFeatures
 
 
 def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:

@@ -595,6 +595,6 @@ class MainController(QObject):
 
 
 def _draft_words() -> DraftWords:
-    from study_app.designer.versions import draft_words  # noqa: PLC0415 - only where there is a draft
+    from study_app.designer.versions import version_rows  # noqa: PLC0415 - only where there is a draft
 
-    return draft_words
+    return version_rows

@@ -23,7 +23,8 @@ from study_app.analysis.results import BlockResult, Results
 from study_app.analysis.statistics.outcome import DRAWS, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import friedman, paired
 from study_app.errors import AnalysisError
-from study_app.protocol.load import parse, source_bytes
+from study_app.protocol.load import parse
+from study_app.protocol.source.files import source_bytes
 from tests.analysis.conftest import Answer, make_results, twelve
 from tests.analysis.conftest import Results as Folder
 

@@ -16,7 +16,8 @@ from study_app import app
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.protocol.load import parse, source_bytes
+from study_app.protocol.load import parse
+from study_app.protocol.source.files import source_bytes
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import check_can_go_on

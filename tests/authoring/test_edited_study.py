@@ -9,7 +9,8 @@ from study_app.designer.document.study import History, read
 from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset
 from study_app.designer.document.toml_text import Refused
 from study_app.errors import ProtocolError
-from study_app.protocol.load import load, parse, shipped
+from study_app.protocol.load import load, parse
+from study_app.protocol.source.files import shipped
 from tests.authoring.grown import PROTOCOLS
 
 DEMO = read((PROTOCOLS / "demo.toml").read_bytes())

@@ -10,8 +10,9 @@ from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.new_study.new_study import template
 from study_app.protocol.describe import describe
-from study_app.protocol.load import load, shipped
+from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
+from study_app.protocol.source.files import shipped
 from study_app.protocol.trials.presented_levels import levels
 from tests.authoring.grown import PROTOCOLS
 from tests.protocol.faulty_protocols import CASES, Case

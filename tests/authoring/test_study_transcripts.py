@@ -12,11 +12,7 @@ from study_app.designer.document.fields import Row, row_at, rows
 from study_app.designer.document.fragments import copied
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.outline.addable import addable
-from study_app.designer.document.series import number_rows
-from study_app.designer.document.writer.refused import Refused
 from study_app.designer.outline.add_list import addable
-from study_app.designer.place.edit_steps import Steps
 from study_app.designer.place.requests import (
     AddElement,
     AddEntry,

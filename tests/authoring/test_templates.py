@@ -11,8 +11,6 @@ from study_app.cli import commands
 from study_app.designer.document.fields import row_at
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.new_study.known_answers import known_answers, simulated
-from study_app.designer.document.writer.refused import Refused
 from study_app.designer.new_study.new_study import Answers, answered, copy_of, template
 from study_app.designer.new_study.template_choices import KnownAnswer, known_answers
 from study_app.designer.new_study.templates import FOLDER, QUESTIONS, templates

@@ -13,7 +13,8 @@ from click.testing import CliRunner
 
 from study_app.cli import commands, main
 from study_app.cli.options import GROUPS
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import load
+from study_app.protocol.source.files import source_bytes
 from study_app.session import replay
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import load as load_settings

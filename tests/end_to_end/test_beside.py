@@ -12,8 +12,9 @@ from PySide6.QtCore import Qt
 from study_app.analysis.report.write_report import report
 from study_app.app.main_controller import MainController
 from study_app.gui.home.view import HomePlace
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.source.files import source_bytes
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.session.simulated.answers_only import DEVICE, Answering, SimulatedTime
 from study_app.session.transitions.table import open_session

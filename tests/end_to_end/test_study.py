@@ -13,9 +13,10 @@ from typing import Any
 import pytest
 
 from study_app.errors import StoreError
-from study_app.protocol.load import load, shipped
+from study_app.protocol.load import load
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import build_schedule, stream
+from study_app.protocol.source.files import shipped
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import open_or_draw_key, opened, read_key

@@ -12,7 +12,7 @@ from study_app.cli.options import keep_offered_workspace
 from study_app.errors import StoreError
 from study_app.gui.home.study_facts import sources, study_facts
 from study_app.protocol.load import load as load_protocol
-from study_app.protocol.load import source_bytes
+from study_app.protocol.source.files import source_bytes
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import keep_workspace, load, recent_protocols, remember_protocol
 from study_app.user_folder import settings_file

@@ -22,9 +22,10 @@ from PySide6.QtWidgets import QApplication, QWidget
 from study_app.gui.operator.operator_view import OperatorView, Session, operator_view, stages
 from study_app.gui.operator.servo_health import ServoHealth
 from study_app.protocol.load import parse
-from study_app.protocol.model import Explore, Protocol
+from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.source.files import source_bytes
+from study_app.protocol.trials.tasks import Explore
 from study_app.protocol.wording.without_force import without_force
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.transitions.events import (

@@ -17,8 +17,9 @@ from study_app.evidence.expected_error import error_report, expected
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.estimators import Ewma, Given, Kalman, Raw
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, Ewma, Given, Kalman, Liquid, MotionBox, Raw, Scene
+from study_app.haptics.model.scene import Box, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.load import load, load_scenes
 from study_app.protocol.trials.tasks import Explore, Reach, Stroke

@@ -5,8 +5,9 @@ import pytest
 
 from study_app.evidence.reference_model import respond, wakes
 from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.estimators import Given
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Given, Liquid, Scene
+from study_app.haptics.model.scene import Liquid, Scene
 
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 

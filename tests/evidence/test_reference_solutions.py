@@ -11,8 +11,9 @@ from study_app.evidence import reference_solutions
 from study_app.evidence.reference_model import respond, wakes
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.estimators import Given
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Given, Liquid, MotionBox, Scene
+from study_app.haptics.model.scene import Liquid, MotionBox, Scene
 
 HONEY = Liquid(id="honey", density_kg_m3=1420, viscosity_pa_s=10)
 BOX = MotionBox(speed_mps=0.6, acceleration_mps2=6)

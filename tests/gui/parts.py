@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from study_app.designer.outline.card import OutlineCard
 from study_app.designer.outline.outline_rows import OutlineRow
 from study_app.gui.help.view import PageReader
-from study_app.gui.lab.view import EstimateCard
+from study_app.gui.lab.cards import EstimateCard
 from study_app.gui.settings.view import ScreenNumber
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme

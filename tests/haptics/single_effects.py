@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from study_app.haptics.model.effects import EFFECTS
-from study_app.haptics.model.estimators import ESTIMATORS
+from study_app.haptics.model.estimators import ESTIMATORS, Given
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Body, Cylinder, Given, Liquid, MotionBox, Scene
+from study_app.haptics.model.scene import Body, Cylinder, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.offline import simulate
 from study_app.lab.parameters import changed
 from tests.haptics.scenes import UNBENT, vectors

@@ -7,9 +7,11 @@ import pytest
 from study_app.errors import StudyError
 from study_app.haptics.model.effects.current import Channel
 from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.scene import Given, Liquid, Scene
+from study_app.haptics.model.estimators import Given
+from study_app.haptics.model.scene import Liquid, Scene
 from study_app.lab.parameters import changed, parameter, sections, value_of
-from study_app.protocol.load import load_scenes, shipped
+from study_app.protocol.load import load_scenes
+from study_app.protocol.source.files import shipped
 
 SCENES = {f"{file}/{name}": scene for file in shipped() for name, scene in load_scenes(file).items()}
 

@@ -7,11 +7,13 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.errors import StoreError
-from study_app.haptics.model.scene import Ewma, Kalman, Scene
+from study_app.haptics.model.estimators import Ewma, Kalman
+from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting
 from study_app.lab.parameters import changed
 from study_app.lab.presets import Choice, liquids_at_hand, preset_text, save
-from study_app.protocol.load import load_scene, load_scenes, shipped
+from study_app.protocol.load import load_scene, load_scenes
+from study_app.protocol.source.files import shipped
 
 EDITS = (
     ("effects.current", "on"),

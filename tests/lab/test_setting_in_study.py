@@ -9,7 +9,8 @@ from study_app.errors import StoreError
 from study_app.lab.ab_comparison import Setting
 from study_app.lab.parameters import changed
 from study_app.lab.presets import Choice, preset_text, save, use_in_study
-from study_app.protocol.load import load, load_scene, source_bytes
+from study_app.protocol.load import load, load_scene
+from study_app.protocol.source.files import source_bytes
 
 
 @pytest.fixture

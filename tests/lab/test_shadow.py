@@ -7,8 +7,9 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
+from study_app.haptics.model.estimators import Kalman
 from study_app.haptics.model.layout import SAMPLE, records
-from study_app.haptics.model.scene import Kalman, Scene
+from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.parameters import changed
 from study_app.lab.shadow import Shadow

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 from study_app.errors import ProtocolError
 from study_app.protocol.describe import describe
-from study_app.protocol.load import parse, source_bytes
+from study_app.protocol.load import parse
+from study_app.protocol.source.files import source_bytes
 
 STUDIES = Path(__file__).parent / "studies"
 CASES = Path(__file__).parent / "cases"

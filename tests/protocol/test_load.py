@@ -8,15 +8,16 @@ from hypothesis import strategies as st
 
 from study_app.errors import Problem, ProtocolError
 from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.estimators import Ewma, Kalman, Raw
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.overrides import override, value_of
-from study_app.haptics.model.scene import Ewma, Kalman, Liquid, Raw, Scene
+from study_app.haptics.model.scene import Liquid, Scene
 from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.describe import describe
-from study_app.protocol.load import load, load_scene, parse, protocol_hash, source_bytes
+from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.scene_file import scene_text
-from study_app.protocol.source.files import bundled, unbundled
+from study_app.protocol.source.files import bundled, protocol_hash, source_bytes, unbundled
 from tests.protocol.sound import EVERY_ORDER, SOUND
 
 

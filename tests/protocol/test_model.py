@@ -11,9 +11,10 @@ from pydantic import BaseModel, GetCoreSchemaHandler, ValidationError
 from study_app.haptics.model.overrides import number_names
 from study_app.haptics.model.ranges import Frozen
 from study_app.protocol.describe import describe
-from study_app.protocol.load import load, parse, source_bytes
+from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity, quantity_words
+from study_app.protocol.source.files import source_bytes
 from study_app.protocol.table import Table, tidy
 from study_app.store.receipt import without_conditions
 from tests.protocol.sound import SOUND

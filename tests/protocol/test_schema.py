@@ -7,7 +7,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from study_app.protocol.load import SceneFile, shipped
+from study_app.protocol.load import SceneFile
+from study_app.protocol.source.files import shipped
 from study_app.protocol.source.json_schema import editor_schema, format_markdown, schema
 from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from tests.protocol.edited_studies import CASES, STUDIES, cases_of, text_of

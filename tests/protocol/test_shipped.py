@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from study_app.gui.home.study_facts import is_shipped
+from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.protocol.load import load, load_scene, load_scenes
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule

@@ -7,8 +7,8 @@ import pytest
 
 from study_app.errors import ProtocolError
 from study_app.protocol.describe import describe
-from study_app.protocol.load import load, parse, protocol_hash, source_bytes
-from study_app.protocol.source.files import bundled, hashes_in, unbundled
+from study_app.protocol.load import load, parse
+from study_app.protocol.source.files import bundled, hashes_in, protocol_hash, source_bytes, unbundled
 from study_app.protocol.source.json_schema import schema
 
 FOOTAGE = b"not decoded here"

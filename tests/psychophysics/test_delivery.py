@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.model.motion import Motion as Path
-from study_app.haptics.model.scene import Ewma, ForceLink, Kalman, Liquid, Scene, Velocity
+from study_app.haptics.model.scene import ForceLink, Liquid, Scene, Velocity
 from study_app.haptics.runtime.offline import samples_along
 from study_app.psychophysics.delivery import EARLIER, at, damping, difference, lag, motion, share
 from tests.compiled import needs_servo

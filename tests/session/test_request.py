@@ -7,7 +7,8 @@ import pytest
 from study_app import app
 from study_app.app.session import entry
 from study_app.errors import StoreError
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import load
+from study_app.protocol.source.files import source_bytes
 from study_app.session.start import NewSession, resumed
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore

@@ -11,9 +11,10 @@ from click.testing import CliRunner
 from study_app.app.session import entry
 from study_app.cli import commands
 from study_app.errors import SessionError
-from study_app.protocol.load import parse, protocol_hash, source_bytes
+from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, Schedule, Trial, build_schedule
+from study_app.protocol.source.files import protocol_hash, source_bytes
 from study_app.session.pages import PausePage
 from study_app.session.resume import REHEARSED_SCREENS, begun_schedule, find_protocol, is_rehearsal, resume_at
 from study_app.session.start import NewSession, check, open_store, resumed

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.protocol.model import Explore, Follow, Reach
+from study_app.protocol.model import Reach
+from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.tasks import TargetReached, TaskView, Tracker, track
 from tests.session.small import samples
 

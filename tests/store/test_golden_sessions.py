@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import load
+from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude, include

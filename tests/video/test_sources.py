@@ -14,8 +14,9 @@ from click.testing import CliRunner
 
 from study_app.cli.study import check
 from study_app.errors import VideoError
-from study_app.protocol.load import parse, source_bytes
+from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
+from study_app.protocol.source.files import source_bytes
 from study_app.session.transitions.events import Broke, broken
 from study_app.store import workstation
 from study_app.store.workstation import MachineSettings

@@ -15,8 +15,6 @@ from study_app.gui.widgets.background import Background
 from study_app.session.pages import Page
 from study_app.session.ports import JournalPort
 from study_app.session.resume import FIRST, Start
-from study_app.session.runner import Runner
-from study_app.session.transitions.events import EndRequested, ForceStopped, Note, PauseRequested, RepeatRequested, ResumeRequested
 from study_app.store.journals.journal_events import Event, SessionEnded
 from study_app.store.progress import Progress
 from study_app.video.sources import Videos

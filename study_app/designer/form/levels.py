@@ -14,12 +14,18 @@ from study_app.designer.document.fields import Row
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import LineField, SpecialEditor
 from study_app.designer.form.rows import FormRow
-from study_app.designer.measures.level_plots import level_block
-from study_app.designer.measures.level_words import LevelWords, even_ticks, log_ticks, rounded
-from study_app.designer.measures.limit_colours import limit_colour
-from study_app.designer.measures.measures_view import focus_of
-from study_app.designer.measures.number_cards import LIMIT_NAMES, Limit, Ticks
-from study_app.designer.measures.levels import limit_colour
+from study_app.designer.measures.levels import (
+    LIMIT_NAMES,
+    LevelWords,
+    Limit,
+    Ticks,
+    even_ticks,
+    level_block,
+    limit_colour,
+    log_ticks,
+    rounded,
+)
+from study_app.designer.measures.simulation import focus_of
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.numbers import Range

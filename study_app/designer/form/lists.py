@@ -16,7 +16,7 @@ from study_app.designer.document.study import Study
 from study_app.designer.form.fields import Field, SpecialEditor, add_button, kept, written
 from study_app.designer.form.rows import FormRow, new_words
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
-from study_app.designer.measures.number_cards import UNKNOWN
+from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.valid_part import valid_part
 from study_app.designer.place.requests import (
     AddElement,

@@ -17,12 +17,12 @@ from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.number_text import duration, exact_duration
-from study_app.protocol.model import Follow, Reach
+from study_app.protocol.model import Reach
 from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
 from study_app.protocol.source.document import Path
 from study_app.protocol.trials.designs import ORDINALS
 from study_app.protocol.trials.methods import Adjustment
-from study_app.protocol.trials.tasks import AnyTask
+from study_app.protocol.trials.tasks import AnyTask, Follow
 from study_app.protocol.trials.tracks import design_of, method_of
 
 PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]

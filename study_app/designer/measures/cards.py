@@ -8,14 +8,13 @@ from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
-from study_app.gui.theme.theme import font
+from study_app.gui.theme.theme import Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, insert_layout, vbox
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
 from study_app.protocol.source.document import Path
-from study_app.viewmodels.tones import Tone
 
 UNKNOWN: Final = "–"
 """Stands for a number that is not known."""

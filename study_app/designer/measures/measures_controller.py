@@ -31,8 +31,6 @@ from study_app.designer.measures.valid_part import valid_part
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems.problems import ProblemRow, RepairSearch, problem_rows
-from study_app.designer.problems.problem_rows import ProblemRow, problem_rows
-from study_app.designer.problems.repair_search import RepairSearch
 from study_app.gui.participant.page_widgets import parts_of
 from study_app.gui.widgets.background import delayed
 from study_app.protocol.model import Protocol

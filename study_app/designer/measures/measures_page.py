@@ -12,16 +12,16 @@ from study_app.designer.measures.cards import UNKNOWN, CardGrid, NumbersRow, Ver
 from study_app.designer.measures.levels import LevelBlock, LevelWords, rounded
 from study_app.designer.measures.measures_view import FAILED, NO_FORCES, MeasuresView
 from study_app.designer.measures.simulation import Controls
-from study_app.designer.problems.problem_rows import ProblemRow
+from study_app.designer.problems.problems import ProblemRow
+from study_app.gui.theme.theme import Tone
 from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
-from study_app.gui.widgets.number_field import NumberField
+from study_app.gui.widgets.numbers import NumberField
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.protocol.checks.force_limits import clipped, clipped_unpaced
-from study_app.viewmodels.tones import Tone
 
 if TYPE_CHECKING:
     from study_app.designer.measures.plots import ForcesView, FunctionView, TrackView

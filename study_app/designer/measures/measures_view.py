@@ -4,12 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from study_app.designer.document.study import Study
-from study_app.designer.document.edited_study import Study
+from study_app.designer.document.changes import languages_of
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import label_of
-from study_app.designer.document.languages import languages_of
 from study_app.designer.document.names import blocks_using
+from study_app.designer.document.study import Study
 from study_app.designer.document.study_facts import Facts
 from study_app.designer.measures.cards import (
     MOST_LINES,
@@ -33,17 +32,15 @@ from study_app.designer.measures.participant_texts import copied_texts, own_text
 from study_app.designer.measures.simulation import Controls, Focus, focus_of
 from study_app.designer.measures.valid_part import valid_part
 from study_app.designer.problems.problems import ProblemRow
-from study_app.designer.problems.problem_rows import ProblemRow
 from study_app.haptics.model.gate import calls_for
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
-from study_app.number_text import counted
+from study_app.number_text import counted, duration, duration_figure, duration_range
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, order_of
 from study_app.protocol.orders.durations import answering_s
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import language_name
-from study_app.viewmodels.number_words import duration, duration_figure, duration_range
 
 BELOW: Final = 4
 """So many cards stay below the other tabs."""

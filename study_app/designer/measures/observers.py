@@ -10,9 +10,8 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from study_app.protocol.checks.expected_precision import ObserverAnswers, ThresholdPlan
 from study_app.protocol.blocks import Block
-from study_app.protocol.checks.expected_precision import Answered, ThresholdPlan
+from study_app.protocol.checks.expected_precision import ObserverAnswers, ThresholdPlan
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import Evenness, balances, numbered
 from study_app.protocol.orders.sequences import row_count

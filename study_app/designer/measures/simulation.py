@@ -10,11 +10,16 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from study_app.designer.document.study import Study
-from study_app.designer.measures.level_plots import Controls
-from study_app.designer.measures.measures_view import Focus, focus_of
-from study_app.designer.measures.observers import Check, measurable, observe
-from study_app.designer.document.edited_study import Study
-from study_app.designer.measures.observers import ENOUGH, Check, Detectable, Finding, GroupPrecision, Simulated, measurable, observe
+from study_app.designer.measures.observers import (
+    ENOUGH,
+    Check,
+    Detectable,
+    Finding,
+    GroupPrecision,
+    Simulated,
+    measurable,
+    observe,
+)
 from study_app.designer.measures.participant_texts import text_keys
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import ThresholdPlan, imprecise, threshold_plan

@@ -15,7 +15,6 @@ from study_app.designer.place.designer_view import StudyChoice
 from study_app.designer.place.tab_order import lead_by_tab
 from study_app.designer.problems.card import NameRefusal
 from study_app.gui.kit.commands import key_cap, tip
-from study_app.designer.problems.repair_button import NameRefusal
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox

@@ -7,25 +7,19 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Final
 
-import numpy as np
 from study_app.designer.document.elements import study_title, title_of
 from study_app.designer.document.fields import row_at, unit_of
 from study_app.designer.document.names import Document
 from study_app.designer.document.study import Study
-from study_app.designer.new_study.known_answers import KnownAnswer, known_answers
-from study_app.designer.new_study.new_study import Answers
-from study_app.designer.document.edited_study import Study
 from study_app.designer.new_study.templates import FOLDER, QUESTIONS
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.number_text import counted, duration
-from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.wording.languages import LANGUAGES
-from study_app.viewmodels.number_words import duration
 
 FILE: Final = FOLDER / "known_answers.json"
 

@@ -9,19 +9,14 @@ from PySide6.QtCore import QEvent, QObject, QPoint, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, QWidget
 
-from study_app.designer.document.elements import words_sought
-from study_app.designer.outline.addable import Addable
-from study_app.designer.document.edited_study import Study
-from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import label_of, row_at, rows
-from study_app.designer.document.initial_values import singular
-from study_app.designer.document.languages import languages_of
+from study_app.designer.document.additions import number_rows
+from study_app.designer.document.changes import languages_of
+from study_app.designer.document.elements import found_fields, title_of, words_sought
+from study_app.designer.document.fields import label_of, node_at, row_at, rows, singular, tags
 from study_app.designer.document.names import named_at
-from study_app.designer.document.schema_nodes import node_at, tags
-from study_app.designer.document.series import number_rows
+from study_app.designer.document.study import Study
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.designer.place.requests import AddElement, AddInstrument, ChangeLanguage, Do, GoTo
-from study_app.designer.problems.finding import found_fields, words_sought
 from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed

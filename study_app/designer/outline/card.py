@@ -36,11 +36,7 @@ from PySide6.QtWidgets import (
 )
 
 from study_app.designer.outline.outline_rows import ElementPath, OutlineRow
-from study_app.designer.outline.rows import ROW_ROLE, Index
-from study_app.designer.outline.tree import Tree
 from study_app.gui.kit.commands import key_cap, key_words, keys_of, tip, with_key
-from study_app.gui.theme.icons import icon
-from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.icons import draw_icon, icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed

@@ -36,7 +36,6 @@ from shiboken6 import isValid
 from study_app.designer.participant.shown_step import SIZES, ParticipantView, ScreenSize
 from study_app.designer.place.segments import Segments
 from study_app.gui.kit.commands import key_cap, tip
-from study_app.gui.theme.theme import font
 from study_app.gui.participant.forms.questions_page import QuestionsPage
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, Theme, font
@@ -47,7 +46,6 @@ from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
 from study_app.gui.widgets.controls import Cap, Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.numbers import NumberField
-from study_app.gui.widgets.number_field import NumberField
 from study_app.session.pages import Page, QuestionnairePage, TaskPage
 from study_app.session.trial import TankView
 

@@ -6,22 +6,14 @@ from dataclasses import dataclass, field
 from pathlib import Path as Folder
 from typing import Any, Final
 
+from study_app.designer.document.additions import is_unknown_name
+from study_app.designer.document.fields import initial
 from study_app.designer.document.names import named_at
-from study_app.designer.document.study import Study
+from study_app.designer.document.study import Study, read, with_value, without_value
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.participant.first_step import first_step, graph_of, reached
-from study_app.designer.participant.participant_page import step_words
-from study_app.designer.participant.shown_step import StepPosition, step_name
-from study_app.errors import Problem, StudyError
-from study_app.designer.document.document_values import with_value, without_value
-from study_app.designer.document.edited_study import Study, read
-from study_app.designer.document.initial_values import initial
-from study_app.designer.document.writer.edits import Edit, Set, Unset
-from study_app.designer.document.writer.refused import Refused
 from study_app.designer.participant.shown_step import StepPosition, first_step, graph_of, reached, step_name, step_words
-from study_app.designer.place.open_study import OpenStudy
-from study_app.designer.problems.repairs import is_unknown_name
+from study_app.designer.place.editing import OpenStudy
 from study_app.errors import Problem, ProtocolError, StudyError
 from study_app.protocol.groups import numbered_parts
 from study_app.protocol.load import examined, read_document

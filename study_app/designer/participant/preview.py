@@ -25,17 +25,13 @@ from study_app.designer.participant.shown_step import (
     step_name,
     step_words,
 )
-from study_app.designer.participant.sound_part import last_valid, sound_part
 from study_app.designer.place.arrangement import PanePage
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.view import DesignerPlace
 from study_app.gui.display.screens import choose_screens
 from study_app.gui.kit.commands import add_commands, tip
 from study_app.gui.kit.devices import screen_number, settings_here, text_scale_on
-from study_app.gui.kit.workstation import screen_number, settings_here, text_scale_on
 from study_app.gui.widgets.background import delayed
-from study_app.gui.widgets.keys import tip
-from study_app.gui.widgets.main_view import make_shortcuts
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial

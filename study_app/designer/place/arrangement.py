@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QSizePolicy, QStackedWidget, QWidget
 
 from study_app.designer.form.card import FormCard
 from study_app.designer.form.rows import Form
-from study_app.designer.measures.measure_cards import FactsRow
+from study_app.designer.measures.measures_page import FactsRow
 from study_app.designer.outline.card import OutlineCard
 from study_app.designer.place.segments import Segments
 from study_app.designer.place.tab_order import lead_by_tab

@@ -32,9 +32,6 @@ from study_app.designer.place.saving import Saving
 from study_app.designer.place.steps import Step, delete_prompt, series_prompt, series_titles
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
-from study_app.designer.versions.changes_controller import ChangesController
-from study_app.designer.problems.problem_rows import ProblemRow, problem_rows, warning_rows
-from study_app.designer.problems.repair_search import RepairSearch
 from study_app.designer.versions.changes import Changes
 from study_app.designer.versions.known_runs import KnownRuns
 from study_app.designer.versions.renaming import Renaming

@@ -22,7 +22,7 @@ from study_app.designer.new_study.new_study import check_free, copy_of
 from study_app.designer.place.file import retyped
 from study_app.designer.place.requests import AddElement, AddNamed, LeaveText, Request, RetypeFile, with_path
 from study_app.designer.place.steps import Recorded, Step, Steps, no_answers
-from study_app.designer.versions.standing import Standing, check_saving, standing
+from study_app.designer.versions.version_rows import Standing, check_saving, standing
 from study_app.errors import StoreError
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import value_at

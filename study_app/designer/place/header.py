@@ -5,16 +5,11 @@ from PySide6.QtGui import QColor, QFocusEvent, QPainter, QPaintEvent, QPen, QRes
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from study_app.designer.new_study.study_list import StudyList
-from study_app.designer.participant.play_controls import PlayControls
-from study_app.designer.participant.play_strip import PlayStrip
+from study_app.designer.participant.play import PlayControls, PlayStrip
 from study_app.designer.place.designer_view import Banner, HeaderState
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.theme import RADIUS_CARD, Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
-from study_app.designer.participant.play import PlayControls, PlayStrip
-from study_app.designer.place.designer_view import HeaderState
-from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, chip_size, paint_chip

@@ -16,14 +16,9 @@ from study_app.designer.document.study import Study
 from study_app.designer.place.arrangement import PanePage
 from study_app.designer.place.editing import Editing, OpenStudy
 from study_app.designer.place.file import shown
-from study_app.designer.document.edited_study import Study
-from study_app.designer.place.editing import Editing
-from study_app.designer.place.file_text import shown
-from study_app.designer.place.open_study import OpenStudy
 from study_app.designer.place.prompts import Prompt
-from study_app.designer.place.right_pane import PanePage
 from study_app.designer.place.view import DesignerPlace
-from study_app.designer.problems.repair_button import NameRefusal
+from study_app.designer.problems.card import NameRefusal
 from study_app.designer.versions.known_runs import KnownRuns
 from study_app.designer.versions.version_rows import FILE, Comparison, Standing, counts, version_choices
 from study_app.errors import StoreError

@@ -9,14 +9,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from study_app.designer.versions.standing import Standing
-from study_app.gui.sessions.session_facts import started_words
-from study_app.gui.theme.theme import Tone
-from study_app.designer.document.edited_study import Study
 from study_app.designer.document.elements import study_title, title_of
 from study_app.designer.document.fields import label_of
-from study_app.designer.document.writer.refused import Refused
-from study_app.designer.problems.problem_rows import element_of
+from study_app.designer.document.study import Study
+from study_app.designer.document.toml_text import Refused
+from study_app.designer.problems.problems import element_of
+from study_app.gui.sessions.session_facts import started_words
+from study_app.gui.theme.theme import Tone
 from study_app.number_text import counted
 from study_app.protocol.differences import document_differences
 from study_app.store.study_runs import Run

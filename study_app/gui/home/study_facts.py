@@ -20,10 +20,10 @@ from study_app.gui.sessions.session_facts import (
     step_title,
 )
 from study_app.number_text import counted
-from study_app.protocol.load import at_hand, is_scene_file, load, parse
+from study_app.protocol.load import is_scene_file, load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.source.files import find, shipped, shipped_file
+from study_app.protocol.source.files import at_hand, find, shipped, shipped_file
 from study_app.protocol.wording.languages import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt

@@ -14,8 +14,9 @@ from study_app.devices.descriptor import Icon
 from study_app.gui.operator.servo_health import ForceFigures, Tile, Vitals, force_rows, health_tiles
 from study_app.gui.sessions.session_facts import operator_language, step_title
 from study_app.number_text import counted, grouped, minutes
-from study_app.protocol.model import Explore, Protocol, Reach
+from study_app.protocol.model import Protocol, Reach
 from study_app.protocol.orders.schedule import FormStep, Schedule, Step, Trial
+from study_app.protocol.trials.tasks import Explore
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import words
 from study_app.store.delivered import Broken

@@ -45,7 +45,8 @@ from study_app.gui.participant.tank.layers import (
 )
 from study_app.gui.theme.theme import TANK
 from study_app.gui.widgets.accessible import say
-from study_app.protocol.model import Explore, Follow, Reach
+from study_app.protocol.model import Reach
+from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.pages import TaskPage
 from study_app.session.tasks import track
 

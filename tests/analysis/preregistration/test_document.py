@@ -7,7 +7,8 @@ from click.testing import CliRunner
 
 from study_app.analysis.planning.preregistration import FILE, commitment, preregistration, read_commitment
 from study_app.cli import commands
-from study_app.protocol.load import load, protocol_hash, shipped, source_bytes
+from study_app.protocol.load import load
+from study_app.protocol.source.files import protocol_hash, shipped, source_bytes
 from tests.protocol.trials.level_studies import FIVE_POINTS, study
 
 HEADS = (

@@ -10,8 +10,9 @@ from study_app.analysis.evaluate import evaluate
 from study_app.analysis.report.sections import methods
 from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
-from study_app.protocol.load import parse, source_bytes
+from study_app.protocol.load import parse
 from study_app.protocol.simulated import NO_FEATURES
+from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from tests.analysis.conftest import Results, make_results, twelve

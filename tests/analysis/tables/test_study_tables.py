@@ -7,7 +7,8 @@ import pytest
 
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.errors import AnalysisError, StoreError
-from study_app.protocol.load import parse, source_bytes
+from study_app.protocol.load import parse
+from study_app.protocol.source.files import source_bytes
 from study_app.store.tables.columns import RESPONSES, TRIALS
 from study_app.store.tables.csv_files import csv_bytes, header, read_table
 from tests.analysis.conftest import CANNOT_JUDGE, Results, make_results

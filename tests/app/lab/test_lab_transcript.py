@@ -12,7 +12,7 @@ from study_app.app.lab_controller import LabController
 from study_app.errors import DeviceNotFound, ServoFault
 from study_app.lab.ab_comparison import Workbench
 from study_app.lab.presets import Choice
-from study_app.protocol.load import source_bytes
+from study_app.protocol.source.files import source_bytes
 from study_app.workers.server import Crashed
 from tests.app.lab.worlds import COSTS, ERRORS, SOON_MS
 from tests.golden import compare

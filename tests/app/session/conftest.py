@@ -9,7 +9,8 @@ from PySide6.QtCore import QCoreApplication, QEvent, QTimer
 from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import load
+from study_app.protocol.source.files import source_bytes
 from study_app.session import start
 from tests.app.world import World, begun
 

@@ -5,15 +5,13 @@ import pytest
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.measures.balance import balance_of
-from study_app.designer.document.writer.edits import Set, Unset
 from study_app.designer.measures.observers import balance_of
 from study_app.designer.measures.participant_texts import copied_texts, revealing, text_keys, texts_by_language
 from study_app.designer.measures.valid_part import valid_part
 from study_app.haptics.model.slope_limits import slope_limit
-from study_app.protocol.load import load, shipped
+from study_app.protocol.load import load
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
-from study_app.protocol.source.files import shipped_file
+from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.trials.presented_levels import level_limits, levels, standard_of
 from tests.protocol.faulty_protocols import CASES
 

@@ -10,8 +10,6 @@ from typing import Any
 import pytest
 
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.versions.standing import check_saving, check_version, next_version, standing
-from study_app.designer.document.writer.refused import Refused
 from study_app.designer.versions.version_rows import check_saving, check_version, next_version, standing
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import protocol_hash

@@ -8,7 +8,8 @@ from study_app.evidence.expected_error import error_report, expected, physical_n
 from study_app.evidence.reference_solutions import stroke
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.local_wake import LocalWake
-from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene
+from study_app.haptics.model.estimators import Ewma, Given, Kalman
+from study_app.haptics.model.scene import Scene
 from tests.evidence.accuracy.scenes import HONEY, REAL, TANK, WATER, compiled
 
 pytestmark = pytest.mark.slow

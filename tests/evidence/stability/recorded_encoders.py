@@ -16,9 +16,10 @@ from scipy.signal import savgol_filter
 
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.estimators import Ewma, Kalman, Raw
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Floats, Motion
-from study_app.haptics.model.scene import Ewma, Kalman, Knee, Raw, Scene, Velocity
+from study_app.haptics.model.scene import Knee, Scene, Velocity
 from study_app.haptics.runtime.offline import new_wake_places, recompute_sample, samples_along
 from study_app.haptics.runtime.pack import pack
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from study_app.evidence.stability.damping_limits import boundary_nspm, measure_limits, passive_nspm
-from study_app.haptics.model.estimators import DeviceVelocity
-from study_app.haptics.model.scene import Ewma, Kalman, Raw
+from study_app.haptics.model.estimators import DeviceVelocity, Ewma, Kalman, Raw
 from study_app.haptics.model.slope_limits import damping_limits, table
 from tests.haptics.scenes import COMPILED
 

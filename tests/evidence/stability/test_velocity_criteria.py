@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from study_app.evidence.stability.velocity import COUNT_M, PARTS, Stroke, errors, held_error, noise_mmps, plain_forces
-from study_app.haptics.model.estimators import ewma_response
-from study_app.haptics.model.scene import Ewma, Kalman, Raw
+from study_app.haptics.model.estimators import Ewma, Kalman, Raw, ewma_response
 from tests.haptics.scenes import COMPILED
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")

@@ -19,8 +19,9 @@ from study_app.evidence.thresholds.known_values import (
     known_value,
     rehearsed,
 )
-from study_app.protocol.load import load, parse, source_bytes
+from study_app.protocol.load import load, parse
 from study_app.protocol.simulated import OBSERVER, Comparison, Observer
+from study_app.protocol.source.files import source_bytes
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.designs import default_design
 from tests.compiled import needs_servo

@@ -6,7 +6,7 @@ So answers depend on person and trial alone, and a trial that is presented again
 import re
 from pathlib import Path
 
-from study_app.protocol.load import source_bytes
+from study_app.protocol.source.files import source_bytes
 
 QUICK = (("min_s", "0.2"), ("count", "1"), ("dwell_s", "0.05"))
 STATEMENTS = ("feels_liquid", "like_honey", "harder", "comfortable")

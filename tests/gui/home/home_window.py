@@ -2,12 +2,13 @@
 
 from PySide6.QtCore import Qt
 
-from study_app.designer.versions import draft_words
+from study_app.designer.versions import version_rows
 from study_app.gui.home.cards import StudyCard
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.view import HomePlace
 from study_app.gui.widgets.main_view import Place
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import load
+from study_app.protocol.source.files import source_bytes
 from study_app.store.sessions.begin import SessionStart, begin
 
 
@@ -25,7 +26,7 @@ def hold(folder, participant, *, simulated=False):
 
 def open_home(qtbot, results, size=None):
     others = dict.fromkeys(("designer", "lab", "results", "devices", "machine", "help"), Place)
-    window = MainWindow({"home": lambda: HomePlace(results, lambda: draft_words), **others})
+    window = MainWindow({"home": lambda: HomePlace(results, lambda: version_rows), **others})
     qtbot.addWidget(window)
     if size is not None:
         window.resize(size)

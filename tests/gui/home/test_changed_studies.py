@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 
 from study_app.gui.home import view
 from study_app.gui.home.cards import StudyCard
-from study_app.protocol.load import source_bytes
+from study_app.protocol.source.files import source_bytes
 from study_app.store.drafts import Draft, discard, keep
 from study_app.store.study_settings import begin_settings
 from tests.gui.home.home_window import open_home, study_cards

@@ -12,7 +12,7 @@ from study_app.gui.home import dialogs
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.home.study_facts import study_facts
 from study_app.gui.widgets.background import Background
-from study_app.protocol.load import source_bytes
+from study_app.protocol.source.files import source_bytes
 from study_app.session.start import MAX_SEED
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.workstation import MachineSettings

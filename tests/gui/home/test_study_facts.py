@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.designer.versions import draft_words
+from study_app.designer.versions import version_rows
 from study_app.errors import ProtocolError
 from study_app.gui.home.study_facts import (
     BrokenFacts,
@@ -29,8 +29,9 @@ from study_app.gui.sessions.session_facts import (
     validity_chip,
 )
 from study_app.gui.sessions.session_page import read_record
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import PageStep, build_schedule
+from study_app.protocol.source.files import source_bytes
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.store.drafts import Draft, draft_files, keep
 from study_app.store.exclusions import exclude
@@ -264,7 +265,7 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
         (kept,) = (file for file in draft_files() if f"{name}.toml" in file.read_text(encoding="utf-8"))
         kept.write_text(json.dumps(json.loads(kept.read_bytes()) | {"kept_at": at}), encoding="utf-8")
     begin_settings(protocols / "older.toml", "demo")
-    found = read_studies((), lambda: draft_words)
+    found = read_studies((), lambda: version_rows)
     assert [(Path(it.source).stem, it.origin) for it in found[2:5]] == [
         ("newer", "Own study"),
         ("older", "Copy of demo"),

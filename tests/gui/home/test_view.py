@@ -5,8 +5,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 
 from study_app.gui.home.cards import BrokenCard, StudyCard
-from study_app.protocol.load import source_bytes
-from study_app.protocol.source.files import shipped_file
+from study_app.protocol.source.files import shipped_file, source_bytes
 from tests.gui.home.home_window import hold, open_home, study_cards
 
 pytestmark = pytest.mark.slow

@@ -11,7 +11,8 @@ from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.sessions.session_page import MOTION_HIDDEN, SessionPage, read_record
 from study_app.gui.theme.theme import LIGHT
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import load
+from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclusions

@@ -12,7 +12,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("too many sub-steps for plain Python", allow_module_level=True)
 
 from study_app.haptics.kernels.plant import move, new_handle, new_schedule, next_tick, push
-from study_app.haptics.model.layout import MOST_DELAY
+from study_app.haptics.model.device_dynamics import MOST_DELAY
 
 STILL = np.zeros(3)
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from study_app.haptics.model.estimators import Ewma, Kalman, Raw
 from study_app.haptics.model.layout import LIMITER_ENERGY, STATUS_NON_FINITE
-from study_app.haptics.model.scene import Ewma, Kalman, Raw
 from study_app.haptics.model.slope_limits import SLEW_N
 from tests.haptics.scenes import EVERYTHING, THESIS, TICK_NS, Hand, examples
 

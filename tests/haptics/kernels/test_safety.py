@@ -5,11 +5,11 @@ from study_app.errors import StudyError
 from study_app.evidence.stability.damping_limits import measured_estimators
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.estimators import NAMED, DeviceVelocity
+from study_app.haptics.model.estimators import NAMED, DeviceVelocity, Ewma, Given, Kalman, Raw
 from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NORM, LIMITER_SLEW, LIMITER_SLOPE
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, Ewma, ForceLink, Given, Kalman, Raw
+from study_app.haptics.model.scene import Box, ForceLink
 from study_app.haptics.model.slope_limits import (
     KALMAN_SLEW,
     LIGHTER,

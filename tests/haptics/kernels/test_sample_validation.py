@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_GLITCH, LIMITER_STALE, STATUS_OK, STATUS_STALE_FAULT
-from study_app.haptics.model.scene import Ewma, Kalman
 from tests.haptics.scenes import HONEY, TICK_NS, UNBENT, WATER, Hand, scene
 
 RAW = scene(velocity=Ewma(alpha=1.0), knee=UNBENT, scale=1)

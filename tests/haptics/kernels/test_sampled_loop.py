@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from study_app.haptics.kernels.plant import move, new_handle
+from study_app.haptics.model.estimators import Ewma
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Ewma
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, UNBENT, scene
 

@@ -5,8 +5,9 @@ import pytest
 
 from study_app.evidence.stability.withheld_force import MOST, QUICK, SHAKEN, measure
 from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.model.layout import LIMITER_ENERGY
-from study_app.haptics.model.scene import Ewma, Kalman, Scene
+from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import handle_limits
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import COMPILED, Hand, liquid

@@ -6,9 +6,10 @@ import pytest
 from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
 from study_app.haptics.model.effects.drag import REFERENCE, Drag
 from study_app.haptics.model.effects.history import History
+from study_app.haptics.model.estimators import Given
 from study_app.haptics.model.gate import bounds, calls_for, resolve
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Body, Box, Given, Liquid, MotionBox, Scene
+from study_app.haptics.model.scene import Body, Box, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, vectors
 

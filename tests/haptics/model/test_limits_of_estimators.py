@@ -2,9 +2,8 @@
 
 import pytest
 
-from study_app.haptics.model.estimators import MOST_LAG_TICKS, DeviceVelocity
+from study_app.haptics.model.estimators import MOST_LAG_TICKS, DeviceVelocity, Ewma, Given, Raw
 from study_app.haptics.model.force_rules import VERSIONS
-from study_app.haptics.model.scene import Ewma, Given, Raw
 from study_app.haptics.model.slope_limits import damping_limits, handle_limits, table
 
 

@@ -6,8 +6,9 @@ from pydantic import BaseModel
 
 from study_app.errors import StudyError
 from study_app.haptics.model.effects.current import Channel, Uniform
+from study_app.haptics.model.estimators import Kalman, Raw
 from study_app.haptics.model.overrides import override, override_all
-from study_app.haptics.model.scene import Box, Everywhere, Kalman, Raw
+from study_app.haptics.model.scene import Box, Everywhere
 from tests.haptics.scenes import HONEY, LIGHT_OIL, POOL, WATER, scene
 
 FULL = scene(POOL)

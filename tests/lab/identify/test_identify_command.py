@@ -6,8 +6,9 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.haptics.model.effects.current import Uniform
+from study_app.haptics.model.estimators import Kalman
 from study_app.haptics.model.overrides import override_all
-from study_app.haptics.model.scene import Box, Kalman, Liquid, Scene
+from study_app.haptics.model.scene import Box, Liquid, Scene
 from study_app.lab.identify import measured_force, preset
 from study_app.lab.identify.fit import fit
 from study_app.protocol.load import load_scene

@@ -5,7 +5,8 @@ import pytest
 
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.checks.consistency import LEAST_N, force_n
-from study_app.protocol.load import load, shipped
+from study_app.protocol.load import load
+from study_app.protocol.source.files import shipped
 from study_app.protocol.trials.tasks import Explore, Stroke
 from tests.compiled import needs_servo
 

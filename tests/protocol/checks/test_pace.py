@@ -5,14 +5,16 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
+from study_app.haptics.model.estimators import Ewma, Given, Kalman, Raw
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Ewma, Given, Kalman, Raw, Scene
+from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import steady
 from study_app.haptics.runtime.offline import simulate
 from study_app.protocol.checks.force_limits import fastest_hz, passed_share
 from study_app.protocol.load import parse
-from study_app.protocol.model import Follow, Protocol
+from study_app.protocol.model import Protocol
 from study_app.protocol.trials.presented_levels import FASTER
+from study_app.protocol.trials.tasks import Follow
 from tests.haptics.scenes import UNBENT, scene
 from tests.protocol.edited_studies import text_of
 

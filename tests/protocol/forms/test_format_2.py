@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.haptics.model.scene import Ewma, Kalman
+from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.protocol.load import parse
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.questions import NumberView, ShowIf, shown

@@ -8,17 +8,8 @@ from hypothesis import strategies as st
 
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import order_of, orders_of
-from study_app.protocol.orders.schedule import (
-    PageStep,
-    Schedule,
-    Trial,
-    block_codes,
-    build_schedule,
-    draw_key,
-    shuffle,
-    stream,
-)
+from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
+from study_app.protocol.orders.schedule import PageStep, Schedule, Trial, build_schedule, draw_key, stream
 from study_app.protocol.orders.sequences import (
     Constraint,
     Square,
@@ -28,6 +19,7 @@ from study_app.protocol.orders.sequences import (
     row,
     row_count,
 )
+from study_app.protocol.streams import shuffle
 from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")

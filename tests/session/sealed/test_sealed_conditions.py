@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.load import source_bytes
+from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded import blinding
 from study_app.store.blinded.unblinding import unblind

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import load
+from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal

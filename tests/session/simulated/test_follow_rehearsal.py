@@ -8,7 +8,7 @@ import pytest
 
 from study_app.haptics.model.layout import LIMITER_FADE
 from study_app.protocol.load import load
-from study_app.protocol.model import Follow
+from study_app.protocol.trials.tasks import Follow
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder

@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.model import gate
-from study_app.haptics.model.scene import Ewma, Kalman
+from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol import formats
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.simulated import OBSERVER, Comparison
+from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.observers import RATE_HZ, SensedTrial, exploration
 from study_app.session.simulated.rehearsal import RehearsedSession, condition_features

@@ -8,8 +8,8 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.haptics.model import gate
+from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.scene import Ewma, Kalman
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.blinded.blinding import as_recorded, sealed_model

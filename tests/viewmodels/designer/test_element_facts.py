@@ -12,10 +12,6 @@ from study_app.designer.document.study import Study, read
 from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.form.form import form
-from study_app.designer.measures.level_plots import Controls
-from study_app.designer.document.writer.edits import Edit, Set, Unset
-from study_app.designer.form.element_facts import used_by
-from study_app.designer.form.form_rows import form
 from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.observers import Simulated
 from study_app.designer.measures.simulation import Controls
@@ -24,10 +20,7 @@ from study_app.designer.new_study.templates import FOLDER
 from study_app.designer.outline.outline_rows import outline_rows
 from study_app.designer.participant.playable import NotPlayableError, playable, sound_part
 from study_app.designer.participant.shown_step import showing
-from study_app.designer.participant.sound_part import sound_part
 from study_app.designer.problems.problems import problem_rows
-from study_app.designer.problems.problem_rows import problem_rows
-from study_app.designer.problems.repairs import repairs
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.files import shipped_file
 from tests.authoring.grown import PROTOCOLS

@@ -11,16 +11,18 @@ from study_app.designer.document.elements import brief, found_fields, outline, p
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.study_facts import facts
 from study_app.designer.form.form import form
-from study_app.designer.measures.level_plots import Controls
-from study_app.designer.measures.measures_view import measures_view
-from study_app.designer.measures.observers import Asked, Measurable, Observed, Planted
-from study_app.designer.measures.planned import Detectable, Finding, GroupPrecision, Simulated
-from study_app.designer.outline.addable import addable, fields_to_go_to
-from study_app.designer.form.element_facts import brief, used_by
-from study_app.designer.form.form_rows import form, position_of
 from study_app.designer.measures.measures_page import clipped_sentence
 from study_app.designer.measures.measures_view import MeasuresView, measures_view
-from study_app.designer.measures.observers import Asked, Detectable, Finding, GroupPrecision, Measurable, Observed, Planted, Simulated
+from study_app.designer.measures.observers import (
+    Asked,
+    Detectable,
+    Finding,
+    GroupPrecision,
+    Measurable,
+    Observed,
+    Planted,
+    Simulated,
+)
 from study_app.designer.measures.plots import forces_sentence, function_sentence, track_sentence
 from study_app.designer.measures.simulation import Controls
 from study_app.designer.outline.add_list import addable, fields_to_go_to

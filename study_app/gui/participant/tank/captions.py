@@ -19,7 +19,8 @@ from study_app.gui.participant.pages.page_widget import (
 )
 from study_app.gui.participant.tank.frame import Placed, TaskShown
 from study_app.gui.theme.theme import PARTICIPANT, font
-from study_app.protocol.model import Explore, Follow, Reach
+from study_app.protocol.model import Reach
+from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.pages import TaskPage
 
 if TYPE_CHECKING:

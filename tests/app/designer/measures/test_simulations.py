@@ -11,13 +11,6 @@ from PySide6.QtCore import QSize, Qt
 from study_app.analysis.planning.threshold_studies import plans, sweep
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.measures.level_plots import Controls
-from study_app.designer.measures.measures_view import Focus, focus_of
-from study_app.designer.measures.number_cards import ANEW, FAILED, UNKNOWN
-from study_app.designer.measures.page_fit import _pages
-from study_app.designer.measures.planned import ENOUGH
-from study_app.designer.document.edited_study import read
-from study_app.designer.document.writer.edits import Set, Unset
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.measures_controller import ANEW, _pages
 from study_app.designer.measures.measures_view import FAILED

@@ -4,16 +4,18 @@ import pytest
 
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Edit, Set, Unset
-from study_app.designer.participant.first_step import first_step
-from study_app.designer.participant.playable import NotPlayableError, playable
-from study_app.designer.participant.shown_step import STANDALONE, StepPosition, same_step, showing, step_name
-from study_app.designer.participant.sound_part import sound_part
-from study_app.designer.document.edited_study import Study
-from study_app.designer.document.writer.edits import Edit, Set, Unset
 from study_app.designer.participant.playable import NotPlayableError, playable, sound_part
-from study_app.designer.participant.shown_step import STANDALONE, StepPosition, first_step, same_step, showing, step_name
-from study_app.protocol.load import load, parse, source_bytes
+from study_app.designer.participant.shown_step import (
+    STANDALONE,
+    StepPosition,
+    first_step,
+    same_step,
+    showing,
+    step_name,
+)
+from study_app.protocol.load import load, parse
 from study_app.protocol.orders.schedule import PageStep, Trial
+from study_app.protocol.source.files import source_bytes
 from study_app.session.transitions.page_builder import preview
 from tests.protocol.groups.grouped import grouped
 

@@ -20,9 +20,6 @@ from PySide6.QtWidgets import (
 )
 
 from study_app.designer.form.card import FormCard
-from study_app.designer.outline.card import OutlineCard
-from study_app.designer.outline.rows import ROW_ROLE
-from study_app.designer.form.element_form import FormCard
 from study_app.designer.outline.card import ROW_ROLE, OutlineCard
 from study_app.designer.place.segments import Segments
 from study_app.gui.participant.intervals.answer_page import ChoiceWidget

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
+from study_app.haptics.model.estimators import Given
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Given
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import UNBENT, WATER_FACTOR, examples, liquid, moving, scene, vectors
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from study_app.haptics.kernels.regions import update_volume_fractions
+from study_app.haptics.model.estimators import Given
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, Cylinder, Given
+from study_app.haptics.model.scene import Box, Cylinder
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import UNBENT, WATER_FACTOR, liquid, scene, vectors

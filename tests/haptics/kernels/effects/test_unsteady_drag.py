@@ -9,9 +9,10 @@ from study_app.evidence.reference_solutions import oscillation, start
 from study_app.evidence.stability.stability_cases import parse
 from study_app.evidence.stability.verdict import judge
 from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS_RPS
+from study_app.haptics.model.estimators import Kalman
 from study_app.haptics.model.laws import finite_reynolds
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, Kalman, MotionBox
+from study_app.haptics.model.scene import Box, MotionBox
 from study_app.haptics.model.slope_limits import steady
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack

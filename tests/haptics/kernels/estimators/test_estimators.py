@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from study_app.errors import StudyError
+from study_app.haptics.model.estimators import Ewma, Raw
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Ewma, Raw, Withdrawn
+from study_app.haptics.model.scene import Withdrawn
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import COMPILED, UNBENT, scene, vectors

@@ -11,11 +11,11 @@ from study_app.evidence.stability.withheld_force import measure
 from study_app.haptics.kernels import estimators as kalman
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.estimators import NAMED
+from study_app.haptics.model.estimators import NAMED, Ewma, Kalman
 from study_app.haptics.model.force_rules import CURRENT, VERSIONS
 from study_app.haptics.model.layout import LIMITER_ESTIMATOR, records
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Ewma, Kalman, Scene
+from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import damping_limits, table
 from study_app.haptics.runtime.offline import new_wake_places, recompute_sample, simulate
 from study_app.haptics.runtime.pack import pack

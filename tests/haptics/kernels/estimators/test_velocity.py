@@ -5,8 +5,9 @@ from hypothesis import strategies as st
 
 from study_app.errors import StudyError
 from study_app.evidence.reference_model import lowered
+from study_app.haptics.model.estimators import Ewma, Given
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Ewma, Given, Knee
+from study_app.haptics.model.scene import Knee
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack, pack_into
 from tests.haptics.scenes import UNBENT, examples, moving, scene, vectors

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from study_app.haptics.model.estimators import Ewma
 from study_app.haptics.model.force_rules import VERSIONS
 from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Ewma
 from study_app.haptics.model.slope_limits import SLEW_N
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import (

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.estimators import Raw
 from study_app.haptics.model.layout import SAFETY, SAMPLE
-from study_app.haptics.model.scene import Knee, Raw
+from study_app.haptics.model.scene import Knee
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import (

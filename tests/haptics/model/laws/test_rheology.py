@@ -7,10 +7,11 @@ from pydantic import ValidationError
 from study_app.errors import StudyError
 from study_app.haptics.model import laws
 from study_app.haptics.model.effects.non_newtonian import steady_n
+from study_app.haptics.model.estimators import Kalman
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.laws import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.overrides import override
-from study_app.haptics.model.scene import Kalman, Liquid, Scene
+from study_app.haptics.model.scene import Liquid, Scene
 from study_app.haptics.model.slope_limits import steady
 from tests.haptics.materials import PRESETS, tank
 

@@ -5,12 +5,6 @@ import pytest
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.measures.level_plots import AS_ASKED, Controls
-from study_app.designer.measures.measures_view import measures_view
-from study_app.designer.measures.number_cards import UNKNOWN, LinesCard, MeasuresView, SessionCard
-from study_app.designer.measures.observers import Measurable, Observed
-from study_app.designer.measures.planned import GroupPrecision, Simulated
-from study_app.designer.document.writer.edits import Set
 from study_app.designer.measures.cards import UNKNOWN, Figures, Line, Lines, MeasureCard
 from study_app.designer.measures.levels import AS_ASKED
 from study_app.designer.measures.measures_page import clipped_sentence
