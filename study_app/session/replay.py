@@ -160,7 +160,7 @@ _ROUNDING = 1e-9
 _FLOAT32 = 2.0**-23  # of the greater ones, a column's own precision
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Replayed:
     """The result of a replay.
 
@@ -170,14 +170,14 @@ class Replayed:
     recomputation; ``took_s`` includes reading the files and loading the code.
     """
 
-    recordings: int
-    seconds: int
-    lasted_s: float
-    computed_s: float
-    took_s: float
-    differences: tuple[str, ...]
-    missing: tuple[str, ...]
-    uncompared: tuple[str, ...]
+    recordings: int = 0
+    seconds: int = 0
+    lasted_s: float = 0.0
+    computed_s: float = 0.0
+    took_s: float = 0.0
+    differences: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+    uncompared: tuple[str, ...] = ()
 
     @property
     def proved(self) -> bool:
@@ -211,7 +211,7 @@ def replay(session_folder: Path) -> Replayed:
     lines = opened(journal.read(session.journal), key)
     protocol, devices, (drawn_from, participant) = _ran(session.receipt, kept, key, lines)
     _again(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code: no part of what is measured
-    found = _Found()
+    found = Replayed()
     ends = {line.which: line for line in lines if isinstance(line, events.TrialEnded | events.IntervalEnded)}
     before: _Before | None = None
     resumed_at: str | None = None
@@ -223,11 +223,11 @@ def replay(session_folder: Path) -> Replayed:
         name = named(*which)
         if not isinstance(line, events.Recorded):
             why = "the journal gives no reason" if line is None else line.reason
-            found.uncompared.append(f"{name}: has no recording: {why}")
+            found.uncompared += (f"{name}: has no recording: {why}",)
             continue
         path = session.path / line.recording
         if not is_there(path):
-            found.missing.append(f"{name}: {line.recording} is missing, but the journal mentions it")
+            found.missing += (f"{name}: {line.recording} is missing, but the journal mentions it",)
             continue
         seed = link_seed(drawn_from, participant, *which)
         interval = which[-1]
@@ -240,9 +240,9 @@ def replay(session_folder: Path) -> Replayed:
             before = _again(samples, scene, devices[resumed], before, places_of(recorded, steps))
         except StudyError as refused:
             before = None
-            found.uncompared.append(f"{name}: not recomputable: {refused}")
+            found.uncompared += (f"{name}: not recomputable: {refused}",)
             continue
-        found.compare(name, samples, before, checks)
+        _compare(found, name, samples, before, checks)
         if (ended := ends.get(which)) is not None and _until_gap(samples.tick) == len(samples):
             again: dict[str, float | None] = {}
             measured = ended.others
@@ -251,9 +251,10 @@ def replay(session_folder: Path) -> Replayed:
                 again |= delivered_again(protocol, presented, started, interval, samples, measured).columns
             if measured.get("delivered_error") is not None and ended.outcome != "interrupted":
                 again["delivered_error"] = error_again(scene, protocol.device.rate_hz, samples, measured)
-            found.differences += [f"{name}: the column {column} differs" for column in different(again, measured)]
+            found.differences += tuple(f"{name}: the column {one} differs" for one in different(again, measured))
         found.computed_s += time.perf_counter() - start
-    return found.replayed(time.perf_counter() - began)
+    found.took_s = time.perf_counter() - began
+    return found
 
 
 class _Device(NamedTuple):
@@ -353,54 +354,29 @@ def _run_steps(
     recompute_scenes(*models, *serials, safety, out, first)
 
 
-class _Found:
-    """What comes out recording by recording."""
-
-    def __init__(self) -> None:
-        self.recordings = 0
-        self.seconds = 0
-        self.lasted_s = 0.0
-        self.computed_s = 0.0
-        self.differences: list[str] = []
-        self.missing: list[str] = []
-        self.uncompared: list[str] = []
-
-    def replayed(self, took_s: float) -> Replayed:
-        """Return all of it, which took so long [s]."""
-        return Replayed(
-            self.recordings,
-            self.seconds,
-            self.lasted_s,
-            self.computed_s,
-            took_s,
-            tuple(self.differences),
-            tuple(self.missing),
-            tuple(self.uncompared),
-        )
-
-    def compare(self, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
-        """Compare one recording's checks with those of the forces computed again."""
-        if len(samples) == 0:
-            self.uncompared.append(f"{name}: holds no sample")
-            return
-        if not again.knows_its_start:
-            self.uncompared.append(f"{name}: continues from the force of a recording that is missing or has a gap")
-            return
-        self.recordings += 1
-        self.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9
-        whole = _until_gap(samples.tick)
-        if whole < len(samples):
-            lost_s = whole / checks.rows
-            self.uncompared.append(f"{name}: samples are missing after {lost_s:.1f} s; what follows was not compared")
-        self.seconds += sum(
-            min((second + 1) * checks.rows, len(samples)) <= whole for second in range(len(checks.device_force))
-        )
-        differing = _other_sums(checks, again.samples) | _other_columns(checks, samples, again.samples)
-        for what, found in differing.items():
-            seconds = [second for second in found if min((second + 1) * checks.rows, len(samples)) <= whole]
-            if seconds:
-                lasted = len(checks.device_force)
-                self.differences.append(f"{name}: the {what} differs in {_listed(seconds)} of {lasted} seconds")
+def _compare(found: Replayed, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
+    """Compare one recording's checks with those of the forces computed again."""
+    if len(samples) == 0:
+        found.uncompared += (f"{name}: holds no sample",)
+        return
+    if not again.knows_its_start:
+        found.uncompared += (f"{name}: continues from the force of a recording that is missing or has a gap",)
+        return
+    found.recordings += 1
+    found.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9
+    whole = _until_gap(samples.tick)
+    if whole < len(samples):
+        lost_s = whole / checks.rows
+        found.uncompared += (f"{name}: samples are missing after {lost_s:.1f} s; what follows was not compared",)
+    found.seconds += sum(
+        min((second + 1) * checks.rows, len(samples)) <= whole for second in range(len(checks.device_force))
+    )
+    differing = _other_sums(checks, again.samples) | _other_columns(checks, samples, again.samples)
+    for what, differ in differing.items():
+        seconds = [second for second in differ if min((second + 1) * checks.rows, len(samples)) <= whole]
+        if seconds:
+            lasted = len(checks.device_force)
+            found.differences += (f"{name}: the {what} differs in {_listed(seconds)} of {lasted} seconds",)
 
 
 def _other_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int]]:

@@ -53,26 +53,32 @@ class Finding:
         return f"{self.place}: {self.message}"
 
 
-class Collector:
-    """Findings so far: ``errors`` are files that cannot be trusted as they are, ``warnings`` something to know."""
+@dataclass(slots=True)
+class Findings:
+    """What was found in a study's ``folder``, with so many sessions.
 
-    def __init__(self, folder: Path) -> None:
-        self.errors: list[Finding] = []
-        self.warnings: list[Finding] = []
-        self._folder = folder
+    ``errors`` are files that cannot be trusted as they are, ``warnings`` something to know.
+    """
 
-    def apart(self) -> Collector:
-        """Return findings of the same folder, with nothing found."""
-        return Collector(self._folder)
+    folder: Path
+    errors: tuple[Finding, ...] = ()
+    warnings: tuple[Finding, ...] = ()
+    sessions: int = 0
+    running: int = 0
 
-    def take(self, others: Collector) -> None:
+    @property
+    def sound(self) -> bool:
+        """Whether there is no error."""
+        return not self.errors
+
+    def take(self, others: Findings) -> None:
         """Add what others found."""
         self.errors += others.errors
         self.warnings += others.warnings
 
     def error(self, path: Path, message: str) -> None:
         """Add what makes ``path`` untrustworthy."""
-        self.errors.append(Finding(self._name(path), message))
+        self.errors += (Finding(self._name(path), message),)
 
     def failure(self, path: Path, error: StoreError) -> None:
         """Add an error that stopped us reading ``path``, which is named once."""
@@ -80,7 +86,7 @@ class Collector:
 
     def warning(self, path: Path, message: str) -> None:
         """Add what should be known of ``path``."""
-        self.warnings.append(Finding(self._name(path), message))
+        self.warnings += (Finding(self._name(path), message),)
 
     @contextlib.contextmanager
     def reading(self, path: Path) -> Iterator[None]:
@@ -91,8 +97,8 @@ class Collector:
             self.failure(path, error)
 
     def _name(self, path: Path) -> str:
-        inside = path.is_relative_to(self._folder) and path != self._folder
-        return path.relative_to(self._folder).as_posix() if inside else "."
+        inside = path.is_relative_to(self.folder) and path != self.folder
+        return path.relative_to(self.folder).as_posix() if inside else "."
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +119,12 @@ class CheckedSession:
     fingerprint: str = ""
 
 
-def check_session(place: Place, key: Key | None, found: Collector, *, recordings: bool = True) -> CheckedSession:
+def check_session(place: Place, key: Key | None, found: Findings, *, recordings: bool = True) -> CheckedSession:
     """Check one session; again where there is an error and a program has opened it meanwhile.
 
     Without ``recordings`` these are not read, which takes a while.
     """
-    errors = found.apart()
+    errors = Findings(found.folder)
     checked = CheckedSession(place, running=is_open(place.folder.path))
     with errors.reading(place.folder.path):
         checked = _check(place, key, errors, running=checked.running, recordings=recordings)
@@ -128,7 +134,7 @@ def check_session(place: Place, key: Key | None, found: Collector, *, recordings
     return checked
 
 
-def _check(place: Place, key: Key | None, found: Collector, *, running: bool, recordings: bool) -> CheckedSession:
+def _check(place: Place, key: Key | None, found: Findings, *, running: bool, recordings: bool) -> CheckedSession:
     folder = place.folder
     if running:
         found.warning(folder.path, "is open in another program")
@@ -177,7 +183,7 @@ def _check(place: Place, key: Key | None, found: Collector, *, running: bool, re
     )
 
 
-def _journal(folder: SessionFolder, found: Collector, *, running: bool) -> Contents:
+def _journal(folder: SessionFolder, found: Findings, *, running: bool) -> Contents:
     """Return what the journal holds: no line where it says nothing of the session."""
     nothing = Contents([], 0)
     if not is_there(folder.journal):
@@ -221,7 +227,7 @@ def _journal(folder: SessionFolder, found: Collector, *, running: bool) -> Conte
     return contents
 
 
-def _receipt(folder: SessionFolder, lines: list[events.Event], key_hash: str | None, found: Collector) -> None:
+def _receipt(folder: SessionFolder, lines: list[events.Event], key_hash: str | None, found: Findings) -> None:
     path = folder.receipt
     if not lines and not is_there(path):
         return  # claimed and never begun
@@ -276,7 +282,7 @@ def _same_answer(listed_answer: events.Answer, given: events.Answer) -> bool:
     )
 
 
-def _tables(place: Place, lines: list[events.Event], found: Collector, *, ended: bool) -> None:
+def _tables(place: Place, lines: list[events.Event], found: Findings, *, ended: bool) -> None:
     """Compare the tables with what the journal gives; one that tells more than the journal is named as such."""
     telling: set[Path] = set()
     with contextlib.suppress(StoreError):  # said of receipt or journal already
@@ -295,7 +301,7 @@ def _tables(place: Place, lines: list[events.Event], found: Collector, *, ended:
 
 
 def check_table(
-    path: Path, expected: bytes, columns: tuple[Column, ...], found: Collector, *, may_differ: Callable[[int], bool]
+    path: Path, expected: bytes, columns: tuple[Column, ...], found: Findings, *, may_differ: Callable[[int], bool]
 ) -> None:
     """Compare a table with what the journals give, and its cells with the dictionary.
 
@@ -327,7 +333,7 @@ def _hash(folder: SessionFolder, name: str) -> str:
         return ""
 
 
-def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Collector, *, recordings: bool) -> None:
+def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Findings, *, recordings: bool) -> None:
     if not is_there(folder.checksums):
         found.error(
             folder.checksums, "is missing: was the program killed at the end of the session? rebuild creates it"
@@ -350,7 +356,7 @@ def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Collecto
 
 
 def _recordings(
-    folder: SessionFolder, lines: list[events.Event], hashes: Mapping[str, str], found: Collector, *, ended: bool
+    folder: SessionFolder, lines: list[events.Event], hashes: Mapping[str, str], found: Findings, *, ended: bool
 ) -> None:
     """Check that every recording the journal tells of is there, whole and of this trial, and no other."""
     listed: set[str] = set()
@@ -391,7 +397,7 @@ def _recordings(
             found.warning(folder.path / name, f"is in no line of the journal{then}")
 
 
-def _facts(folder: SessionFolder, line: events.Recorded, kind: str, name: str, rows: int, found: Collector) -> None:
+def _facts(folder: SessionFolder, line: events.Recorded, kind: str, name: str, rows: int, found: Findings) -> None:
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     path = folder.path / name
@@ -430,7 +436,7 @@ def doubts(place: Place) -> tuple[Discrepancy, ...]:
     found = (Discrepancy(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
     if _as_ended(place):
         return found
-    told = Collector(folder.path)
+    told = Findings(folder.path)
     check_session(place, None, told, recordings=False)
     first: dict[str, Finding] = {}
     for one in (*told.errors, *(warning for warning in told.warnings if warning.place.endswith(".csv"))):

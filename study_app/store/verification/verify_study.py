@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -43,26 +42,11 @@ from study_app.store.tables.study_files import (
     table_bytes,
 )
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
-from study_app.store.verification.verify_session import CheckedSession, Collector, Finding, check_session, check_table
+from study_app.store.verification.verify_session import CheckedSession, Findings, check_session, check_table
 from study_app.store.withdrawals import Tombstone, describe_session, tombstones
 
 Sessions: TypeAlias = list[CheckedSession]
 Proofs: TypeAlias = Sequence[tuple[str, str]]  # fingerprint and session
-
-
-@dataclass(frozen=True, slots=True)
-class Findings:
-    """What `verify` found in so many sessions."""
-
-    errors: tuple[Finding, ...]
-    warnings: tuple[Finding, ...]
-    sessions: int
-    running: int
-
-    @property
-    def sound(self) -> bool:
-        """Whether there is no error."""
-        return not self.errors
 
 
 def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
@@ -82,7 +66,7 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
         It is not a study folder, or ``fingerprints`` no copy of fingerprints.
     """
     merged = read_merged(folder)
-    found = Collector(folder)
+    found = Findings(folder)
     if merged is None:
         copy = None if fingerprints is None else (fingerprints, read_copy(fingerprints))
         sessions = _verify_study(folder, copy, found)
@@ -97,11 +81,11 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
             f"{folder} holds several sites: compare each with the copy of its own fingerprints, such as {fingerprints} "
             f"with {merged.folder(merged.names[0])}"
         )
-    running = sum(one.running for one in sessions)
-    return Findings(tuple(found.errors), tuple(found.warnings), len(sessions), running)
+    found.sessions, found.running = len(sessions), sum(one.running for one in sessions)
+    return found
 
 
-def _verify_study(folder: Path, copy: tuple[Path, Proofs] | None, found: Collector) -> Sessions:
+def _verify_study(folder: Path, copy: tuple[Path, Proofs] | None, found: Findings) -> Sessions:
     study = StudyFolder(folder)
     name = described_study(study)
     if name is None:
@@ -130,7 +114,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proofs] | None, found: Collect
     return sessions
 
 
-def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], found: Collector) -> None:
+def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], found: Findings) -> None:
     """Check that every participant with a session has one entry, that of the journals, and that none was changed.
 
     Those of the participants who have ``withdrawn`` stay used.
@@ -166,7 +150,7 @@ def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[
             found.error(study.allocated, f"entry {entry} of participant {participant} is another participant's, too")
 
 
-def _key(study: StudyFolder, found: Collector) -> Key | None:
+def _key(study: StudyFolder, found: Findings) -> Key | None:
     try:
         return blinding.read_key(study.path)
     except StoreError as error:
@@ -174,7 +158,7 @@ def _key(study: StudyFolder, found: Collector) -> Key | None:
         return None
 
 
-def _withdrawn(study: StudyFolder, found: Collector) -> dict[str, Tombstone]:
+def _withdrawn(study: StudyFolder, found: Findings) -> dict[str, Tombstone]:
     """Return the withdrawals, and report those that are not finished."""
     try:
         withdrawn = tombstones(study)
@@ -200,7 +184,7 @@ def _erased(study: StudyFolder, withdrawn: Mapping[str, Tombstone]) -> set[tuple
     }
 
 
-def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Collector) -> None:
+def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Findings) -> None:
     """Check the table of all sessions, where each session's journal could be read.
 
     Lines of sessions that have not ended may be behind their journals. The table is not judged where a program writes
@@ -211,7 +195,7 @@ def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Coll
     rows = [one.row for one in sessions if one.row is not None]
     content, columns = table_bytes(study, rows), columns_of(study, rows)
     late = {number for number, row in enumerate(rows, start=2) if row["status"] == receipt.UNFINISHED}
-    told = found.apart()
+    told = Findings(found.folder)
     check_table(study.participants(name), content, columns, told, may_differ=late.__contains__)
     now = study.sessions()
     written = len(now) != len(sessions) or any(one.running for one in sessions) or any(is_open(one.path) for one in now)
@@ -219,7 +203,7 @@ def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Coll
         found.take(told)
 
 
-def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: Collector) -> None:
+def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: Findings) -> None:
     """Compare the sessions with the study's own list, as it was before they were checked.
 
     A program lists a session once its files are final, just before it lets go of it: a listed one is judged even where
@@ -237,7 +221,7 @@ def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: 
             found.error(path, f"lacks {place_of(study, one.place.folder)}, which has ended; rebuild adds it")
 
 
-def _copy(study: StudyFolder, sessions: Sessions, copy: Proofs, path: Path, found: Collector) -> None:
+def _copy(study: StudyFolder, sessions: Sessions, copy: Proofs, path: Path, found: Findings) -> None:
     """Compare the sessions with a list that was kept elsewhere."""
     _compare(study, sessions, copy, str(path), found)
     known = {place for _, place in copy}
@@ -247,7 +231,7 @@ def _copy(study: StudyFolder, sessions: Sessions, copy: Proofs, path: Path, foun
             found.error(one.place.folder.path, f"{lacks}: it was added, or ended, after that copy was made")
 
 
-def _compare(study: StudyFolder, sessions: Sessions, proofs: Proofs, name: str, found: Collector) -> None:
+def _compare(study: StudyFolder, sessions: Sessions, proofs: Proofs, name: str, found: Findings) -> None:
     there = {place_of(study, one.place.folder): one for one in sessions}
     for proof, place in proofs:
         one, path = there.get(place), study.path / place
@@ -259,7 +243,7 @@ def _compare(study: StudyFolder, sessions: Sessions, proofs: Proofs, name: str, 
             found.error(path, f"is not the session that {name} lists as {proof}: it was changed ({now})")
 
 
-def _description(study: StudyFolder, found: Collector) -> None:
+def _description(study: StudyFolder, found: Findings) -> None:
     """Compare the description with what this version writes for the study as one of the receipts has it."""
     held = read_own(study.description, study.path)
     sealed = not (blinding.reveals(study.path) or names_sealed(held))
@@ -286,7 +270,7 @@ def _published(study: StudyFolder) -> Iterator[dict[str, Any]]:
                 yield protocol
 
 
-def _exclusions(study: StudyFolder, sessions: Sessions, found: Collector) -> None:
+def _exclusions(study: StudyFolder, sessions: Sessions, found: Findings) -> None:
     with found.reading(study.reversed_exclusions):
         exclusions.reversals(study.path)
     with found.reading(study.exclusions):
@@ -302,7 +286,7 @@ def _exclusions(study: StudyFolder, sessions: Sessions, found: Collector) -> Non
                 found.error(study.exclusions, f"there is no {exclusions.named(row)}")
 
 
-def _reveals(study: StudyFolder, key: Key | None, found: Collector) -> None:
+def _reveals(study: StudyFolder, key: Key | None, found: Findings) -> None:
     with found.reading(study.reveals):
         for number, torn in blinding.unreadable_reveals(study.path):
             if torn:
@@ -314,7 +298,7 @@ def _reveals(study: StudyFolder, key: Key | None, found: Collector) -> None:
                 found.error(study.reveals, f"reveal {number} was of another key")
 
 
-def _blinding(study: StudyFolder, key: Key | None, found: Collector) -> None:
+def _blinding(study: StudyFolder, key: Key | None, found: Findings) -> None:
     """Say where a condition is revealed before the key was, but not which."""
     published = next(_published(study), None)
     if key is None or blinding.reveals(study.path) or published is None:
@@ -330,7 +314,7 @@ def _blinding(study: StudyFolder, key: Key | None, found: Collector) -> None:
         found.warning(study.path, f"{leak.place} reveals a condition, although the key is sealed")
 
 
-def _between(merged: Merged, found: Collector) -> None:
+def _between(merged: Merged, found: Findings) -> None:
     """Check what the list of sites says of them, and that no session is in two."""
     seen: dict[str, Path] = {}
     for site in merged.sites:
@@ -357,7 +341,7 @@ def _between(merged: Merged, found: Collector) -> None:
         found.warning(path, "is an incomplete file of a program that was ended, or is being written")
 
 
-def _compare_site(merged: Merged, site: Site, found: Collector) -> None:
+def _compare_site(merged: Merged, site: Site, found: Findings) -> None:
     """Compare a site's folder with what the list of sites says of it; sessions are only erased there."""
     study = StudyFolder(merged.folder(site.name))
     if (name := described_study(study)) not in (None, merged.study):
