@@ -114,7 +114,7 @@ def read_record(folder: Path) -> SessionRecord:
     (facts,) = session_facts(study.path, row_of(session, key), listed, {})
     own = tuple(one for one in listed if one.what[:2] == (facts.participant, facts.session))
     start = start_of(lines)
-    rows = session_tables.trials(lines)
+    rows = session_tables.SessionRows(lines).trials
     trials = _trials(session, rows, lines, start.limits, own)
     measured = any(device.name == start.device and not device.motion_shows_force for device in discover().devices)
     return SessionRecord(
@@ -171,7 +171,7 @@ def _trials(
     reasons = {one.trial: one.reason for one in own}
     answered: dict[tuple[int, int], int] = {}
     unconfirmed = progress_of(lines).unconfirmed
-    for row in session_tables.responses(lines):
+    for row in session_tables.SessionRows(lines).responses:
         which = (row["trial"], row["attempt"])
         answered[which] = answered.get(which, 0) + (row["first_choice_s"] is not None)
     return tuple(

@@ -248,14 +248,11 @@ def beyond(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, 
         return
     if is_there(folder.checksums):
         yield folder.checksums, "was written after the session ended, but the journal has no end"
-    for name, rows, spare in (
-        ("responses", session_tables.responses(lines), 0),
-        ("trials", session_tables.trials(lines), 1),
-        ("intervals", session_tables.SessionRows(lines).intervals, 1),
-    ):
-        path = folder.table(place.study, name)
-        if (there := _rows(path, place.study_folder.path)) > len(rows) + spare:
-            yield path, f"has {there} rows, and the journal gives {len(rows)}"
+    rows = session_tables.SessionRows(lines)
+    for name, spare in (("responses", 0), ("trials", 1), ("intervals", 1)):
+        path, given = folder.table(place.study, name), len(rows.table(name))
+        if (there := _rows(path, place.study_folder.path)) > given + spare:
+            yield path, f"has {there} rows, and the journal gives {given}"
 
 
 def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:

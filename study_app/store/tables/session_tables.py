@@ -145,16 +145,6 @@ class SessionRows:
                 rows[-1]["outcome"] = "interrupted"
 
 
-def responses(lines: Sequence[events.Event]) -> list[Row]:
-    """Return one row per response, in the order of confirmation."""
-    return SessionRows(lines).responses
-
-
-def trials(lines: Sequence[events.Event]) -> list[Row]:
-    """Return one row per presentation of a trial, in order; the running one has no outcome yet."""
-    return SessionRows(lines).trials
-
-
 def table_columns(lines: Sequence[events.Event], *, opened: bool) -> dict[str, tuple[Column, ...]]:
     """Return the columns of a session's tables by name: without the sealed ones where they are sealed, not ``opened``.
 

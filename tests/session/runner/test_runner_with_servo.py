@@ -30,7 +30,7 @@ from study_app.session.trial import SETTLED_S
 from study_app.store.blinded.blinding import opened
 from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
-from study_app.store.tables.session_tables import trials
+from study_app.store.tables.session_tables import SessionRows
 from tests.compiled import needs_servo
 from tests.session import small
 from tests.session.fakes import FakeJournal
@@ -243,7 +243,9 @@ class Judged:
                     if view is not None:
                         runner.frame_shown(servo.now_ns() + 3_000_000, view.sample_time_ns)
                     runner.poll()
-            self.row = next(row for row in trials(opened(store.lines, store.key)) if row["outcome"] == "complete")
+            self.row = next(
+                row for row in SessionRows(opened(store.lines, store.key)).trials if row["outcome"] == "complete"
+            )
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of
 from study_app.store.tables.columns import TABLES, TRIALS
 from study_app.store.tables.csv_files import MISSING, Column, csv_bytes, guarded, header, in_columns_of, read_table
-from study_app.store.tables.session_tables import participant, trials
+from study_app.store.tables.session_tables import SessionRows, participant
 from tests.journal_lines import event_of
 
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
@@ -71,7 +71,7 @@ def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str
     script.trial(1)
     script.end(1, **summary)
     script.add("note", kind="mark", text="-1 and more")
-    rows = trials(script.lines)
+    rows = SessionRows(script.lines).trials
     content = csv_bytes(TRIALS, rows)
     assert b",'-1 and more\n" in content
     assert read_table(content, TRIALS) == rows
@@ -97,13 +97,13 @@ def test_numbers_in_the_columns_of_an_earlier_version_stand_as_they_were_written
 def test_a_running_trial_has_no_outcome_and_a_left_one_is_interrupted() -> None:
     script = Script()
     script.trial(1)
-    assert [row["outcome"] for row in trials(script.lines)] == [None]
+    assert [row["outcome"] for row in SessionRows(script.lines).trials] == [None]
     script.trial(1, attempt=2)
     script.end(1, attempt=2, outcome="timeout")
     script.trial(2)
-    assert [row["outcome"] for row in trials(script.lines)] == ["interrupted", "timeout", None]
+    assert [row["outcome"] for row in SessionRows(script.lines).trials] == ["interrupted", "timeout", None]
     script.add("session_ended", status="withdrawn", reason="")
-    assert [row["outcome"] for row in trials(script.lines)] == ["interrupted", "timeout", "interrupted"]
+    assert [row["outcome"] for row in SessionRows(script.lines).trials] == ["interrupted", "timeout", "interrupted"]
 
 
 def test_notes_and_marks_stay_with_the_trial_they_were_made_in() -> None:
@@ -115,7 +115,7 @@ def test_notes_and_marks_stay_with_the_trial_they_were_made_in() -> None:
     script.add("note", kind="mark", text="")
     script.add("repeat", trial=1, reason="door")
     script.trial(1, attempt=2)
-    assert [(row["marked"], row["notes"]) for row in trials(script.lines)] == [
+    assert [(row["marked"], row["notes"]) for row in SessionRows(script.lines).trials] == [
         (True, "sneezed, twice\nrepeated: door"),
         (False, None),
     ]
@@ -144,7 +144,7 @@ def test_a_trial_is_valid_within_the_protocols_limits(measured: dict[str, float]
     script = Script(limits=limits)
     script.trial(1)
     script.end(1, **measured)
-    assert trials(script.lines)[0]["valid"] is valid
+    assert SessionRows(script.lines).trials[0]["valid"] is valid
     assert participant(script.lines)["validity"] == (None if valid is None else "valid" if valid else "invalid")
 
 
@@ -188,4 +188,4 @@ def test_lines_that_make_no_session_are_refused() -> None:
         ([*head, interval], "line 3 is an interval of trial 4, which has none"),
     ):
         with pytest.raises(StoreError, match=sentence):
-            trials(lines)
+            SessionRows(lines)
