@@ -108,26 +108,20 @@ def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[s
     """
     block = answers.block
     found = summarize_block(study, answers)
-    settings: list[NotTested] = []
-    not_tested: list[NotTested] = []
     for finding in all_findings():
         if not finding.what:
             continue
         if block.kind not in (finding.kinds if block.revealed else finding.sealed):
             if not block.revealed and block.kind in finding.waits:
-                not_tested.append(NotTested(finding.what, SEALED))
+                found = replace(found, absent=(*found.absent, NotTested(finding.what, SEALED)))
             continue
         tell(finding.what)
-        (value, absent), failed = answers.attempt(
-            finding.what, partial(finding.test, answers, found), (finding.empty, ())
-        )
-        found = finding.add_to(found, value)
-        if finding.about == "sessions":
-            found = replace(found, absent=(*found.absent, *absent, *failed))
-        else:
-            settings += failed
-            not_tested += absent
-    return replace(found, absent=(*found.absent, *settings, *not_tested))
+        tested = answers.failures.attempt(finding.what, partial(finding.test, answers, found), block=block.id)
+        if isinstance(tested, Failure):
+            tested = finding.empty, (NotTested(finding.what, tested.why),)
+        value, absent = tested
+        found = replace(finding.add_to(found, value), absent=(*found.absent, *absent))
+    return found
 
 
 def delivered(study: Study) -> tuple[Delivered, ...]:

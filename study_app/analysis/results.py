@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias, TypeVar
 
-from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynamics, PublishedValue, Setting
+from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynamics, Setting
 from study_app.analysis.data.motion import Performance
 from study_app.analysis.statistics.equivalence import UNSEEN, UNSEEN_EQUAL, Equivalence, fewest
 from study_app.analysis.statistics.outcome import Interval, Outcome
+from study_app.protocol.model import Published
 from study_app.protocol.orders.balance import Evenness
 
 
@@ -236,7 +237,7 @@ class LevelsResult:
     statistics: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
     family: str | None = None
     adaptive: bool = False
-    published: tuple[PublishedValue, ...] = ()
+    published: tuple[Published, ...] = ()
     device: OwnDynamics | None = None
 
 

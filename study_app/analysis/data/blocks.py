@@ -212,32 +212,19 @@ def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tu
     return tuple(sorted(settings, key=lambda setting: order.index(setting.condition))), kind
 
 
-@dataclass(frozen=True, slots=True)
-class PublishedValue:
-    """A value of another study that the protocol names: see `protocol.analysis_plan.Published`."""
-
-    measure: str
-    value: float
-    standard: float | None
-    low: float | None
-    high: float | None
-    percent: float | None
-    n: int | None
-    source: str
-
-    def in_words(self) -> str:
-        """Return it with what is known of it."""
-        known = [
-            *([] if self.standard is None else [f"standard {self.standard:g}"]),
-            *([] if self.low is None or self.high is None else [f"{self.low:g} to {self.high:g}"]),
-            *([] if self.percent is None else [f"at {self.percent:g} % correct"]),
-            *([] if self.n is None else [f"n = {self.n}"]),
-        ]
-        source = f"{self.source}: " if self.source else ""
-        return f"{source}{self.measure} {self.value:g}" + (f" ({', '.join(known)})" if known else "")
+def published_words(one: Published) -> str:
+    """Return a published value with what is known of it."""
+    known = [
+        *([] if one.standard is None else [f"standard {one.standard:g}"]),
+        *([] if one.low is None or one.high is None else [f"{one.low:g} to {one.high:g}"]),
+        *([] if one.percent is None else [f"at {one.percent:g} % correct"]),
+        *([] if one.n is None else [f"n = {one.n}"]),
+    ]
+    source = f"{one.source}: " if one.source else ""
+    return f"{source}{one.measure} {one.value:g}" + (f" ({', '.join(known)})" if known else "")
 
 
-def compared_percent(published: Iterable[PublishedValue | Published]) -> float | None:
+def compared_percent(published: Iterable[Published]) -> float | None:
     """Return the percentage of successes at which published thresholds were measured; None: unknown, or several."""
     percents = {one.percent for one in published if one.measure in {"weber", "threshold"}}
     return percents.pop() if len(percents) == 1 else None

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from study_app import figure_style as style
+from study_app.analysis.data.blocks import published_words
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import MARGIN_PT, Look, Picture, Sheet, attempted, picture_of, sample_words
 from study_app.analysis.levels.answers import (
@@ -526,7 +527,7 @@ def _at(found: LevelsResult) -> str:
 
 def weber_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture:
     """Draw the Weber fractions of a block with thresholds at two standards or more."""
-    listed = "; ".join(one.in_words() for one in found.published)
+    listed = "; ".join(published_words(one) for one in found.published)
     published = f" Open circles and dotted lines: published values, {listed}." if published_fractions(found) else ""
     caption = (
         f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, over the standard. Thin: participants; thick: "

@@ -5,7 +5,7 @@ Which tests apply, in which families, and what may be said of them; the p that d
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Final, Generic, Literal, TypeAlias, TypeVar, cast
+from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar, cast
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,7 @@ from study_app.analysis.data.measures import Array, medians, presentations
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.report.html_page import drawn
-from study_app.analysis.results import BlockResult, Failure, Failures, NotTested, Results, Tested, Verdict
+from study_app.analysis.results import BlockResult, Failures, NotTested, Results, Tested, Verdict
 from study_app.analysis.statistics.outcome import DRAWS, Outcome, draws_for, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import DRAWN_UP_TO
 from study_app.store.tables.csv_files import Column, optional
@@ -61,11 +61,6 @@ class BlockAnswers:
     def k(self) -> int:
         """How many settings there are; conditions of one delay are one."""
         return len(set(self.block.columns.values()))
-
-    def attempt(self, what: str, compute: Callable[[], T], empty: U) -> tuple[T | U, tuple[NotTested, ...]]:
-        """Return what ``compute`` finds; where it fails ``empty``, and that ``what`` is not there and why."""
-        found = self.failures.attempt(what, compute, block=self.block.id)
-        return (empty, (NotTested(what, found.why),)) if isinstance(found, Failure) else (found, ())
 
     @property
     def intervals(self) -> int | None:
@@ -363,8 +358,6 @@ class Finding(Generic[R]):
     kinds, sealed, waits : tuple of str
         The kinds of blocks in which it is tested once the key is open, in which it is tested while the key is sealed,
         and in which it is named as waiting for the key.
-    about : str
-        Whether settings or sessions are compared.
     statements : bool
         Whether the value is tests of single statements whose verdicts belong to the limits of the study.
     empty : R
@@ -383,7 +376,6 @@ class Finding(Generic[R]):
     kinds: ClassVar[tuple[Kind, ...]] = KINDS
     sealed: ClassVar[tuple[Kind, ...]] = ()
     waits: ClassVar[tuple[Kind, ...]] = ()
-    about: ClassVar[Literal["settings", "sessions"]] = "settings"
     statements: ClassVar[bool] = False
     empty: ClassVar[Any] = None
     figure_name: ClassVar[str] = ""

@@ -222,7 +222,6 @@ class SessionsDiffer(StatementTests):
     what = "comparison of sessions"
     part = "sessions"
     sealed = KINDS
-    about = "sessions"
     asks = "sessions differ"
     title = "Do sessions differ?"
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import pandas as pd
 
-from study_app.analysis.data.blocks import LevelBlock, PublishedValue, Setting, setting_name
+from study_app.analysis.data.blocks import LevelBlock, Setting, published_words, setting_name
 from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import Picture
@@ -60,7 +60,7 @@ def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opene
         own_units=chooses_units(block),
         family=None if block.assumed is None else block.assumed.family,
         adaptive=block.method is not None and block.method.adaptive,
-        published=tuple(PublishedValue(**one.model_dump(exclude={"block"})) for one in block.published),
+        published=block.published,
         device=study.own_dynamics,
     )
     if stimulus is not None:
@@ -117,7 +117,7 @@ def level_findings(found: LevelsResult) -> Iterator[str]:
     sentences = [line for one in statistics() for line in one(found).sentences()]
     yield from sentences
     if sentences and found.published:
-        yield f"{found.title}: published values: {'; '.join(one.in_words() for one in found.published)}."
+        yield f"{found.title}: published values: {'; '.join(published_words(one) for one in found.published)}."
 
 
 def level_limits(found: LevelsResult) -> Iterator[str]:

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis import levels
-from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.blocks import LevelBlock, published_words
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.levels.columns import RESULTS
@@ -104,7 +104,7 @@ class LevelStatistic(Generic[R]):
         yield table_of(self.rows, *columns, words=int(columns[0][0] == "Participant"))
         if words := self.explained():
             yield paragraph(words, "soft")
-        if published := [one.in_words() for one in self.found.published if self.compares(one.measure)]:
+        if published := [published_words(one) for one in self.found.published if self.compares(one.measure)]:
             yield paragraph(f"Published: {'; '.join(published)}.")
         for name in self.figures:
             yield from drawn(self.pictures, f"{name}-{self.found.block}")

@@ -44,6 +44,7 @@ from study_app.analysis.results import (
     silent,
 )
 from study_app.errors import AnalysisError
+from study_app.protocol.model import Published
 from study_app.store.blinded.unblinding import reveals_of
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
@@ -66,6 +67,8 @@ def plain(value: Any) -> Any:
         held = {field.name: getattr(value, field.name) for field in fields(value)}
         omitted = OF_FORMAT_2.get(type(value), frozenset())
         return {name: plain(entry) for name, entry in held.items() if entry or name not in omitted}
+    if isinstance(value, Published):
+        return value.model_dump(exclude={"block"})
     if isinstance(value, Mapping):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, tuple | list):
@@ -78,18 +81,14 @@ def plain(value: Any) -> Any:
 
 
 def _entries(found: BlockResult) -> Iterator[tuple[str, Any]]:
-    """Yield a block's fields, the findings about settings in their midst and those about sessions last."""
-    tested = [finding for finding in all_findings() if finding.what]
+    """Yield a block's fields, with its findings in their midst."""
     for field in fields(found):
         if field.name != "findings":
             yield field.name, getattr(found, field.name)
             continue
-        for finding in tested:
-            if finding.about == "settings":
+        for finding in all_findings():
+            if finding.what:
                 yield from finding.entries(found).items()
-    for finding in tested:
-        if finding.about == "sessions":
-            yield from finding.entries(found).items()
 
 
 FORMAT: Final = 1
@@ -268,14 +267,10 @@ def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, b
         drawn.append(one)
         progress(f"drawing: {one.name}", 0.7 + 0.2 * min(1.0, len(drawn) / 4))
 
-    def told(what: str, make: Callable[[], tuple[str, ...]]) -> tuple[str, ...]:
-        found = failures.attempt(f"texts: {what}", make)
-        return (f"Not there: {found.why}.",) if isinstance(found, Failure) else found
-
     texts: dict[str, Any] = {
-        "findings": told("findings", lambda: sections.of_levels(results)),
-        "limits": told("limits", lambda: sections.limits(study, results)),
-        "methods": told("methods", lambda: (methods(study, results),))[0],
+        "findings": failures.value("texts: findings", lambda: sections.of_levels(results), ()),
+        "limits": failures.value("texts: limits", lambda: sections.limits(study, results), ()),
+        "methods": failures.value("texts: methods", lambda: methods(study, results), ""),
     }
     files: dict[str, bytes] = {}
     for file, make in (

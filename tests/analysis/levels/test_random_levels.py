@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from study_app import figure_style
-from study_app.analysis.data.blocks import LevelBlock, OwnDynamics, PublishedValue
+from study_app.analysis.data.blocks import LevelBlock, OwnDynamics
 from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.levels.answers import Answers, LevelAnswers, SettingEstimate
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_methods, level_section
 from study_app.analysis.levels.sensitivities import SensitivityEstimate
 from study_app.analysis.levels.thresholds import ExponentEstimate, ThresholdEstimate, Thresholds
 from study_app.analysis.results import Failures, GroupAnswers, LevelsResult
+from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.methods import Constant, QuestPlus, UpDown
 from study_app.protocol.trials.stimuli import Stimulus
@@ -120,10 +121,17 @@ def filled(number: int) -> tuple[LevelBlock, LevelsResult]:
     if not revealed:
         return _block(design, vary, ends, standards, number), found
     estimated = share and rng.random() < 0.8
-    published = PublishedValue(
-        "exponent" if summary == "geometric mean" else "weber", 0.2, some(base), some(0.1), 0.3, percent, some(10),
-        some("Jones 1997") or "",
-    )  # fmt: skip
+    published = Published.model_construct(
+        block="b",
+        measure="exponent" if summary == "geometric mean" else "weber",
+        value=0.2,
+        standard=some(base),
+        low=some(0.1),
+        high=0.3,
+        percent=percent,
+        n=some(10),
+        source=some("Jones 1997") or "",
+    )
     where = [(person, standard) for person in whom for standard in standards]
     more: dict[str, Any] = {
         "vary": vary, "quantity": quantity, "unit": unit, "level_kind": kind, "spacing": rng.choice(["log", "linear"]),
