@@ -9,7 +9,7 @@ from pathlib import Path as File
 from typing import Any, Final
 
 from study_app.designer.document.toml_edits import Edit, Unset, apply, check_encodable, meaning
-from study_app.designer.document.toml_text import Refused, Splice, Splices, applied, reverted
+from study_app.designer.document.toml_text import Refused, Splice, Splices, applied, common_ends, reverted
 from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import examined, located, read_document
 from study_app.protocol.model import Protocol
@@ -137,11 +137,8 @@ class Study:
             The text cannot be written as UTF-8.
         """
         check_encodable(text)
-        old, shortest, first, last = self.text, min(len(self.text), len(text)), 0, 0
-        while first < shortest and old[first] == text[first]:
-            first += 1
-        while last < shortest - first and old[-1 - last] == text[-1 - last]:
-            last += 1
+        old = self.text
+        first, last = common_ends(old, text)
         splice = Splice(first, old[first : len(old) - last], text[first : len(text) - last])
         return (self, ()) if old == text else (self._with(text), ((splice,),))
 

@@ -18,6 +18,7 @@ from study_app.designer.document.toml_text import (
     Spans,
     Splices,
     applied,
+    common_ends,
     inline,
     key_text,
     spans_of,
@@ -669,12 +670,8 @@ def _changes(path: Path, old: Any, new: Any) -> Iterator[Edit]:
 
 
 def _list_changes(path: Path, old: list[Any], new: list[Any]) -> Iterator[Edit]:
-    shortest, first = min(len(old), len(new)), 0
-    while first < shortest and same(old[first], new[first]):
-        first += 1
-    last = 0
-    while last < shortest - first and same(old[-1 - last], new[-1 - last]):
-        last += 1
+    shortest = min(len(old), len(new))
+    first, last = common_ends(old, new, same)
     for index in range(first, shortest - last):
         yield from _changes((*path, index), old[index], new[index])
     for index in range(shortest - last, len(new) - last):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 import re
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, Final, NamedTuple, TypeAlias
 
@@ -74,6 +75,18 @@ class Editor:
                 one = Splice(last.at, whole, last.after + one.after)  # noqa: PLW2901
             joined.append(one)
         return tuple(joined)
+
+
+def common_ends(
+    old: Sequence[Any], new: Sequence[Any], same: Callable[[Any, Any], bool] = operator.eq
+) -> tuple[int, int]:
+    """Return how many letters or entries two texts or arrays have in common at the beginning, and then at the end."""
+    shortest, first, last = min(len(old), len(new)), 0, 0
+    while first < shortest and same(old[first], new[first]):
+        first += 1
+    while last < shortest - first and same(old[-1 - last], new[-1 - last]):
+        last += 1
+    return first, last
 
 
 def applied(text: str, splices: Iterable[Splice]) -> str:

@@ -24,8 +24,8 @@ from study_app.designer.place.requests import (
     AddNamed,
     ChangeLanguage,
     Do,
-    DuplicateEntries,
-    MoveEntries,
+    DuplicateElement,
+    MoveTo,
     Paste,
     RemoveKey,
     Request,
@@ -241,7 +241,7 @@ class EntryList(Field):
         first = to - sum(index < to for index in indexes)
         after = tuple(range(first, first + len(indexes)))
         if 0 <= to <= len(self.rows) and after != indexes:
-            self.changes.emit(MoveEntries(tuple(map(self.place, indexes)), to), after)
+            self.changes.emit(MoveTo(tuple(map(self.place, indexes)), to, stays=True), after)
 
     def remove(self, indexes: tuple[int, ...]) -> None:
         """Ask to remove entries, the last first."""
@@ -255,7 +255,8 @@ class EntryList(Field):
     def _duplicate(self) -> None:
         if self.row.row.kind != "references":  # a name that is listed twice is a fault
             after = tuple(index + rank for rank, index in enumerate(self.chosen, start=1))
-            self.changes.emit(DuplicateEntries(tuple(map(self.place, self.chosen))), after)
+            first, *others = map(self.place, self.chosen)
+            self.changes.emit(DuplicateElement(first, tuple(others), stays=True), after)
 
     def _copy(self) -> None:
         self.asked.emit(Do("copy", (tuple(map(self.place, self.chosen)),)))

@@ -25,7 +25,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QFrame, QPlainTextEdit, QWidget
 
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_text import spans_of
+from study_app.designer.document.toml_text import common_ends, spans_of
 from study_app.designer.form.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
@@ -92,11 +92,7 @@ def retyped(text: str, typed: str) -> str:
         The text of the pane after typing.
     """
     old, newline = shown(text), "\r\n" if "\r\n" in text else "\n"
-    shortest, first, last = min(len(old), len(typed)), 0, 0
-    while first < shortest and old[first] == typed[first]:
-        first += 1
-    while last < shortest - first and old[-1 - last] == typed[-1 - last]:
-        last += 1
+    first, last = common_ends(old, typed)
     begin, end = _original(text, first), _original(text, len(old) - last)
     return text[:begin] + typed[first : len(typed) - last].replace("\n", newline) + text[end:]
 
@@ -242,11 +238,7 @@ class FileEditor(Themed, QPlainTextEdit):
                 self._rest.start(HAND_ON_MS)
 
     def _replace(self, old: str, new: str) -> None:
-        shortest, first, last = min(len(old), len(new)), 0, 0
-        while first < shortest and old[first] == new[first]:
-            first += 1
-        while last < shortest - first and old[-1 - last] == new[-1 - last]:
-            last += 1
+        first, last = common_ends(old, new)
         self._showing = True
         cursor = QTextCursor(self.document())
         cursor.setPosition(_units(old[:first]))

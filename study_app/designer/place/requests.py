@@ -107,10 +107,14 @@ class ChangeLanguage:
 
 @dataclass(frozen=True, slots=True)
 class DuplicateElement:
-    """Copy an element right after itself; ``also`` are others that are copied with it."""
+    """Copy an element right after itself; ``also`` are others that are copied with it.
+
+    ``stays`` says that the form stays at its element, as where entries of a list in it are copied.
+    """
 
     path: Path
     also: tuple[Path, ...] = ()
+    stays: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,10 +137,14 @@ class MoveElement:
 
 @dataclass(frozen=True, slots=True)
 class MoveTo:
-    """Move entries of a list together before the one at the index ``to``; its length stands for the end."""
+    """Move entries of a list together before the one at the index ``to``; its length stands for the end.
+
+    ``stays`` says that the form stays at its element.
+    """
 
     entries: tuple[Path, ...]
     to: int
+    stays: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,21 +153,6 @@ class Paste:
 
     path: Path
     text: str
-
-
-@dataclass(frozen=True, slots=True)
-class MoveEntries:
-    """Move entries of a list as `MoveTo` does; the form stays at its element."""
-
-    entries: tuple[Path, ...]
-    to: int
-
-
-@dataclass(frozen=True, slots=True)
-class DuplicateEntries:
-    """Copy entries of a list, each right after itself; the form stays at its element."""
-
-    entries: tuple[Path, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,9 +215,8 @@ class GoTo:
 
 Request: TypeAlias = (
     SetValue | SetText | LeaveText | RemoveKey | AddKey | AddEntry | SwitchKind | SwitchKey | AddElement | AddNamed
-    | AddInstrument | ChangeLanguage | DuplicateElement | MakeSeries | MoveElement | MoveTo | MoveEntries
-    | DuplicateEntries | Paste | DeleteElement | RenameElement
-    | RetypeFile | Several
+    | AddInstrument | ChangeLanguage | DuplicateElement | MakeSeries | MoveElement | MoveTo | Paste | DeleteElement
+    | RenameElement | RetypeFile | Several
 )  # fmt: skip
 
 

@@ -40,30 +40,7 @@ from study_app.designer.document.names import (
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Edit, Insert, Move, Set, Unset
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.place.requests import (
-    AddElement,
-    AddEntry,
-    AddInstrument,
-    AddKey,
-    AddNamed,
-    ChangeLanguage,
-    DeleteElement,
-    DuplicateElement,
-    DuplicateEntries,
-    MakeSeries,
-    MoveElement,
-    MoveEntries,
-    MoveTo,
-    Paste,
-    RemoveKey,
-    RenameElement,
-    Request,
-    SetText,
-    SetValue,
-    Several,
-    SwitchKey,
-    SwitchKind,
-)
+from study_app.designer.place import requests
 from study_app.designer.problems.problems import element_of
 from study_app.ids import free_id
 from study_app.number_text import exact_text
@@ -99,7 +76,7 @@ def series_prompt(study: Study, path: Path) -> SeriesPrompt | None:
     return SeriesPrompt(path, title_of(study.document, path), fields) if fields else None
 
 
-def series_titles(study: Study, asked: MakeSeries) -> tuple[tuple[str, ...], str]:
+def series_titles(study: Study, asked: requests.MakeSeries) -> tuple[tuple[str, ...], str]:
     """Return the title of each copy of a series; where there can be no copies with these values, why."""
     row = number_row(study.document, asked.path, asked.field)
     try:
@@ -133,7 +110,7 @@ class Step:
     fresh: bool = False  # whether what is selected after it is new: its first text takes the keyboard
 
 
-def add(study: Study, asked: AddElement, selected: Path) -> Step:
+def add(study: Study, asked: requests.AddElement, selected: Path) -> Step:
     """Return the step that adds an element after the selected one of its kind, and beside its step in the session."""
     section = asked.section
     behind = selected[len(section)] if selected[: len(section)] == section and len(selected) > len(section) else None
@@ -141,7 +118,7 @@ def add(study: Study, asked: AddElement, selected: Path) -> Step:
     return Step(f"Add {singular(section[-1])}", beside(study, edits, selected, path), path, fresh=True)
 
 
-def add_named(study: Study, asked: AddNamed) -> Step:
+def add_named(study: Study, asked: requests.AddNamed) -> Step:
     """Return the step that adds an element and names it at a place."""
     row = row_at(study.document, asked.path)
     edits, path = added(study, (asked.section,))
@@ -156,7 +133,7 @@ def add_named(study: Study, asked: AddNamed) -> Step:
     return Step(f"Add {singular(asked.section)}", edits, path, fresh=True)
 
 
-def add_instrument(study: Study, asked: AddInstrument) -> Step:
+def add_instrument(study: Study, asked: requests.AddInstrument) -> Step:
     """Return the step that adds a standard questionnaire; its questions are listed where the study writes texts."""
     source, languages = instrument(asked.name), languages_of(study)
     table: dict[str, Any] = {"instrument": asked.name}
@@ -166,7 +143,7 @@ def add_instrument(study: Study, asked: AddInstrument) -> Step:
     return Step(f"Add {asked.name}", (Set(path, table),), path)
 
 
-def change_language(study: Study, asked: ChangeLanguage) -> Step:
+def change_language(study: Study, asked: requests.ChangeLanguage) -> Step:
     """Return the step that adds a language, fills in its texts or takes it away."""
     code = asked.language
     words = {"add": "Add", "copy": "Fill in", "remove": "Remove"}[asked.how]
@@ -174,7 +151,7 @@ def change_language(study: Study, asked: ChangeLanguage) -> Step:
     return Step(f"{words} {language_name(code)}", edits)
 
 
-def duplicate(study: Study, asked: DuplicateElement) -> Step:
+def duplicate(study: Study, asked: requests.DuplicateElement) -> Step:
     """Return the step that copies elements; the step of each in the session comes right after that of the original."""
     edits: tuple[Edit, ...] = ()
     copies: list[Path] = []
@@ -189,7 +166,7 @@ def duplicate(study: Study, asked: DuplicateElement) -> Step:
     return Step(words, edits, copies[0], several=tuple(copies), fresh=len(copies) == 1)
 
 
-def make_series(study: Study, asked: MakeSeries) -> Step:
+def make_series(study: Study, asked: requests.MakeSeries) -> Step:
     """Return the step that makes copies of an element that differ in one number, one for each value.
 
     A copy is listed in the blocks that list the element, unless the block would then have a problem.
@@ -232,7 +209,7 @@ def beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) ->
     return edits if _index(step) == to else (*edits, Move(step, to))
 
 
-def move(study: Study, asked: MoveElement) -> Step:
+def move(study: Study, asked: requests.MoveElement) -> Step:
     """Return the step that moves an element up or down by one place, with those of its list that move with it."""
     first = step_of(study.document, asked.path)
     if first is None:
@@ -248,7 +225,7 @@ def move(study: Study, asked: MoveElement) -> Step:
     return _moved(study, tuple(together), tuple(together.values()), to, words)
 
 
-def move_to(study: Study, asked: MoveTo) -> Step:
+def move_to(study: Study, asked: requests.MoveTo) -> Step:
     """Return the step that moves entries of a list to another place in it."""
     things = tuple((named_at(study.document, entry) or entry) for entry in asked.entries)
     return _moved(study, things, asked.entries, asked.to, f"Move {_titles(study, things)}")
@@ -264,7 +241,7 @@ def _moved(study: Study, things: Sequence[Path], entries: Sequence[Path], to: in
     return Step(words, edits, paths[0], several=paths, said=said)
 
 
-def paste(study: Study, asked: Paste) -> Step:
+def paste(study: Study, asked: requests.Paste) -> Step:
     """Return the step that pastes elements after the selected one."""
     if not study.is_toml:
         raise Refused("the file cannot be read: correct its text first")
@@ -281,7 +258,7 @@ def paste(study: Study, asked: Paste) -> Step:
     return Step(words, edits, found.paths[0], text=found.text, several=found.paths)
 
 
-def delete(study: Study, asked: DeleteElement) -> Step:
+def delete(study: Study, asked: requests.DeleteElement) -> Step:
     """Return the step that deletes elements."""
     path, document = asked.path, study.document
     paths = (path, *asked.also)
@@ -370,7 +347,7 @@ class Steps:
         """Forget what switches removed: another element is selected."""
         self._left.clear()
 
-    def step(self, study: Study, asked: Request, selected: Path = ()) -> Step:
+    def step(self, study: Study, asked: requests.Request, selected: Path = ()) -> Step:
         """Return the step that is asked for while an element is selected.
 
         Raises
@@ -378,36 +355,31 @@ class Steps:
         Refused
             It makes no sense in this study.
         """
-        if isinstance(asked, SetText):
+        if isinstance(asked, requests.SetText):
             edits = (*_text(study, asked), *followed(study, asked.path, asked.language, asked.text))
             return Step(f"Type {label_of(asked.path[-1])}", edits, None, (asked.path, asked.language))
-        if isinstance(asked, SwitchKind):
+        if isinstance(asked, requests.SwitchKind):
             return self._switch(study, asked)
-        if isinstance(asked, SwitchKey):
+        if isinstance(asked, requests.SwitchKey):
             return self._switch_key(study, asked)
-        if isinstance(asked, SetValue):
+        if isinstance(asked, requests.SetValue):
             name = label_of(asked.path[-1])
             return Step(f"Change {name}", (Set(asked.path, asked.value),), None, asked.path if asked.typing else None)
-        if isinstance(asked, RemoveKey):
+        if isinstance(asked, requests.RemoveKey):
             return Step(f"Remove {label_of(asked.path[-1])}", (Unset(asked.path),))
-        if isinstance(asked, AddKey):
+        if isinstance(asked, requests.AddKey):
             return Step(f"Add {label_of(asked.path[-1])}", (Set(asked.path, _first_value(study, asked.path)),))
-        if isinstance(asked, AddEntry):
+        if isinstance(asked, requests.AddEntry):
             return _add_entry(study, asked)
-        if isinstance(asked, MoveEntries):
-            return replace(move_to(study, MoveTo(asked.entries, asked.to)), select=None, several=())
-        if isinstance(asked, DuplicateEntries):
-            step = duplicate(study, DuplicateElement(asked.entries[0], asked.entries[1:]))
-            return replace(step, select=None, several=(), fresh=False)
-        if isinstance(asked, RenameElement):
+        if isinstance(asked, requests.RenameElement):
             edits = renamed(study.document, asked.path, asked.name, self._recorded(asked.path))
             after = asked.path if isinstance(asked.path[-1], int) else (*asked.path[:-1], asked.name)
             return Step(f"Rename to {asked.name}", edits, after)
-        if isinstance(asked, Several):
+        if isinstance(asked, requests.Several):
             return self._several(study, asked, selected)
         return _of_elements(study, asked, selected)
 
-    def _several(self, study: Study, asked: Several, selected: Path) -> Step:
+    def _several(self, study: Study, asked: requests.Several, selected: Path) -> Step:
         edits: tuple[Edit, ...] = ()
         for one in asked.requests:
             step = self.step(study, one, selected)
@@ -415,13 +387,13 @@ class Steps:
             edits += step.edits
         return Step(asked.words, edits)
 
-    def _switch(self, study: Study, asked: SwitchKind) -> Step:
+    def _switch(self, study: Study, asked: requests.SwitchKind) -> Step:
         kept = self._left.get(asked.path, {})
         edits = switched(study, asked.path, asked.kind, kept)
         self._left[asked.path] = {**kept, **left_by(study, asked.path, asked.kind)}
         return Step(f"Switch to {label_of(asked.kind or 'nothing').lower()}", edits)
 
-    def _switch_key(self, study: Study, asked: SwitchKey) -> Step:
+    def _switch_key(self, study: Study, asked: requests.SwitchKey) -> Step:
         table, name = asked.path[:-1], str(asked.path[-1])
         before = value_at(study.document, asked.path)
         kept = {**self._left.get(table, {}), **({} if before is None else {name: before})}
@@ -435,20 +407,29 @@ class Steps:
 
 
 _OF_ELEMENTS: Final[Mapping[type, Callable[[Study, Any], Step]]] = {
-    AddNamed: add_named, AddInstrument: add_instrument, ChangeLanguage: change_language, DuplicateElement: duplicate,
-    MoveElement: move, MoveTo: move_to, Paste: paste, DeleteElement: delete, MakeSeries: make_series,
-}  # fmt: skip
+    requests.AddNamed: add_named,
+    requests.AddInstrument: add_instrument,
+    requests.ChangeLanguage: change_language,
+    requests.DuplicateElement: duplicate,
+    requests.MoveElement: move,
+    requests.MoveTo: move_to,
+    requests.Paste: paste,
+    requests.DeleteElement: delete,
+    requests.MakeSeries: make_series,
+}
 
 
-def _of_elements(study: Study, asked: Request, selected: Path) -> Step:
-    if isinstance(asked, AddElement):
+def _of_elements(study: Study, asked: requests.Request, selected: Path) -> Step:
+    if isinstance(asked, requests.AddElement):
         return add(study, asked, selected)
     if type(asked) in _OF_ELEMENTS:
-        return _OF_ELEMENTS[type(asked)](study, asked)
+        step = _OF_ELEMENTS[type(asked)](study, asked)
+        stays = isinstance(asked, requests.MoveTo | requests.DuplicateElement) and asked.stays
+        return replace(step, select=None, several=(), fresh=False) if stays else step
     raise Refused("this cannot be done with a study")
 
 
-def _text(study: Study, asked: SetText) -> tuple[Edit, ...]:
+def _text(study: Study, asked: requests.SetText) -> tuple[Edit, ...]:
     languages = [str(code) for _, code in entries(study.document, "study.languages.*")] or [asked.language]
     value = value_at(study.document, asked.path)
     if isinstance(value, Mapping):
@@ -469,7 +450,7 @@ def _first_value(study: Study, path: Path) -> Any:
     return {str(row.path[-1]): _listed(initial(after.document, row.path)) for row in needed}
 
 
-def _add_entry(study: Study, asked: AddEntry) -> Step:
+def _add_entry(study: Study, asked: requests.AddEntry) -> Step:
     row = row_at(study.document, asked.path)
     there = row.value if row is not None and isinstance(row.value, tuple) else ()
     value = asked.value
