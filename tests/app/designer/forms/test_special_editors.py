@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QGuiApplication, QMouseEvent
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.gui.widgets.controls import IconButton
 
@@ -96,3 +96,14 @@ def test_a_question_is_shown_whole_and_typed_as_one_paragraph(qtbot: Any, design
     assert designer.text != before
     designer.editing.undo()
     assert designer.text == before
+
+
+@pytest.mark.parametrize("row", [("scales", "agreement", "labels"), (*ITEMS, 0, "text")])
+def test_any_language_from_right_to_left_is_typed_so(
+    designer: Any, monkeypatch: pytest.MonkeyPatch, row: tuple[str | int, ...]
+) -> None:
+    monkeypatch.setattr("study_app.protocol.wording.languages.RIGHT_TO_LEFT", {"en"})
+    designer.open("kitchen", *row[:-1])
+    field = designer.field(*row)
+    lines = [*field.findChildren(QLineEdit), *field.findChildren(QPlainTextEdit)]
+    assert {one.layoutDirection() for one in lines} == {Qt.LayoutDirection.RightToLeft}
