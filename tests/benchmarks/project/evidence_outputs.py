@@ -70,7 +70,7 @@ COMMANDS: Final = {
     "stability --delivered": Compared("stability --delivered"),
     "stability --estimation": Compared("stability --estimation 4"),
     "stability --only": Compared("stability --cases 2 --only driver", SECONDS),
-    "stability --table": Compared("stability --table out/limits.csv"),
+    "stability --table": Compared("stability --table out/limits.csv", lines="^(line|foaw|lead),"),
     "stability --velocity": Compared("stability --velocity", columns=("line", "foaw", "lead"), lines="^cost"),
     "stability --withheld": Compared("stability --withheld"),
     "timing": TIMES._replace(arguments="timing --seconds 0.5 --to out"),
