@@ -72,8 +72,7 @@ sys.exit(live.code)
 
 HELP = """
 from study_app.gui.application import application_here
-from study_app.gui.help.view import HelpPlace
-from study_app.viewmodels.help import entries
+from study_app.gui.help.view import HelpPlace, entries
 application_here()
 place = HelpPlace()
 for entry in entries():
