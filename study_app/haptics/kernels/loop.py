@@ -250,9 +250,9 @@ def _take_scene(host: Any, slots: Any, safety: Any, sample: Any) -> None:
 @kernel
 def _copy_constants(host: Any, model: Any, spare: Any, slot: int) -> None:
     """Copy the constants and the serial of the spare model into a model; its state stays."""
-    model.parameters[0] = spare.parameters[0]
+    c_functions.copy_record(model.parameters[0], spare.parameters[0])
     for i in range(model.liquids.shape[0]):
-        model.liquids[i] = spare.liquids[i]
+        c_functions.copy_record(model.liquids[i], spare.liquids[i])
     host.serial[slot] = host.serial[1 - slot]
 
 
