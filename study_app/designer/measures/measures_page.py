@@ -253,8 +253,9 @@ class MeasuresPage(Themed, QWidget):
             unit = f", {of.words.unit}" if of.words.unit else ""
             self.function.show_simulated(f"% {of.words.success} over {of.words.kind}{unit}", of, shown)
             self.track.show_simulated(f"{of.words.kind}{unit} over trials", of, shown)
-        self.grid.setVisible(bool(shown.cards))
-        self.grid.show_cards(shown.cards)
+        cards = () if shown.numbers else shown.cards
+        self.grid.setVisible(bool(cards))
+        self.grid.show_cards(cards)
 
     def _make_plots(self) -> None:
         from study_app.designer.measures.plots import ForcesView, FunctionView, TrackView  # noqa: PLC0415 - pyqtgraph, once there is a plot

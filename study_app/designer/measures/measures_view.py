@@ -77,8 +77,8 @@ class MeasuresView:
 
     @property
     def below(self) -> tuple[MeasureCard, ...]:
-        """The cards that stay below other tabs."""
-        return () if self.numbers else self.cards[:BELOW]
+        """The cards that stay below other tabs; the tab itself shows cards where it has no numbers."""
+        return self.cards[:BELOW]
 
 
 def measures_view(

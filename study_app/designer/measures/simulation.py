@@ -113,7 +113,8 @@ def simulation_of(protocol: Protocol, focus: Focus, controls: Controls) -> Simul
     if not simulated and not advises(protocol):
         return None
     block = focus.block.id if focus.block is not None and simulated else ""
-    return Simulation(_dependencies(protocol), block, controls if block else Controls(), protocol)
+    depends = json.dumps(_without_texts(protocol.model_dump(mode="json", exclude={"pages"})), sort_keys=True)
+    return Simulation(depends, block, controls if block else Controls(), protocol)
 
 
 def advises(protocol: Protocol) -> bool:
@@ -158,12 +159,6 @@ def least_of(protocol: Protocol, plan: ThresholdPlan) -> float:
     if plan.stimulus.level_kind == "weber":
         return ERRORS * (limits.level_error_percent or USUAL_ERROR_PERCENT) / 100
     return 0.0
-
-
-def _dependencies(protocol: Protocol) -> str:
-    """Return the parts of a study on which its simulations depend: all except pages and texts."""
-    whole = protocol.model_dump(mode="json", exclude={"pages"})
-    return json.dumps(_without_texts(whole), sort_keys=True)
 
 
 def _without_texts(value: Any) -> Any:
@@ -224,24 +219,15 @@ def _group(plan: ThresholdPlan, controls: Controls, check: Check) -> GroupPrecis
     more = plan.with_trials(round(MORE * plan.trials))
     shares = [_studies(one, (people,), check).within(0, precision) for one in (plan, more)]
     enough = people if shares[0] >= ENOUGH else None
-    for sizes in _looked_for(people):
-        if enough is not None:
-            break
-        found = _studies(plan, sizes, check)
+    last = people
+    while enough is None and last < MOST_PEOPLE:
+        sizes = range(last + 1, min(2 * last, MOST_PEOPLE) + 1)
+        found, last = _studies(plan, sizes, check), sizes[-1]
         enough = next((size for place, size in enumerate(sizes) if found.within(place, precision) >= ENOUGH), None)
     most = max(MOST_PEOPLE, people)
     return GroupPrecision(
         people, THRESHOLD_STUDIES, precision, plan.trials, shares[0], more.trials, shares[1], most, enough
     )
-
-
-def _looked_for(people: int) -> list[range]:
-    """Return where it is looked for how many participants are enough: twice as many each time, up to `MOST_PEOPLE`."""
-    found, last = [], people
-    while last < MOST_PEOPLE:
-        found.append(range(last + 1, min(2 * last, MOST_PEOPLE) + 1))
-        last = found[-1][-1]
-    return found
 
 
 def _studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> threshold_studies.PrecisionResult:

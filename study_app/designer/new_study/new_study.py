@@ -71,7 +71,10 @@ def answered(study: Study, answers: Answers) -> Study:
         if fault is not None:
             raise Refused(f"{fault.message}{f' ({fault.hint})' if fault.hint else ''}")
     if answers.title:
-        study, _ = study.edited(*_titled(study, answers.title))
+        head = study.document["study"]
+        by_language = isinstance(head, Mapping) and isinstance(head.get("title"), Mapping)
+        place = ("study", "title", languages_of(study)[0]) if by_language else ("study", "title")
+        study, _ = study.edited(Set(place, answers.title))
     there = languages_of(study)
     for code in answers.languages:
         if code not in there:
@@ -82,14 +85,6 @@ def answered(study: Study, answers: Answers) -> Study:
         if answers.languages and code not in answers.languages:
             study, _ = study.edited(*without_language(study, code))
     return study
-
-
-def _titled(study: Study, title: str) -> tuple[Set, ...]:
-    head = study.document["study"]
-    before = head.get("title") if isinstance(head, Mapping) else None
-    if isinstance(before, Mapping):
-        return (Set(("study", "title", languages_of(study)[0]), title),)
-    return (Set(("study", "title"), title),)
 
 
 def check_free(name: str) -> Path:

@@ -192,7 +192,7 @@ def playable(study: Study, path: Path, position: StepPosition | None = None) -> 
         own = tuple(one for problem in found.problems if (one := known.get((problem.place, problem.message))))
         raise NotPlayableError(own or found.problems)
     shown = preview(found.protocol, position.seed)
-    step = _step_at(shown, position) if position.name else first_step(shown, path)
+    step = _step_at(shown, position) if position.name else first_step(shown, path) or 0
     return Playable(
         with_liquid_files(found.text.encode(), found.folder),
         found.folder,

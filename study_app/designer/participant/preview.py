@@ -1,15 +1,17 @@
-"""The participant's page of the study that is edited: which page, in which language, with which answers."""
+"""The participant's page of the study that is edited: the tab with language, screen, steps and pages."""
 
 import time
 from collections.abc import Mapping
 from typing import Final
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QWidget
 
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.study import Study
 from study_app.designer.measures.valid_part import valid_part
-from study_app.designer.participant.participant_tab import ParticipantTab
+from study_app.designer.participant.live_page import LivePage
 from study_app.designer.participant.playable import last_valid, sound_part
 from study_app.designer.participant.shown_step import (
     SIZES,
@@ -32,6 +34,14 @@ from study_app.gui.display.screens import choose_screens
 from study_app.gui.kit.commands import add_commands, tip
 from study_app.gui.kit.devices import screen_number, settings_here, text_scale_on
 from study_app.gui.widgets.background import delayed
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.accessible import say
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
+from study_app.gui.widgets.controls import Cap, Choice, IconButton
+from study_app.gui.kit.commands import key_cap
+from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.numbers import NumberField
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
@@ -45,23 +55,56 @@ from study_app.session.transitions.page_builder import Moment, moments, preview,
 from study_app.store.study_settings import keep_setting, kept_language
 
 NO_ANSWERS: Final[Mapping[str, Value]] = {}
+MOST_IN_ROW: Final = 2
+TRIAL_PX: Final = 48
+BAR_PX: Final = 34
+"""The height of what stands beside the tabs."""
 
 
-class ParticipantPreview(QObject):
-    """Shows the participant's page that the selected element is on, and goes from step to step.
+class ParticipantPreview(Card):
+    """The tab Participant: the page that the selected element is on, with language, screen, steps and pages.
 
     It is drawn with the seed of `session.preview`; no sealed key is read. Answers are kept while the study is open, so
     that an edit does not empty the page, and go nowhere else.
     """
 
     def __init__(self, editing: Editing, place: DesignerPlace) -> None:
-        super().__init__(editing)
+        super().__init__(padding=12, gap=10)
         self.editing, self.place = editing, place
-        self.tab = tab = ParticipantTab()
-        fit, most = tab.fit_aside, lambda: tab.most_px
-        page = PanePage("participant", "Participant", tab, tab.aside, fit_aside=fit, most_px=most, tip=tip("page"))
-        place.pane.add_page(page, first=True)
-        tab.resized.connect(place.pane.make_room)
+        self.view = ParticipantView()
+        self._screens_shown: tuple[ScreenSize, ...] = ()
+        self._high = 0
+        self.page = LivePage()
+        self.setFocusProxy(self.page)
+        self.note = label("", "small", "warn", wraps=True)
+        self.note.hide()
+        self.languages = Segments("Language of the page")
+        self.language_key = Cap(key_cap("language"))
+        self.language_key.setToolTip(tip("language"))
+        self.screens = Choice()
+        self.screens.setAccessibleName("Screen")
+        self.screens.setFont(font("label"))
+        self.screens.setProperty("dense", "true")
+        self.screens.setFixedHeight(BAR_PX)
+        self.screens.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.screens.setMinimumContentsLength(9)
+        self.aside = QWidget()
+        hbox(self.languages, self.language_key, self.screens, spacing=10, margins=0, parent=self.aside)
+        self.before = IconButton("chevron_left", "Previous step", "Previous step", size=36)
+        self.after = IconButton("chevron", "Next step", "Next step", size=36)
+        for button in (self.before, self.after):
+            button.setAutoRepeat(True)
+        self.step = label("", "label", wraps=True)
+        self.trial, self.trials = NumberField(), label("", "label")
+        self.trial.setFixedWidth(TRIAL_PX)
+        self.trial.setToolTip("Trial of the block; Play from here begins with it")
+        self.moments = Segments("Page of the trial")
+        self.zoom = Segments("Size of the page")
+        self.zoom.show_values(((True, "Fit"), (False, "100 %")), chosen=True)
+        parts = (self.before, (self.step, 1), self.trial, self.trials, self.after, self.moments, self.zoom)
+        self._row, self._second = hbox(*parts, spacing=8), hbox(STRETCH)
+        add_parts(self.column, self.note, (self.page, 1), self._row, self._second, STRETCH)
+
         self._language = ""
         self._found: Found | None = None
         self._moment: Moment | None = None
@@ -80,20 +123,29 @@ class ParticipantPreview(QObject):
         editing.changed.connect(self._after_form.start)
         editing.edited.connect(self._follow)
         place.entered.connect(self._look_at_screen)
-        tab.shown.connect(self._follow)
-        tab.language_asked.connect(self.show_language)
-        tab.step_asked.connect(self.go)
-        tab.trial_asked.connect(self.go_to_trial)
-        tab.moment_asked.connect(self.show_moment)
-        tab.happened.connect(self._hear)
-        tab.frame_due.connect(self._move_ball)
+        self.page.shown.connect(self._follow)
+        self.page.happened.connect(self._hear)
+        self.page.frame_due.connect(self._move_ball)
+        self.page.left.connect(lambda: self.before.setFocus(Qt.FocusReason.OtherFocusReason))
+        self.languages.chosen.connect(lambda code: self.show_language(str(code)))
+        self.screens.activated.connect(self._choose_screen)
+        self.before.clicked.connect(lambda: self.go(-1))
+        self.after.clicked.connect(lambda: self.go(1))
+        self.trial.entered.connect(lambda number: self.go_to_trial(round(number)))
+        self.trial.unread.connect(lambda _text: self.trial.put_back())
+        self.trial.stepped.connect(lambda steps: self.go_to_trial(self.view.trial + steps))
+        self.moments.chosen.connect(self.show_moment)
+        self.zoom.chosen.connect(self._show_fitted)
+        page = PanePage("participant", "Participant", self, self.aside, fit_aside=self.fit_aside,
+                        most_px=lambda: self.most_px, tip=tip("page"))  # fmt: skip
+        place.pane.add_page(page, first=True)
         add_commands(place, {"page": self.enter_page, "language": self.show_next_language})
         self._look_at_screen()
 
     @property
     def position(self) -> StepPosition | None:
         """Where the preview is; None where it shows nothing, or a page that is not in the first session."""
-        self.tab.trial.flush()
+        self.trial.flush()
         self._update()
         found = self._found
         if found is None or found.session:
@@ -107,7 +159,7 @@ class ParticipantPreview(QObject):
     def enter_page(self) -> None:
         """Give the keyboard to the page."""
         self._come_forward()
-        self.tab.page.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.page.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def _come_forward(self) -> None:
         self.place.sides.chosen.emit("pane")
@@ -120,9 +172,9 @@ class ParticipantPreview(QObject):
         self._come_forward()
         if hides and not form.isVisible():
             self.place.pane.tabs.setFocus(Qt.FocusReason.ShortcutFocusReason)
-        languages = self.tab.view.languages
+        languages = self.view.languages
         if len(languages) > 1:
-            self.show_language(languages[(languages.index(self.tab.view.language) + 1) % len(languages)])
+            self.show_language(languages[(languages.index(self.view.language) + 1) % len(languages)])
 
     def show_language(self, language: str) -> None:
         """Show the pages in another language, also when the study is opened again."""
@@ -164,7 +216,7 @@ class ParticipantPreview(QObject):
             self.show_language(event.language)
         elif isinstance(event, Chosen):
             self._answers.setdefault(self._page_key, {})[event.item] = event.value
-            if isinstance(self.tab.view.page, DesignPage):
+            if isinstance(self.view.page, DesignPage):
                 self._go_on()
         elif isinstance(event, Retracted):
             self._answers.get(self._page_key, {}).pop(event.item, None)
@@ -201,11 +253,11 @@ class ParticipantPreview(QObject):
         size = screen.size()
         own = ScreenSize("own", f"This machine's, {size.width()} × {size.height()}", size.width(), size.height(),
                          text_scale_on(settings, screen))  # fmt: skip
-        self.tab.offer_screens((*SIZES, own))
+        self.offer_screens((*SIZES, own))
 
     def _follow(self) -> None:
         self._after_form.stop()
-        if self.editing.opened is not None and self.tab.isVisible():
+        if self.editing.opened is not None and self.isVisible():
             self._show()
 
     def _update(self) -> None:
@@ -266,7 +318,7 @@ class ParticipantPreview(QObject):
             return
         if found is None:
             problem = str(study.problems[0]) if study.problems else "there is no step"
-            self.tab.show_view(ParticipantView(note=f"The page cannot be shown: {problem}"))
+            self.show_view(ParticipantView(note=f"The page cannot be shown: {problem}"))
             return
         shown, index = found.shown, found.index
         pages = moments(shown, index)
@@ -281,7 +333,7 @@ class ParticipantPreview(QObject):
         step = step_words(shown, now, shown.protocol.study.languages[0])
         if found.session and found.session != STANDALONE:
             step = f"{step} ({found.session})"
-        self.tab.show_view(
+        self.show_view(
             ParticipantView(
                 page,
                 self._language,
@@ -360,4 +412,85 @@ class ParticipantPreview(QObject):
 
     def _move_ball(self) -> None:
         if self._ball is not None:
-            self.tab.show_tank(self._ball.view(time.monotonic() - self._since_s))
+            self.page.show_tank(self._ball.view(time.monotonic() - self._since_s))
+
+    # the widgets
+
+    def show_view(self, view: ParticipantView) -> None:
+        before, self.view = self.view, view
+        self.setAccessibleName(view.name)
+        if before.language and view.language != before.language:
+            say(self.languages, view.name)
+        self.languages.tips = dict.fromkeys(view.languages, tip("language"))
+        self.languages.setVisible(len(view.languages) > 1)
+        self.languages.show_values([(code, code.upper()) for code in view.languages], view.language)
+        self.note.setText(view.note)
+        self.note.setVisible(bool(view.note))
+        self._show_step(view)
+        self.before.setEnabled(view.has_before)
+        self.after.setEnabled(view.has_after)
+        self.moments.setVisible(bool(view.moments))
+        self.moments.show_values(view.moments, view.moment)
+        if len(view.moments) > MOST_IN_ROW:
+            self._second.insertWidget(0, self.moments)
+        else:
+            self._row.insertWidget(self._row.indexOf(self.after) + 1, self.moments)
+        self.page.show_view(view)
+        if view.languages != before.languages:
+            self.place.pane.make_room()  # the controls beside the tabs have another width
+        if (high := self.column.minimumSize().height()) != self._high:  # another note, or another row of pages
+            self._high = high
+            self.place.pane.make_room()
+
+    def _show_step(self, view: ParticipantView) -> None:
+        """Name the step; the number of a trial is a field."""
+        before, after = view.around_trial if view.trials else (view.step, "")
+        sides = Qt.AlignmentFlag.AlignVCenter
+        self.step.setText(before)
+        self.step.setAlignment(sides | (Qt.AlignmentFlag.AlignRight if after else Qt.AlignmentFlag.AlignHCenter))
+        self.trials.setText(after)
+        for part in (self.trial, self.trials):
+            part.setVisible(bool(after))
+        self.trial.setAccessibleName(f"{before}, 1 to {view.trials}; Play from here begins with it")
+        self.trial.show_text(str(view.trial))
+
+    def fit_aside(self, room_px: int) -> None:
+        """Show the key of the languages where there is room for it."""
+        self.language_key.setVisible(len(self.view.languages) > 1)
+        self.language_key.setVisible(len(self.view.languages) > 1 and self.aside.sizeHint().width() <= room_px)
+
+    def offer_screens(self, sizes: tuple[ScreenSize, ...]) -> None:
+        """Offer screens to show the page for."""
+        if sizes == self._screens_shown:
+            return
+        chosen = self.screens.currentData()
+        self._screens_shown = sizes
+        self.screens.clear()
+        for size in sizes:
+            self.screens.addItem(size.words, size.name)
+        self.screens.setCurrentIndex(max(self.screens.findData(chosen), 0))
+        self._choose_screen(self.screens.currentIndex())
+
+    def _choose_screen(self, at: int) -> None:
+        self.page.show_screen(self._screens_shown[at])
+        self._make_room()
+
+    def _show_fitted(self, fits: object) -> None:
+        self.zoom.show_values(((True, "Fit"), (False, "100 %")), fits)
+        self.page.show_fitted(fits=bool(fits))
+        self._make_room()
+
+    def _make_room(self) -> None:
+        margins = self.column.contentsMargins()
+        self.page.make_room(self.width() - margins.left() - margins.right())
+        self.place.pane.make_room()
+
+    @property
+    def most_px(self) -> int:
+        """The height that it can use: where the page is shown whole, no more than that needs [px]."""
+        other = self.column.minimumSize().height() - self.page.minimumHeight()
+        return min(QWIDGETSIZE_MAX, self.page.maximumHeight() + other)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._make_room()

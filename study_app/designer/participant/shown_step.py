@@ -109,15 +109,15 @@ Graph: TypeAlias = Mapping[Path, frozenset[Path]]
 """What each table names, by paths: ``("conditions", "syrup")`` → ``{("liquids", "syrup")}``."""
 
 
-def first_step(shown: Preview, path: Path) -> int:
-    """Return the index of the first step that shows an element; 0 where no step is about it.
+def first_step(shown: Preview, path: Path) -> int | None:
+    """Return the index of the first step that shows an element; None where no step is about it.
 
     ``shown``: the session; ``path``: the element, or a place within it: ``("conditions", "water")``, a question, a text
     of a page.
     """
     graph = graph_of(shown.protocol.model_dump())
     tables = (_shown_by(shown, step, graph) for step in shown.schedule.steps)
-    return next((at for at, found in enumerate(tables) if path[:2] in found), 0)
+    return next((at for at, found in enumerate(tables) if path[:2] in found), None)
 
 
 def graph_of(document: Mapping[str, object]) -> Graph:
@@ -147,14 +147,9 @@ def _shown_by(shown: Preview, step: Step, graph: Graph) -> frozenset[Path]:
         return reached(graph, [("questionnaires", step.form)])
     block: Path = ("blocks", step.block)
     parts = [part for part in graph.get(block, ()) if part[0] not in {"conditions", "pages"}]
-    return reached(graph, [*parts, *_presented(shown, step)]) | {block}
-
-
-def _presented(shown: Preview, trial: Trial) -> Iterator[Path]:
-    """Yield the conditions that a trial names; those of a varied number follow from the block's stimulus."""
-    for name in (shown.codes[trial.block][trial.code], shown.protocol.blocks[trial.block].standard):
-        if name in shown.protocol.conditions:
-            yield ("conditions", str(name))
+    named = (shown.codes[step.block][step.code], shown.protocol.blocks[step.block].standard)
+    presented = [("conditions", name) for name in named if name in shown.protocol.conditions]  # not of a varied number
+    return reached(graph, [*parts, *presented]) | {block}
 
 
 Side: TypeAlias = Literal["tank", "questions"]
@@ -209,7 +204,7 @@ def showing(study: Protocol, path: Path) -> Found | None:
     A page or questionnaire that is in no session is shown on its own.
     """
     for session, shown in previews(study):
-        if (index := _index(shown, path)) is not None:
+        if (index := first_step(shown, path)) is not None:
             return Found(shown, index, session)
     if len(path) > 1 and path[0] in {"pages", "questionnaires"}:
         name = str(path[1])
@@ -239,15 +234,3 @@ def same_step(study: Protocol, name: str, trial: int, session: str) -> Found | N
 def side_of(path: Path) -> Side | None:
     """Return on which page of a trial an element is seen; None: on either."""
     return _SIDES.get(str(path[0])) if path else None
-
-
-def _index(shown: Preview, path: Path) -> int | None:
-    index = first_step(shown, path)
-    return index if index or _is_first(shown, path) else None
-
-
-def _is_first(shown: Preview, path: Path) -> bool:
-    """Return whether the first step is about an element: `first_step` returns it for what no step shows, too."""
-    first = shown.schedule.steps[0]
-    alone = replace(shown, schedule=replace(shown.schedule, steps=(PageStep(""), first)))
-    return first_step(alone, path) == 1

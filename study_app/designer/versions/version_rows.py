@@ -5,7 +5,6 @@ import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -161,13 +160,9 @@ def _kept_words(one: Kept, now: datetime) -> str:
     when = _when(one.at, now)
     if one.origin == "draft":
         return f"Unsaved edits of another window, {when}"
-    return f"{_stated(one.hash)}: {'saved' if one.origin == 'saved' else 'in the file before it was saved'} {when}"
-
-
-@lru_cache(maxsize=256)
-def _stated(hash_: str) -> str:
-    found = _STATED.search((kept_content(hash_) or b"").decode("utf-8", "replace"))
-    return found[1] if found else "No version"
+    stated = _STATED.search((kept_content(one.hash) or b"").decode("utf-8", "replace"))
+    how = "saved" if one.origin == "saved" else "in the file before it was saved"
+    return f"{stated[1] if stated else 'No version'}: {how} {when}"
 
 
 def _when(moment: str, now: datetime) -> str:

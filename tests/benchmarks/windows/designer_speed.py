@@ -101,7 +101,7 @@ def main(edits: int = 60) -> None:
         for _ in range(edits):
             QTest.keyClick(field, Qt.Key.Key_B)
             painted.append(timed(controller.place.flush))
-        assert "bb" in str(controller.preview.tab.view.page)
+        assert "bb" in str(controller.preview.view.page)
         rows.append(("edit → live page painted", "100", painted))
         print("                                      goal   wall p50    p95    CPU p50    p95  [ms]")
         for what, goal, took in rows:

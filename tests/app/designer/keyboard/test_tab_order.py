@@ -21,7 +21,7 @@ def dutch(qtbot: Any, designer: Any) -> Any:
     for how in ("add", "copy"):
         designer.editing.ask(ChangeLanguage(how, "nl"))
     designer.go_to("blocks", "liquids")
-    qtbot.waitUntil(lambda: len(designer.controller.preview.tab.languages.buttons) == 2)
+    qtbot.waitUntil(lambda: len(designer.controller.preview.languages.buttons) == 2)
     return designer
 
 
@@ -48,7 +48,7 @@ def test_tab_goes_through_the_parts_as_they_are_seen(dutch: Any, width: int) -> 
     assert place.form.rows[0].isAncestorOf(seen[areas.index(3)])
     for crumb in place.parts.path.steps:
         assert (crumb in seen) == (width < 1400)
-    tab = dutch.controller.preview.tab
+    tab = dutch.controller.preview
     seen = passed(dutch, lambda part: part is tab.page)
     assert seen == [*place.pane.tabs.buttons, *tab.languages.buttons, tab.screens, tab.page]
     tab.page.left.emit()

@@ -53,6 +53,7 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
     assert page.function.plot.accessibleDescription().startswith("Share of answers that are correct")
     assert "19 %" in page.track.plot.accessibleDescription()
     assert page.forces.plot.accessibleDescription().startswith("Force at 31 levels")
+    assert not page.grid.isVisible()  # its cards stay below other tabs
 
     designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
     qtbot.waitUntil(lambda: len(worker.orders) == 2)

@@ -31,7 +31,7 @@ def live(designer: Any) -> Any:
     """The live page of the open study, with the question "Like honey" selected."""
     designer.open("kitchen", *ITEM)
     QApplication.processEvents()
-    return designer.controller.preview.tab.page
+    return designer.controller.preview.page
 
 
 def answers(live: Any) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def place_of(live: Any, part: Any) -> QPoint:
 def test_a_trial_is_typed_stepped_to_and_played(qtbot: Any, designer: Any) -> None:
     designer.controller.begin("template:viscosity-jnd", "thicker")
     designer.go_to("blocks", "viscosity")
-    tab, preview = designer.controller.preview.tab, designer.controller.preview
+    tab, preview = designer.controller.preview, designer.controller.preview
     trials = tab.view.trials
     assert (tab.step.text(), tab.trial.text(), tab.trials.text()) == ("Viscosity, trial", "1", f"of {trials}")
     assert tab.trial.accessibleName() == f"Viscosity, trial, 1 to {trials}; Play from here begins with it"
@@ -82,7 +82,7 @@ def test_keys_answer_the_page_and_go_on_and_esc_leaves_it(qtbot: Any, designer: 
     QTest.keyClick(designer.keyboard, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
     QTest.keyClick(live, Qt.Key.Key_3)
     QTest.keyClick(live, Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: designer.controller.preview.tab.view.step == "Liquids, trial 2 of 2")
+    qtbot.waitUntil(lambda: designer.controller.preview.view.step == "Liquids, trial 2 of 2")
     assert isinstance(live.page_window.page, TaskPage)
     assert designer.text == before
     assert not designer.results.exists()
@@ -139,7 +139,7 @@ def test_no_fault_blanks_the_page(designer: Any, broken: Any, opened: str) -> No
         designer.open("demo")
         designer.open("kitchen", "pages", "welcome")
     assert designer.study.faults
-    view = designer.controller.preview.tab.view
+    view = designer.controller.preview.view
     assert getattr(view.page, "title", "") == "A first look"
     assert "last valid" in view.note
 
@@ -168,7 +168,7 @@ def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live:
 def test_at_100_percent_the_page_is_that_of_a_session_pixel_by_pixel(
     qtbot: Any, designer: Any, live: Any, path: Any, screen: int
 ) -> None:
-    tab = designer.controller.preview.tab
+    tab = designer.controller.preview
     designer.go_to(*(("blocks", "liquids") if path == ITEM else path))
     tab.screens.setCurrentIndex(screen)
     tab.screens.activated.emit(screen)
@@ -224,7 +224,7 @@ def show():
     window.go("designer")
     designer.open("demo")
     QApplication.processEvents()
-    assert designer.preview.tab.page.page_window.isVisible()
+    assert designer.preview.page.page_window.isVisible()
     return designer, window
 
 
@@ -247,7 +247,7 @@ COPY = (*ITEM[:-1], 2)
 @pytest.fixture
 def tab(designer: Any) -> Any:
     designer.open("kitchen", *ITEM)
-    return designer.controller.preview.tab
+    return designer.controller.preview
 
 
 def statements(tab: Any) -> list[tuple[str, str]]:
