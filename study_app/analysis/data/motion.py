@@ -188,6 +188,11 @@ class Performance:
     invalid: int
     unread: tuple[str, ...]
 
+    def medians(self, block: str) -> pd.DataFrame:
+        """Return each participant's median of every measure of reaches, by (code, participant)."""
+        rows = [{**asdict(trial), **asdict(reach)} for trial in self.reached for reach in trial.found]
+        return _medians(pd.DataFrame(rows, columns=["participant", "block", "code", *OF_REACHES]), block, OF_REACHES)
+
     def recorded_in(self, block: str) -> bool:
         """Return whether there is any reach of a block."""
         return any(trial.block == block for trial in self.reached)
@@ -279,10 +284,13 @@ def _file(folder: Path, row: Mapping[Any, Any]) -> Path:
     return session_in(folder, str(row["participant"]), int(row["session"])).path / str(row["recording"])
 
 
+def _medians(rows: pd.DataFrame, block: str, measures: Sequence[str]) -> pd.DataFrame:
+    return rows[rows["block"] == block].groupby(["code", "participant"])[list(measures)].median()
+
+
 def _quartiles(block: Block, rows: pd.DataFrame, measures: Sequence[str]) -> Iterator[Moved]:
     """Yield the quartiles over participants of each one's median, by measure and setting; ``rows`` are of any block."""
-    here = rows[rows["block"] == block.id]
-    medians = here.groupby(["code", "participant"])[list(measures)].median()
+    medians = _medians(rows, block.id, measures)
     for measure in measures:
         for code in block.codes:
             values = medians[measure][medians.index.get_level_values("code") == code].dropna().to_numpy(dtype=float)

@@ -54,11 +54,13 @@ def draw_answers(
     lowest_ms: Sequence[float | None],
     foot: str,
     look: Look,
+    *,
+    own_scales: bool = False,
 ) -> Sheet:
     """Draw statements over delay on a true scale: a thin line per participant (of many: of some), band, thick median.
 
     ``plots`` are short texts and answers (participants, delays), ``lowest_ms`` the lowest delays at which a trend
-    shows.
+    shows. With ``own_scales`` they are measures, each on a scale of its own.
     """
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     columns = min(len(plots), PLOTS_A_ROW)
@@ -77,9 +79,12 @@ def draw_answers(
             sheet.text(x, top + 6.5 + number * TITLE_LINE_PT, line, size=TITLE_SIZE, weight="bold")
         axes = sheet.axes(x, top + title_pt + 6, width, ANSWERS_PT)
         axes.set_label(f"item{place + 1}")
-        axes.set_ylim(BOTTOM, TOP)
-        sheet.scale(axes, "y", LEVELS, LEVELS if column == 0 else (), lines=True)
-        over_delay(sheet, axes, values, np.asarray(delays_ms, dtype=float), SPREAD)
+        if own_scales:
+            _scale_to(sheet, axes, values)
+        else:
+            axes.set_ylim(BOTTOM, TOP)
+            sheet.scale(axes, "y", LEVELS, LEVELS if column == 0 else (), lines=True)
+        over_delay(sheet, axes, values, np.asarray(delays_ms, dtype=float), 0.0 if own_scales else SPREAD)
         _lowest(sheet, axes, lowest_ms[place], float(np.mean(delays_ms)))
         counts = (~np.isnan(values)).sum(axis=0)
         if (counts < len(values)).any():  # not every participant answered at every setting
@@ -89,6 +94,15 @@ def draw_answers(
             axes.text(1, 1.0, words, fontproperties=sheet.font(5.8), color=style.TEXT_SOFT, **where)
     sheet.text(MARGIN_PT + SCALE_PT, sheet.height_pt - 6, foot, size=6.5, colour=style.TEXT_SOFT)
     return sheet
+
+
+def _scale_to(sheet: Sheet, axes: Axes, values: Array) -> None:
+    """Give axes a scale over all values; NaN is a value that is missing."""
+    low, high = (float(np.nanmin(values)), float(np.nanmax(values))) if not np.isnan(values).all() else (0.0, 0.0)
+    room = 0.08 * (high - low) or 0.5
+    axes.set_ylim(low - room, high + room)
+    ticks = [tick for tick in MaxNLocator(nbins=4).tick_values(low, high) if low - room <= tick <= high + room]
+    sheet.scale(axes, "y", ticks, [f"{tick:.3g}" for tick in ticks], lines=True)
 
 
 def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread: float) -> None:

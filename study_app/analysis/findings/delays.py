@@ -1,10 +1,12 @@
 """Comparisons over delays: each with the shortest, the lowest that shows, the detection threshold, and reaching."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
-from study_app.analysis.data.blocks import Direction
+from study_app.analysis.data.blocks import Block, Direction
+from study_app.analysis.data.motion import OF_REACHES
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.finding import (
@@ -26,6 +28,7 @@ from study_app.analysis.report.html_page import heading, paragraph, table, table
 from study_app.analysis.results import (
     BlockResult,
     NotTested,
+    Results,
     all_of,
     beyond,
     counted,
@@ -545,3 +548,51 @@ class UnchangedUpTo(Finding[None]):
 def _within(against: ContrastWithControl) -> str:
     bound = against.found.bound
     return f"within ±{bound:g} {'point' if bound == 1 else 'points'} of those at {ms(against.control_ms)}"
+
+
+MEASURES: Final = ("Movement time, s", "Path, mm", "Overshoot, mm", "Submovements")
+"""The titles of `OF_REACHES`."""
+
+
+def _kept(block: Block, results: Results) -> str:
+    """Say how many trials kept to the limits of timing."""
+    here = [one for one in results.delivered if one.block == block.id]
+    judged, valid = sum(one.judged for one in here), sum(one.valid for one in here)
+    if not judged:
+        return "Whether trials kept to the protocol's limits of timing was not measured."
+    return f"Trials that kept to the protocol's limits of timing: {valid} of {judged}; all are included."
+
+
+class Movement(Finding[None]):
+    """The figure of how participants reach under a delay, measured from recordings."""
+
+    key = "movement"
+    place = 11
+    part = "figure of movement"
+    figure_name = "movement"
+    figure_title = "Reaching over added delay"
+
+    def section(self) -> Iterable[str]:
+        return self.drawn()
+
+    def figure(self, drawing: Drawing) -> Picture | None:
+        block, measured = drawing.block, drawing.results.performance
+        if not drawing.found.delays_ms or measured is None or not measured.recorded_in(block.id):
+            return None
+        medians = measured.medians(block.id).reset_index()
+        plots = [
+            (title, medians.pivot(index="participant", columns="code", values=measure)[list(block.codes)].to_numpy())
+            for title, measure in zip(MEASURES, OF_REACHES, strict=True)
+        ]
+        people = medians["participant"].nunique()
+        n = counted(people, "participant")
+        foot = "Added delay, ms. A participant's point: the median of a trial's reaches, the first left out."
+        caption = (
+            f"How participants reached, over the delay that was asked for ({drawing.simulated}n = {n} "
+            f"with recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: the middle "
+            "half. Movement time: from the lighting of a target to the entry that was held. Scales do not begin at "
+            f"zero. {_kept(block, drawing.results)}"
+        )
+        delays_ms = [setting.delay_ms or 0.0 for setting in block.settings]
+        draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), foot, own_scales=True)
+        return drawing.picture(self.figure_title, caption, draw, (f"{n} with recordings", n))
