@@ -55,10 +55,7 @@ FAILED: Final = "the process of the simulations does not start"
 
 
 class MeasuresController(QObject):
-    """Shows what the open study can find.
-
-    ``place``: where it is shown; ``repairs``: finds the repairs of problems.
-    """
+    """Shows what the open study can find; ``warned``: the warnings of ``check`` that take simulations are others."""
 
     warned = Signal()
 

@@ -94,9 +94,8 @@ def measures_view(
 ) -> MeasuresView:
     """Return what is shown of the selected element.
 
-    ``controls``: what is simulated; ``simulated``: what simulations answered; ``problems``: the problems of the study,
-    each with the words of its repairs as far as they were found; ``parts``: on how many parts the questions stand on a
-    small screen, where that is known; ``earlier``: whether the study is the last one without faults.
+    ``problems`` has the words of the repairs of each as far as they were found, ``parts`` says on how many parts the
+    questions stand on a small screen, where that is known, ``earlier`` that the study is the last one without faults.
     """
     valid = valid_part(study)
     protocol, focus = valid.protocol, focus_of(valid.protocol, path)

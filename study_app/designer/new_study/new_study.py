@@ -24,14 +24,13 @@ from study_app.workspace import workspace
 class Answers:
     """What a new study begins with; what is left out stays as it is in the template.
 
-    ``title``: its title, "" for that of the template; ``languages``: its languages; the texts of those that the
-    template lacks are missing. Where it lacks all, the first one has the texts of the template's first language;
-    ``values``: answers to the template's own questions: key and value.
+    Texts of languages that the template lacks are missing. Where it lacks all of them, the first one has the texts of
+    the template's first language.
     """
 
     title: str = ""
     languages: tuple[str, ...] = ()
-    values: tuple[tuple[Place, Any], ...] = ()
+    values: tuple[tuple[Place, Any], ...] = ()  # answers to the template's own questions
 
 
 NO_ANSWERS: Final = Answers()

@@ -111,28 +111,21 @@ class OwnQuestion:
 
 @dataclass(frozen=True, slots=True)
 class TemplateChoice:
-    """What a new study can begin as.
+    """What a new study can begin as."""
 
-    ``source``, ``title``, ``description``: what it is opened by, what it is called, and what it is for; ``copy``:
-    whether it is another study; ``note``: of a copy: where the study is from; ``figures``: icon and words of its
-    length, people and trials; ``tags``: icon and words of what it needs; ``session``: icon, title and time of each
-    step; ``recovery``: its known answer; ``name``, ``study_title``: short name that a copy gets where none is given,
-    and title that it has; ``questions``: what it asks beyond title, name and languages.
-    """
-
-    source: str
+    source: str  # what it is opened by
     title: str
     description: str
-    copy: bool = False
-    note: str = ""
-    figures: tuple[tuple[str, str], ...] = ()
-    tags: tuple[tuple[str, str], ...] = ()
-    session: tuple[tuple[str, str, str], ...] = ()
+    copy: bool = False  # whether it is another study
+    note: str = ""  # of a copy: where the study is from
+    figures: tuple[tuple[str, str], ...] = ()  # icon and words of its length, people and trials
+    tags: tuple[tuple[str, str], ...] = ()  # icon and words of what it needs
+    session: tuple[tuple[str, str, str], ...] = ()  # icon, title and time of each step
     recovery: KnownAnswer | None = None
-    name: str = ""
-    study_title: str = ""
+    name: str = ""  # short name that a copy gets where none is given
+    study_title: str = ""  # title that it gets where none is given
     languages: tuple[str, ...] = ()
-    questions: tuple[OwnQuestion, ...] = ()
+    questions: tuple[OwnQuestion, ...] = ()  # beyond title, name and languages
 
 
 def languages_offered() -> tuple[tuple[str, str], ...]:

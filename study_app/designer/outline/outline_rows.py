@@ -39,25 +39,18 @@ ElementPath: TypeAlias = Path
 
 @dataclass(frozen=True, slots=True)
 class OutlineRow:
-    """One row of the outline.
+    """One row of the outline."""
 
-    ``path``: the element; () for the heading of a section; ``title``, ``icon``, ``note``: what it is called, the
-    name of its icon, and a word at its right: a time, a count, or its `brief` fact; ``depth``: how far it is below the
-    heading of its section; ``faults``: how many faults are within it; ``name``: what a screen reader says of it;
-    ``step``: its entry in the list that orders it; () where it cannot be moved; ``field``: the field of it that was
-    found, () where none was looked for; ``named``: whether what was looked for is in its title or id.
-    """
-
-    path: Path
+    path: Path  # () for the heading of a section
     title: str
     icon: str = ""
-    note: str = ""
-    depth: int = 0
-    faults: int = 0
-    name: str = ""
-    step: Path = ()
-    field: Path = ()
-    named: bool = False
+    note: str = ""  # at its right: a time, a count, or its `brief` fact
+    depth: int = 0  # below the heading of its section
+    faults: int = 0  # within it
+    name: str = ""  # what a screen reader says of it
+    step: Path = ()  # its entry in the list that orders it; () where it cannot be moved
+    field: Path = ()  # the field of it that was found, () where none was looked for
+    named: bool = False  # whether what was looked for is in its title or id
 
 
 def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:

@@ -46,6 +46,7 @@ from study_app.gui.widgets.controls import Cap, Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.numbers import NumberField
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX
+from study_app.protocol.wording.languages import words
 from study_app.session.pages import Page, QuestionnairePage, TaskPage
 from study_app.session.trial import TankView
 
@@ -170,7 +171,7 @@ class LivePage(Themed, QGraphicsView):
         """Open another window in place of the present one."""
         self.close_page()
         made = ParticipantWindow(
-            view.words,
+            words(view.language),
             clock=lambda: time.monotonic() - self._since_s,
             windowed=True,
             text_scale=self._screen.text_scale,

@@ -152,18 +152,14 @@ _PARTS: Final = ("questionnaires", "tasks", "conditions", "liquids", "scales", "
 
 @dataclass(frozen=True, slots=True)
 class Playable:
-    """What is played.
-
-    ``source``: the study's source; ``folder``: where its footage is; ``step``: the index of the first step that is
-    shown, in the preview's schedule; ``words``: that step, as "Liquids, trial 3 of 6"; ``position``: language and seed.
-    """
+    """What is played."""
 
     source: bytes = field(repr=False)
-    folder: Folder
+    folder: Folder  # where its footage is
     protocol: Protocol = field(repr=False)
-    step: int
-    words: str
-    position: StepPosition
+    step: int  # of the preview's schedule: the first that is shown
+    words: str  # that step, as "Liquids, trial 3 of 6"
+    position: StepPosition  # language and seed
 
 
 class NotPlayableError(StudyError):

@@ -444,11 +444,11 @@ class ParticipantPreview(Card):
 
     def _show_step(self, view: ParticipantView) -> None:
         """Name the step; the number of a trial is a field."""
-        before, after = view.around_trial if view.trials else (view.step, "")
+        before, _, after = view.step.rpartition(f" {view.trial} of ") if view.trials else (view.step, "", "")
         sides = Qt.AlignmentFlag.AlignVCenter
         self.step.setText(before)
         self.step.setAlignment(sides | (Qt.AlignmentFlag.AlignRight if after else Qt.AlignmentFlag.AlignHCenter))
-        self.trials.setText(after)
+        self.trials.setText(f"of {after}" if after else "")
         for part in (self.trial, self.trials):
             part.setVisible(bool(after))
         self.trial.setAccessibleName(f"{before}, 1 to {view.trials}; Play from here begins with it")

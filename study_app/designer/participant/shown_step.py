@@ -9,7 +9,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial, build_schedule
 from study_app.protocol.source.document import Path
-from study_app.protocol.wording.languages import Words, language_name, words
+from study_app.protocol.wording.languages import language_name
 from study_app.session.pages import Page
 from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Moment, Preview, preview
 
@@ -34,46 +34,26 @@ SIZES: Final = (
 
 @dataclass(frozen=True, slots=True)
 class ParticipantView:
-    """What the tab shows.
+    """What the tab shows."""
 
-    ``page``: the page; None where it cannot be shown; ``language``: the language of the page; ``languages``: the
-    study's languages; ``step``: which step it is, as "Liquids, trial 1 of 6"; ``trial``, ``trials``: which trial of
-    its block it is, from 1, and how many the block has; 0 where it is none; ``has_before``, ``has_after``: whether
-    there is a step before and after it; ``moments``: the pages of the step, with their words; ``moment``: the one that
-    is shown; ``focused``: the id of the question that is selected; ``note``: what cannot be shown and why; "" where all
-    is; ``photodiode``: whether the tank has a corner for a photodiode.
-    """
-
-    page: Page | None = None
+    page: Page | None = None  # None where it cannot be shown
     language: str = "en"
-    languages: tuple[str, ...] = ()
-    step: str = ""
-    has_before: bool = False
+    languages: tuple[str, ...] = ()  # those of the study
+    step: str = ""  # as "Liquids, trial 1 of 6"
+    has_before: bool = False  # whether there is a step before it
     has_after: bool = False
-    moments: tuple[tuple[Moment, str], ...] = ()
-    moment: Moment | None = None
-    focused: str | None = None
-    note: str = ""
-    photodiode: bool = True
-    trial: int = 0
+    moments: tuple[tuple[Moment, str], ...] = ()  # the pages of the step, with their words
+    moment: Moment | None = None  # the one that is shown
+    focused: str | None = None  # the id of the question that is selected
+    note: str = ""  # what cannot be shown and why, "" where all is
+    photodiode: bool = True  # whether the tank has a corner for one
+    trial: int = 0  # of its block, from 1; 0 where it is none
     trials: int = 0
-
-    @property
-    def around_trial(self) -> tuple[str, str]:
-        """The words of the step before and after the number of its trial: "Liquids, trial", "of 6"."""
-        before, _, after = self.step.rpartition(f" {self.trial} of ")
-        return before, f"of {after}"
-
-    @property
-    def words(self) -> Words:
-        """The interface's words in the language of the page."""
-        return words(self.language)
 
     @property
     def name(self) -> str:
         """What the page is called for a screen reader."""
-        named = language_name(self.language)
-        return f"Participant's page, {named}"
+        return f"Participant's page, {language_name(self.language)}"
 
 
 def step_words(shown: Preview, step: Step, language: str) -> str:
@@ -110,11 +90,7 @@ Graph: TypeAlias = Mapping[Path, frozenset[Path]]
 
 
 def first_step(shown: Preview, path: Path) -> int | None:
-    """Return the index of the first step that shows an element; None where no step is about it.
-
-    ``shown``: the session; ``path``: the element, or a place within it: ``("conditions", "water")``, a question, a text
-    of a page.
-    """
+    """Return the index of the first step that shows an element, or a place within it; None where no step does."""
     graph = graph_of(shown.protocol.model_dump())
     tables = (_shown_by(shown, step, graph) for step in shown.schedule.steps)
     return next((at for at, found in enumerate(tables) if path[:2] in found), None)

@@ -25,26 +25,20 @@ _VERSION: Final = re.compile(r"[0-9A-Za-z.+-]+")
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How a study's content stands to those that participants were run with.
+    """How a study's content stands to those that participants were run with."""
 
-    ``version``: the version to save it as: its own, or the next free one; ``was``: the version that was run last; ""
-    where none was; ``sessions``: how many sessions were run with this very content; ``asks``: whether saving asks
-    first: the content differs from the one that was run; ``others``: how many sessions were run with the study's own
-    version and another content.
-    """
-
-    version: str
-    was: str = ""
-    sessions: int = 0
-    asks: bool = False
-    others: int = 0
+    version: str  # to save it as: its own, or the next free one
+    was: str = ""  # the version that was run last, "" where none was
+    sessions: int = 0  # were run with this very content
+    asks: bool = False  # whether saving asks first: the content differs from the one that was run
+    others: int = 0  # sessions that were run with the study's own version and another content
 
 
 def standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Standing:
     """Return how a study's content stands to what was run; pilots and rehearsals protect nothing.
 
-    ``hash_``: ``protocol_hash`` of the study as it is edited; ``base``: ``protocol_hash`` of the file that it is edited
-    from; "" for a new study; ``version``: the version that the study states; ``known``: what was run (`runs`).
+    ``hash_`` and ``base`` are the ``protocol_hash`` of the study as it is edited, and of the file that it is edited
+    from, "" for a new study; ``version`` is what the study states.
     """
     ran = [run for run in known if run.sessions]
     if not ran:
@@ -61,8 +55,8 @@ def standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Stand
 def check_saving(hash_: str, version: str, known: tuple[Run, ...]) -> None:
     """Refuse to save a version under the number of another content that participants were run with.
 
-    ``hash_``, ``version``: ``protocol_hash`` and version of what is to be saved; ``known``: what was run (`runs`);
-    pilots and rehearsals protect nothing. Raises Refused if the version was run with another content.
+    ``hash_`` is the ``protocol_hash`` of what is to be saved; pilots and rehearsals protect nothing. Raises Refused if
+    the version was run with another content.
     """
     others = sum(run.sessions for run in known if run.version == version and run.hash != hash_)
     if others:
