@@ -31,7 +31,7 @@ def test_a_study_that_was_asked_for_opens_at_the_first_visit(visit: MainControll
 
 
 @pytest.mark.parametrize(
-    ("name", "controller"), [("lab", "lab.controller.Lab"), ("designer", "designer.controller.Designer")]
+    ("name", "controller"), [("lab", "app.lab_controller.Lab"), ("designer", "designer.place.controller.Designer")]
 )
 def test_a_place_that_cannot_be_made_is_said_and_a_second_visit_tries_again(
     visit: MainController, qtbot: Any, monkeypatch: pytest.MonkeyPatch, name: str, controller: str
@@ -42,7 +42,7 @@ def test_a_place_that_cannot_be_made_is_said_and_a_second_visit_tries_again(
         tried.append(name)
         raise RuntimeError("a module is missing")
 
-    monkeypatch.setattr(f"study_app.app.{controller}Controller", fail)
+    monkeypatch.setattr(f"study_app.{controller}Controller", fail)
     for _ in range(2):
         with pytest.raises(RuntimeError, match="a module is missing"):
             visit.window.go(name)

@@ -24,7 +24,7 @@ from study_app import app
 collected = collections() - before, gc.isenabled(), gc.get_freeze_count() > 0
 from PySide6.QtCore import QObject
 
-for_all = [name for name in ("main_controller", "machine") if f"study_app.app.{name}" in sys.modules]
+for_all = [name for name in ("main_controller", "lab_controller") if f"study_app.app.{name}" in sys.modules]
 assert callable(app.run) and callable(app.home)
 
 from study_app.app.main_controller import MainController
@@ -41,6 +41,7 @@ class Idle:
     def __init__(self, **_named): pass
     def start(self): pass
     def is_alive(self): return False
+    def join(self, _timeout=None): pass
 
 application, results, plain = application_here(), Path(sys.argv[1]), threading.Thread
 threading.Thread = Idle

@@ -13,8 +13,6 @@ from typing import Final
 
 from PySide6.QtCore import QTimer
 
-from study_app.haptics.runtime.clocks.linux import make_high_priority
-
 MOST_PERIODS: Final = 4  # so long a work waits for room; then it is done without
 MOST_SHARE: Final = 0.15  # of the time that a work may take: what takes longer is done less often
 FORGETS: Final = 0.9  # what a work took at worst is forgotten by so much each time
@@ -151,6 +149,8 @@ class ThreadPriority:
         try:
             os.setpriority(os.PRIO_PROCESS, thread, NICE)
         except PermissionError:
+            from study_app.haptics.runtime.clocks.linux import make_high_priority  # noqa: PLC0415 - the compiler: a session has it
+
             try:
                 make_high_priority(thread, NICE)
             except OSError:
