@@ -36,6 +36,7 @@ TITLE_SIZE: Final = 7.5
 TITLE_LINE_PT: Final = 9.0
 ANSWERS_GAP_PT: Final = 11.0
 SCALE_PT: Final = 13.0
+OWN_SCALE_PT: Final = 26.0
 ANSWERS_TOP_PT: Final = 40.0
 ANSWERS_FOOT_PT: Final = 17.0
 BOTTOM: Final = 0.55
@@ -64,7 +65,8 @@ def draw_answers(
     """
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     columns = min(len(plots), PLOTS_A_ROW)
-    width = (style.PAGE_WIDTH_PT - 2 * MARGIN_PT - SCALE_PT - 6 - (columns - 1) * ANSWERS_GAP_PT) / columns
+    scale_pt, gap_pt = (OWN_SCALE_PT, OWN_SCALE_PT) if own_scales else (SCALE_PT, ANSWERS_GAP_PT)
+    width = (style.PAGE_WIDTH_PT - 2 * MARGIN_PT - scale_pt - 6 - (columns - 1) * gap_pt) / columns
     titles = [ruler.wrap(title, width, TITLE_SIZE, "bold") for title, _ in plots]
     title_pt = max(map(len, titles)) * TITLE_LINE_PT
     rows = -(-len(plots) // PLOTS_A_ROW)
@@ -73,7 +75,7 @@ def draw_answers(
     legend(sheet)
     for place, (_, values) in enumerate(plots):
         row, column = divmod(place, PLOTS_A_ROW)
-        x = MARGIN_PT + SCALE_PT + column * (width + ANSWERS_GAP_PT)
+        x = MARGIN_PT + scale_pt + column * (width + gap_pt)
         top = ANSWERS_TOP_PT + row * (row_pt + 6)
         for number, line in enumerate(titles[place]):
             sheet.text(x, top + 6.5 + number * TITLE_LINE_PT, line, size=TITLE_SIZE, weight="bold")
@@ -92,7 +94,7 @@ def draw_answers(
             words = f"n {low}" if low == high else f"n {low}–{high}"
             where: Style = {"transform": axes.transAxes, "ha": "right", "va": "bottom"}
             axes.text(1, 1.0, words, fontproperties=sheet.font(5.8), color=style.TEXT_SOFT, **where)
-    sheet.text(MARGIN_PT + SCALE_PT, sheet.height_pt - 6, foot, size=6.5, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT + scale_pt, sheet.height_pt - 6, foot, size=6.5, colour=style.TEXT_SOFT)
     return sheet
 
 
@@ -101,7 +103,8 @@ def _scale_to(sheet: Sheet, axes: Axes, values: Array) -> None:
     low, high = (float(np.nanmin(values)), float(np.nanmax(values))) if not np.isnan(values).all() else (0.0, 0.0)
     room = 0.08 * (high - low) or 0.5
     axes.set_ylim(low - room, high + room)
-    ticks = [tick for tick in MaxNLocator(nbins=4).tick_values(low, high) if low - room <= tick <= high + room]
+    found = MaxNLocator(nbins=4).tick_values(low, high) if high > low else [low]
+    ticks = [float(tick) for tick in found if low - room <= tick <= high + room]
     sheet.scale(axes, "y", ticks, [f"{tick:.3g}" for tick in ticks], lines=True)
 
 

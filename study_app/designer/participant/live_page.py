@@ -33,18 +33,11 @@ from PySide6.QtWidgets import (
 from shiboken6 import isValid
 
 from study_app.designer.participant.shown_step import SIZES, ParticipantView, ScreenSize
-from study_app.designer.place.segments import Segments
-from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.participant.forms.questions_page import QuestionsPage
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import say
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
-from study_app.gui.widgets.controls import Cap, Choice, IconButton
-from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.numbers import NumberField
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import Page, QuestionnairePage, TaskPage

@@ -7,19 +7,15 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QActionGroup, QKeyEvent
 from PySide6.QtWidgets import QMenu, QWidget
 
+from study_app.designer.measures.cards import INKS
 from study_app.gui.kit.commands import key_cap, keys_of, tip
 from study_app.gui.theme.theme import Tone, font
-from study_app.designer.measures.cards import INKS
-from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton, IconButton
-from study_app.gui.widgets.labels import Ink, label
-from study_app.gui.widgets.keys import key_cap, keys_of, tip
 from study_app.gui.widgets.labels import label
-from study_app.viewmodels.tones import Tone
 
 PlayAction: TypeAlias = Literal["play", "stop", "keep", "delete", "problems", "close"]
 

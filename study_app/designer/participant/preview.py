@@ -29,17 +29,17 @@ from study_app.designer.participant.shown_step import (
 )
 from study_app.designer.place.arrangement import PanePage
 from study_app.designer.place.editing import Editing
+from study_app.designer.place.segments import Segments
 from study_app.designer.place.view import DesignerPlace
 from study_app.gui.display.screens import choose_screens
-from study_app.gui.kit.commands import add_commands, tip
+from study_app.gui.kit.commands import add_commands, key_cap, tip
 from study_app.gui.kit.devices import screen_number, settings_here, text_scale_on
-from study_app.gui.widgets.background import delayed
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.accessible import say
+from study_app.gui.widgets.background import delayed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
 from study_app.gui.widgets.controls import Cap, Choice, IconButton
-from study_app.gui.kit.commands import key_cap
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.numbers import NumberField
 from study_app.number_text import counted

@@ -215,3 +215,20 @@ def gids(axes: Axes, ending: str) -> list:
 def by_person(results: Results, levels: list[int]) -> None:
     for number, level in enumerate(levels, start=1):
         results.add(f"P{number:03d}", lambda condition, item, level=level: level)
+
+
+def test_measures_of_reaches_have_a_scale_each() -> None:
+    values = np.array([[0.8, 0.9, 1.0], [0.85, np.nan, 1.1]])
+    look = Look("Motion", [], ["n = 2"], style.PRINT_FONTS)
+    plots = [("Time, s", values), ("Flat", np.ones((2, 3)))]
+    first, second = answer_figures.draw_answers(
+        plots, [0.0, 100.0, 200.0], [None, None], "", look, own_scales=True
+    ).figure.axes
+    gids = {str(line.get_gid()): line for line in first.lines}
+    assert np.asarray(gids["item1-participant1"].get_ydata()).tolist() == [0.8, 0.9, 1.0]
+    assert np.asarray(gids["item1-median"].get_ydata()).tolist() == pytest.approx([0.825, 0.9, 1.05])
+    low, high = first.get_ylim()
+    assert low < 0.8
+    assert high > 1.1
+    assert [tick.get_text() for tick in second.get_yticklabels()] == ["1"]
+    assert second.get_ylim() == (0.5, 1.5)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from study_app.store import receipt
-from study_app.store.verification.verify_study import Findings
+from study_app.store.verification.verify_session import Findings
 
 SESSION = "data/sub-P007/ses-01"
 
