@@ -21,7 +21,7 @@ from typing import Final, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[3]
 NUMBERS: Final = r"[-+]?\d[\d,.]*(e[-+]?\d+)?"
-VERDICTS: Final = r"\b(met|missed|undecided: measure for longer)\b"
+VERDICTS: Final = r"\b(met|missed|undecided: measure for longer|times)\b"
 SECONDS: Final = r"\d+ s\b"
 MEASURED_COLUMNS: Final = (
     "median_ns", "p99_ns", "ns_per_ms", "memory_bytes", "ticks_per_s", "times_real_time", "batches", "pareto_front",
@@ -77,7 +77,7 @@ COMMANDS: Final = {
     "timing --delays": TIMES._replace(arguments="timing --delays --seconds 0.5 --to out"),
     "timing --devices": TIMES._replace(arguments="timing --devices --seconds 0.5 --to out"),
     "timing --lsl": TIMES._replace(arguments="timing --lsl --seconds 0.5 --to out"),
-    "timing --triggers": TIMES._replace(arguments="timing --triggers virtual: --seconds 0.5 --to out"),
+    "timing --triggers": TIMES._replace(arguments="timing --triggers virtual --seconds 0.5 --to out"),
     "validate": Compared("validate --studies 10 --workers 1 --to out", r"in \d+ s, \d+ s of processor time"),
     "validate-report": Compared("validate-report --studies 1 --workers 1 --to out", SECONDS),
 }
