@@ -153,7 +153,7 @@ def _compared_lines(compared: Compared, file: Path) -> Iterator[str]:
             dropped = [k for k, cell in enumerate(cells) if cell in compared.columns] or dropped
             if len(cells) > 1:
                 kept = " | ".join(cell for k, cell in enumerate(cells) if k not in dropped)
-        yield re.sub(compared.masked, "…", kept) if compared.masked else kept
+        yield re.sub(f"(?:{compared.masked})+", "…", kept) if compared.masked else kept
 
 
 def _cells(line: str, suffix: str) -> list[str]:
