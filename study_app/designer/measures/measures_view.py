@@ -355,18 +355,19 @@ def balance_card(study: Study, protocol: Protocol, block: Block, controls: Contr
     judged = balance_of(protocol, block, participants)
     if judged is None:
         return []
-    evenness, rows = judged.evenness, judged.rows
+    order, evenness, rows = judged
     if evenness.balanced:
         verdict: Verdict = ("ok", "check", "balanced")
         if rows is not None:
             rounds = counted(participants // rows, "round")
             verdict = ("ok", "check", f"balanced: {participants} participants are {rounds} of {rows}")
     elif rows is not None and participants % rows:
-        even = " or ".join(str(one) for one in (judged.last_even, judged.next_even) if one)
-        verdict = ("warn", "warning", f"balanced with {even} participants, for a {SQUARE_NAMES[judged.order]}")
+        last = participants - participants % rows
+        even = f"{last} or {last + rows}" if last else f"{rows}"
+        verdict = ("warn", "warning", f"balanced with {even} participants, for a {SQUARE_NAMES[order]}")
     elif rows is not None:
         verdict = ("warn", "warning", "positions balanced, carry-over not")
-    elif judged.order == "fixed":
+    elif order == "fixed":
         verdict = ("warn", "warning", "all participants have the same order, which reveals the codes")
     else:
         verdict = ("neutral", "info", "balanced on average only: drawn for each session")

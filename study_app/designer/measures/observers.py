@@ -271,37 +271,14 @@ def _one(plan: ThresholdPlan, answered: ObserverAnswers) -> list[Asked]:
     return sorted(found, key=lambda one: one.trial)
 
 
-@dataclass(frozen=True, slots=True)
-class Balanced:
-    """How even a block's orders are.
+def balance_of(protocol: Protocol, block: Block, participants: int) -> tuple[str, Evenness, int | None] | None:
+    """Return order and evenness of a block, and how many participants a round of its square takes, if it has one.
 
-    A round of its square takes so many participants (``rows``), None where it has none; ``session`` says whose orders,
-    where sessions differ.
+    None where the block has one code.
     """
-
-    order: str
-    evenness: Evenness
-    rows: int | None
-    session: str = ""
-
-    @property
-    def last_even(self) -> int:
-        """The number of participants of the last full round; 0 where there is none."""
-        return 0 if self.rows is None else self.evenness.orders - self.evenness.orders % self.rows
-
-    @property
-    def next_even(self) -> int | None:
-        """The next number of participants that fills a round; None without a square."""
-        people = self.evenness.orders
-        return None if self.rows is None else people + -people % self.rows
-
-
-def balance_of(protocol: Protocol, block: Block, participants: int) -> Balanced | None:
-    """Return how even the orders of a block are; None where it has one code."""
     for judged in balances(protocol, numbered(participants), SEED):
         for one in judged.blocks:
             if one.id == block.id:
-                codes = len(one.evenness.codes)
-                rows = row_count(one.order, codes) if one.order in ("williams", "latin") else None
-                return Balanced(one.order, one.evenness, rows, judged.session)
+                rows = row_count(one.order, len(one.evenness.codes)) if one.order in ("williams", "latin") else None
+                return one.order, one.evenness, rows
     return None

@@ -96,8 +96,8 @@ def test_an_order_is_even_at_full_rounds_of_its_square() -> None:
     even, uneven = balance_of(protocol, block, 12), balance_of(protocol, block, 13)
     assert even is not None
     assert uneven is not None
-    assert (even.rows, even.next_even, even.evenness.balanced) == (6, 12, True)
-    assert (uneven.next_even, uneven.evenness.balanced) == (18, False)
+    assert (even[2], even[1].balanced) == (6, True)
+    assert (uneven[2], uneven[1].balanced) == (6, False)
     assert balance_of(protocol, protocol.blocks["practice"], 12) is None
 
 
