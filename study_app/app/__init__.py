@@ -1,6 +1,6 @@
 """The composition root, where device, servo, store, session, analysis and windows meet.
 
-``main_controller`` owns the main window, ``lab_and_designer`` the two places whose modules take long to load;
+``main_controller`` owns the main window and makes its places, two of which take long to load;
 ``session.live_session`` runs one session from its request to the closed journal; ``session.entry`` begins or resumes
 one by command.
 """

@@ -29,7 +29,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 
 from study_app.gui.lab.lab_state import Floats, LabView, Point
-from study_app.gui.participant.tank import layers as sprites
+from study_app.gui.participant.tank import sprites
 from study_app.gui.participant.tank.frame import BallPlace, BallPlacer, Box, Camera
 from study_app.gui.participant.tank.layers import Backdrop, backdrop
 from study_app.gui.participant.window import PointerCapture

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.gui.participant.intervals.answer_page import SettingControls
 from study_app.gui.participant.pages.page_widget import page_painter
-from study_app.gui.participant.tank import layers as sprites
+from study_app.gui.participant.tank import sprites
 from study_app.gui.participant.tank.captions import Captions
 from study_app.gui.participant.tank.frame import (
     DEPTH_STEPS,
@@ -37,6 +37,7 @@ from study_app.gui.participant.tank.frame import (
 from study_app.gui.participant.tank.layers import (
     Backdrop,
     OnsetPatch,
+    Pane,
     VideoLayer,
     backdrop,
     paint_patch,
@@ -225,8 +226,6 @@ class TankWidget(QWidget):
         self._tell()
 
     def _made_pane(self) -> QWidget:
-        from study_app.gui.participant.tank.layers import Pane  # noqa: PLC0415 - OpenGL: only where it is drawn with
-
         pane = Pane(self, self._paint)
         pane.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         pane.swapped.connect(self._swapped)

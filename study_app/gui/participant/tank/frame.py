@@ -13,7 +13,7 @@ from typing import Protocol, TypeAlias
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF, QRegion
 
-from study_app.gui.participant.tank import layers as sprites
+from study_app.gui.participant.tank import sprites
 from study_app.gui.theme.theme import TANK
 
 Point: TypeAlias = tuple[float, float, float]

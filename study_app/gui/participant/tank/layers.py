@@ -1,4 +1,4 @@
-"""Still images of the tank: backdrop, sprites, and the layers that are painted over each other."""
+"""Still images of the tank: its backdrop, and the layers that are painted over each other."""
 
 import math
 import threading
@@ -8,25 +8,14 @@ from functools import lru_cache
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRect, QRectF, QSizeF, Qt, Signal
-from PySide6.QtGui import (
-    QColor,
-    QImage,
-    QLinearGradient,
-    QPainter,
-    QPainterPath,
-    QPen,
-    QPolygonF,
-    QRadialGradient,
-    QRegion,
-    QSurfaceFormat,
-)
+from PySide6.QtGui import QColor, QImage, QLinearGradient, QPainter, QPolygonF, QRadialGradient, QRegion, QSurfaceFormat
 from PySide6.QtOpenGLWidgets import QOpenGLWidget
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.participant.tank import glass
 from study_app.gui.participant.tank.frame import Box, Camera, Placed
-from study_app.gui.theme.theme import PARTICIPANT, TANK
+from study_app.gui.theme.theme import PARTICIPANT
 from study_app.video.frames import VideoFrame
 
 ROOM = ("#0E141A", "#16222C", "#0A1015")
@@ -123,164 +112,6 @@ def _dithered(image: QImage) -> QImage:
     made = QImage(flat.data, width, height, 4 * width, QImage.Format.Format_RGB32).copy()
     made.setDevicePixelRatio(ratio)
     return made
-
-
-GLOW = 1.55  # reach of the lit ring's light, in radii
-TICK = (1.18, 1.32)
-SOFT = 1.5  # reach of a shadow, in radii of the ball
-
-
-@dataclass(frozen=True, slots=True)
-class Sprite:
-    """An image and the half sizes of its place around a middle [logical px]."""
-
-    image: QImage
-    half_width: float
-    half_height: float
-
-    def place(self, middle: QPointF, grown: float = 1.0) -> QRectF:
-        """Return where the sprite goes when its middle is at ``middle``."""
-        wide, high = grown * self.half_width, grown * self.half_height
-        return QRectF(middle.x() - wide, middle.y() - high, 2 * wide, 2 * high)
-
-
-def _sprite(half_width: float, half_height: float, ratio: float) -> tuple[Sprite, QPainter]:
-    """Return an empty sprite with room for its edge, and a painter whose origin is its middle."""
-    wide, high = math.ceil(half_width * ratio) + 1, math.ceil(half_height * ratio) + 1
-    image = QImage(2 * wide, 2 * high, QImage.Format.Format_ARGB32_Premultiplied)
-    image.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(image)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.translate(wide, high)
-    painter.scale(ratio, ratio)
-    return Sprite(image, wide / ratio, high / ratio), painter
-
-
-def _ink(colour: str, alpha: float = 1.0) -> QColor:
-    ink = QColor(colour)
-    ink.setAlphaF(alpha)
-    return ink
-
-
-@lru_cache(maxsize=256)
-def ball(radius: float, ratio: float, haze: float) -> Sprite:
-    """Return the proxy of ``radius`` [logical px]; ``haze`` in 0 … 1 is how much water lies before it."""
-    sprite, painter = _sprite(radius, radius, ratio)
-    painter.scale(radius, radius)
-    disc = QRectF(-1, -1, 2, 2)
-    body = QRadialGradient(QPointF(0, 0), 1.25, QPointF(-0.34, -0.42))
-    for place, colour in (
-        (0, "#FFD58C"),
-        (0.28, TANK.proxy_light),
-        (0.56, TANK.proxy),
-        (0.86, "#A85C14"),
-        (1, "#6E3A0A"),
-    ):
-        body.setColorAt(place, QColor(colour))
-    painter.setBrush(body)
-    painter.drawEllipse(disc)
-    bounce = QRadialGradient(QPointF(0.02, 0.78), 0.62)
-    bounce.setColorAt(0, _ink("#BFD3D8", 0.34))
-    bounce.setColorAt(1, _ink("#BFD3D8", 0))
-    painter.setBrush(bounce)
-    painter.drawEllipse(disc)
-    _rim(painter)
-    painter.save()
-    painter.translate(-0.33, -0.42)
-    painter.rotate(-36)
-    painter.scale(0.34, 0.22)
-    shine = QRadialGradient(QPointF(0, 0), 1)
-    for place, alpha in ((0, 0.95), (0.3, 0.72), (0.65, 0.22), (1, 0)):
-        shine.setColorAt(place, _ink("#FFFFFF", alpha))
-    painter.setBrush(shine)
-    painter.drawEllipse(QRectF(-1, -1, 2, 2))
-    painter.restore()
-    painter.setBrush(_ink(TANK.water_light, 0.20 * haze))
-    painter.drawEllipse(disc)
-    painter.end()
-    return sprite
-
-
-def _rim(painter: QPainter) -> None:
-    """Paint the light that the floor throws on the ball's lower edge."""
-    along = QLinearGradient(-0.85, 0, 0.75, 0)
-    for place, alpha in ((0, 0), (0.3, 0.62), (0.6, 0.5), (1, 0)):
-        along.setColorAt(place, _ink("#FFD9A6", alpha))
-    painter.setPen(QPen(along, 0.035, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.drawArc(QRectF(-0.965, -0.965, 1.93, 1.93), 200 * 16, 115 * 16)
-    painter.setPen(Qt.PenStyle.NoPen)
-
-
-@lru_cache(maxsize=256)
-def shadow(radius: float, ratio: float, flat: float) -> Sprite:
-    """Return the shadow of a ball of ``radius`` [logical px]; ``flat`` is its height over its width."""
-    reach = SOFT * radius
-    sprite, painter = _sprite(reach, reach * flat, ratio)
-    painter.scale(reach, reach * flat)
-    dark = QRadialGradient(QPointF(0, 0), 1)
-    for place, alpha in ((0, 0.78), (0.38, 0.62), (0.68, 0.24), (1, 0)):
-        dark.setColorAt(place, _ink(TANK.shadow, alpha))
-    painter.setBrush(dark)
-    painter.drawEllipse(QRectF(-1, -1, 2, 2))
-    painter.end()
-    return sprite
-
-
-@lru_cache(maxsize=16)
-def ring(radius: float, ratio: float, stroke: float) -> Sprite:
-    """Return the lit target without its dwell arc: light, track and four ticks."""
-    reach = GLOW * radius
-    sprite, painter = _sprite(reach, reach, ratio)
-    glow = QRadialGradient(QPointF(0, 0), reach)
-    for place, alpha in ((0, 0.07), (0.5, 0.13), (0.655, 0.42), (0.72, 0.30), (0.86, 0.10), (1, 0)):
-        glow.setColorAt(place, _ink("#CFE9F7", alpha))
-    painter.setBrush(glow)
-    painter.drawEllipse(QPointF(0, 0), reach, reach)
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.setPen(QPen(_ink(TANK.lit, 0.22), stroke * 1.5))
-    painter.drawEllipse(QPointF(0, 0), radius, radius)
-    painter.setPen(QPen(_ink("#A9D3E8", 0.78), stroke * 0.8))
-    painter.drawEllipse(QPointF(0, 0), radius, radius)
-    painter.setPen(QPen(_ink(TANK.lit, 0.92), stroke * 0.42))
-    for quarter in range(4):
-        angle = math.pi / 4 + quarter * math.pi / 2
-        inner, outer = (QPointF(radius * r * math.cos(angle), radius * r * math.sin(angle)) for r in TICK)
-        painter.drawLine(inner, outer)
-    painter.end()
-    return sprite
-
-
-@lru_cache(maxsize=32)
-def diamond(radius: float, ratio: float, stroke: float) -> Sprite:
-    """Return a dim target: a dashed diamond of half diagonal ``radius`` [logical px]."""
-    reach = radius + 2 * stroke
-    sprite, painter = _sprite(reach, reach, ratio)
-    corners = [QPointF(0, -radius), QPointF(radius, 0), QPointF(0, radius), QPointF(-radius, 0)]
-    path = QPainterPath(corners[0])
-    for corner in (*corners[1:], corners[0]):
-        path.lineTo(corner)
-    painter.setPen(dashes(_ink(TANK.dim, 0.86), stroke, math.hypot(radius, radius), 6))
-    painter.drawPath(path)
-    painter.end()
-    return sprite
-
-
-def dashes(ink: QColor, stroke: float, side: float, count: int) -> QPen:
-    """Return a pen that makes ``count`` dashes on a side [px] and has half a dash at both of its ends."""
-    pen = QPen(ink, stroke, Qt.PenStyle.CustomDashLine, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.MiterJoin)
-    period = side / (count * stroke)
-    pen.setDashPattern([period * 0.64, period * 0.36])
-    pen.setDashOffset(period * 0.32)
-    return pen
-
-
-def draw(painter: QPainter, sprite: Sprite, middle: QPointF, *, opacity: float = 1.0, grown: float = 1.0) -> None:
-    """Draw a sprite with its middle at a sub-pixel place, ``grown`` times its size."""
-    painter.setOpacity(opacity)
-    painter.drawImage(sprite.place(middle, grown), sprite.image)
-    painter.setOpacity(1.0)
 
 
 MOVING_MPS = 0.020
