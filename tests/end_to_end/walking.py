@@ -42,6 +42,7 @@ from study_app.session.transitions.state import FINAL
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.progress import Progress
 from tests.end_to_end.real_windows import Program, wait_for
+from tests.journal_lines import event_of
 
 SHORTER = {
     "min_s = 10 ": "min_s = 0.5 ",
@@ -135,8 +136,8 @@ class Pages:
     def ended_view(self) -> OperatorView:
         """Return what the operator sees in the end."""
         ended = Progress()
-        ended.take({"event": "session_started", "t_s": 0.0})
-        ended.take({"event": "session_ended", "t_s": 1.0, "status": "completed"})
+        ended.take(event_of("session_started", t_s=0.0))
+        ended.take(event_of("session_ended", t_s=1.0, status="completed"))
         session = Session(
             protocol=self.protocol,
             schedule=self.schedule,

@@ -54,8 +54,9 @@ class DesignerController(QObject):
     """
 
     def __init__(self, results: Path) -> None:
-        super().__init__()
-        self.place = place = DesignerPlace()
+        place = DesignerPlace()
+        super().__init__(place)  # it goes with its place, before a timer or thread would show what is gone
+        self.place = place
         self.editing = editing = Editing(results, self)
         self.runs = KnownRuns(editing)
         self.saving = Saving(editing, place, self.runs)
@@ -71,7 +72,6 @@ class DesignerController(QObject):
         self._resting.setInterval(REST_MS)
         self._resting.setSingleShot(True)
         self._resting.timeout.connect(self.show_outline)
-        place.destroyed.connect(self.deleteLater)  # else a timer or thread would show what is gone
         place.entered.connect(self.enter)
         self._does: dict[Task, Callable[..., object]] = {
             "select": editing.select, "back": editing.go_back, "undo": editing.undo, "redo": editing.redo,

@@ -7,6 +7,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
+from study_app.designer.place.header import BannerCard
 from study_app.designer.place.requests import ChangeLanguage, SetText, SetValue
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
@@ -45,7 +46,9 @@ def stuck(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What the banner has a screen reader say."""
     found: list[str] = []
-    monkeypatch.setattr("study_app.designer.place.header.say", lambda _banner, words: found.append(words))
+    monkeypatch.setattr(
+        "study_app.designer.place.header.say", lambda by, words: isinstance(by, BannerCard) and found.append(words)
+    )
     return found
 
 
