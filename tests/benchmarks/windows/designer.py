@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from study_app.designer.document.toml_edits import apply
 from study_app.designer.document.toml_text import Refused
-from tests.authoring.grown import texts
-from tests.authoring.random_edits import check_edit, edit_of
+from tests.designer.document.grown import texts
+from tests.designer.document.random_edits import check_edit, edit_of
 
 
 def main(wanted: int) -> None:

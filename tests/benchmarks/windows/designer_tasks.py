@@ -27,10 +27,10 @@ from study_app.designer.versions.changes import DifferenceText
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import shipped_file
 from study_app.store.drafts import draft_of
-from tests.app.designer.support.inputs import name_of, wait_until
-from tests.app.designer.support.made_studies import begin, participant, save
-from tests.app.designer.support.program import environment, use
-from tests.app.designer.support.users import USERS, KeyUser, User
+from tests.designer.support.inputs import name_of, wait_until
+from tests.designer.support.made_studies import begin, participant, save
+from tests.designer.support.program import environment, use
+from tests.designer.support.users import USERS, KeyUser, User
 from tests.end_to_end.real_windows import virtual_display
 
 FAULTS = (

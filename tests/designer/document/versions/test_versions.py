@@ -1,0 +1,169 @@
+"""Versions of a study: which were run, what is kept of each."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.designer.document.toml_text import Refused
+from study_app.designer.versions.version_rows import check_saving, check_version, next_version, standing
+from study_app.protocol.load import parse
+from study_app.protocol.source.files import protocol_hash
+from study_app.store.receipt import without_conditions
+from study_app.store.study_runs import Run, keep_what_was_run, runs
+from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, kept_versions, save
+from study_app.user_folder import data_folder
+from tests.designer.document.grown import PROTOCOLS
+
+TEXT = (PROTOCOLS / "demo.toml").read_text(encoding="utf-8")
+
+
+def session(folder: Path, participant: str, source: bytes, **facts: Any) -> None:
+    path = folder / "data" / f"sub-{participant}" / "ses-01" / "receipt.json"
+    path.parent.mkdir(parents=True)
+    protocol = without_conditions(parse(source, "demo"))
+    held = {
+        "key_hash": "0" * 64, "protocol_hash": protocol_hash(source), "protocol": protocol, "simulated": False,
+        "pilot": False, "started_at": "2026-11-21T12:00:00+00:00", **facts,
+    }  # fmt: skip
+    path.write_text(json.dumps(held))
+
+
+def test_runs_counts_sessions_pilots_and_rehearsals_by_content(tmp_path: Path) -> None:
+    one, other = TEXT.encode(), TEXT.replace('version = "1.0"', 'version = "1.1"').encode()
+    session(tmp_path / "demo", "P001", one)
+    session(tmp_path / "demo", "P002", one)
+    session(tmp_path / "demo", "P003", other, started_at="2026-11-22T12:00:00+00:00")
+    session(tmp_path / "demo-pilot", "P001", one, pilot=True)
+    session(tmp_path / "demo-pilot-2", "P001", other, pilot=True, simulated=True)  # played and kept
+    session(tmp_path / "demo-rehearsal-1", "P001", other, simulated=True)
+    (tmp_path / "demo" / "data" / "sub-P004" / "ses-01").mkdir(parents=True)
+    found = runs(tmp_path, "demo")
+    assert [(run.version, run.sessions, run.pilots, run.rehearsals) for run in found] == [
+        ("1.0", 2, 1, 0),
+        ("1.1", 1, 1, 1),
+    ]
+    assert [run.hash for run in found] == [protocol_hash(one), protocol_hash(other)]
+    assert found[0].protocol == json.loads(json.dumps(without_conditions(parse(one, "demo"))))
+    assert runs(tmp_path, "other") == ()
+
+
+def test_a_content_that_was_run_is_kept_before_the_file_changes(tmp_path: Path) -> None:
+    file = tmp_path / "demo.toml"
+    file.write_text(TEXT, encoding="utf-8")
+    keep_what_was_run(file, [Run("another", "1.0", sessions=1)])
+    assert kept_content(content_hash(TEXT.encode())) is None
+    keep_what_was_run(file, [Run(content_hash(TEXT.encode()), "1.0", sessions=1)])
+    assert kept_content(content_hash(TEXT.encode())) == TEXT.encode()
+
+
+def test_standing_says_when_saving_asks_and_which_version_is_free() -> None:
+    ran = (Run("abc", "1.0", sessions=2), Run("def", "1.1", sessions=1), Run("pil", "1.2", pilots=3))
+    assert not standing("new", "old", "0.1", [Run("pil", "0.1", pilots=1, rehearsals=2)]).asks
+    same = standing("abc", "abc", "1.0", ran)
+    assert (same.asks, same.version, same.sessions) == (False, "1.0", 2)
+    changed = standing("new", "abc", "1.0", ran)
+    assert (changed.asks, changed.version, changed.was, changed.others) == (True, "1.2", "1.1", 2)
+    raised = standing("new", "def", "2.0", ran)
+    assert (raised.asks, raised.version, raised.others) == (True, "2.0", 0)
+    assert not standing("newer", "new", "2.0", ran).asks
+
+
+@pytest.mark.parametrize("version", ["", "1 2", "1,2", "é"])
+def test_what_cannot_be_a_version_is_refused(version: str) -> None:
+    check_version("1.2-rc+3", [Run("abc", "1.2-rc+3", pilots=1)])
+    with pytest.raises(Refused, match="cannot be a version"):
+        check_version(version, [])
+    with pytest.raises(Refused, match="was run with another content"):
+        check_version("1.0", [Run("abc", "1.0", sessions=1)])
+
+
+def test_a_version_that_was_run_is_never_overwritten_with_other_content() -> None:
+    known = (Run("abc", "1.0", sessions=2), Run("def", "1.1", pilots=3))
+    check_saving("abc", "1.0", known)
+    check_saving("new", "1.1", known)
+    check_saving("new", "2.0", known)
+    with pytest.raises(Refused, match=r"version 1\.0 was run by 2 sessions with another content: .* version 1\.1$"):
+        check_saving("new", "1.0", known)
+
+
+@pytest.mark.parametrize(
+    ("version", "following"),
+    [("1", "2"), ("1.9", "1.10"), ("2026-a", "2027-a"), ("beta", "beta.1"), ("1.0-rc2", "1.0-rc3")],
+)
+def test_next_version_raises_the_last_number(version: str, following: str) -> None:
+    assert next_version(version) == following
+
+
+def test_save_replaces_the_file_keeps_its_permissions_and_its_previous_content(tmp_path: Path) -> None:
+    file, link = tmp_path / "study.toml", tmp_path / "link.toml"
+    file.write_bytes(b"a = 1\r\n")
+    file.chmod(0o640)
+    link.symlink_to(file)
+    base = content_hash(b"a = 1\r\n")
+    after = save(link, "a = 2\r\n", base)
+    assert file.read_bytes() == b"a = 2\r\n"
+    assert link.is_symlink()
+    assert file.stat().st_mode & 0o777 == 0o640
+    assert kept_content(base) == b"a = 1\r\n"
+    assert kept_content(after) == b"a = 2\r\n"
+    assert kept_content("0" * 64) is None
+    assert [(kept.hash, kept.origin) for kept in kept_versions(file)] == [(base, "found"), (after, "saved")]
+    save(file, "a = 1\r\n", after)
+    assert [kept.hash for kept in kept_versions(link)] == [base, after]
+
+
+def test_save_refuses_a_file_that_another_program_changed(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    base = save(file, "a = 1\n", "")
+    with pytest.raises(ChangedOutsideError, match="changed by another program"):
+        save(file, "a = 2\n", "")
+    file.write_text("b = 1\n")
+    with pytest.raises(ChangedOutsideError, match="changed by another program"):
+        save(file, "a = 2\n", base)
+    assert file.read_text() == "b = 1\n"
+    file.unlink()
+    with pytest.raises(ChangedOutsideError, match="deleted or moved"):
+        save(file, "a = 2\n", base)
+
+
+def test_lines_of_the_list_that_cannot_be_read_are_left_out(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    base = save(file, "a = 1\n", "")
+    (path,) = (data_folder() / "versions").glob("*.jsonl")
+    path.write_bytes(b'{"hash": "torn\n[]\n{"hash": "x", "origin": "else"}\n' + path.read_bytes())
+    assert [kept.hash for kept in kept_versions(file)] == [base]
+
+
+SAVING = """
+import sys
+from pathlib import Path
+from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, save
+from study_app.errors import StoreError
+file, name, saved = Path(sys.argv[1]), sys.argv[2], 0
+while saved < 20:
+    before = file.read_bytes()
+    text = before.decode() + f"{name}{saved} = 1\\n"
+    try:
+        save(file, text, content_hash(before))
+    except ChangedOutsideError:
+        continue
+    except StoreError:
+        continue
+    saved += 1
+"""
+
+
+@pytest.mark.slow
+def test_two_programs_that_save_one_file_lose_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    file.write_text("")
+    programs = [subprocess.Popen([sys.executable, "-c", SAVING, str(file), name]) for name in "ab"]
+    assert [program.wait(120) for program in programs] == [0, 0]
+    expected = {f"{name}{number} = 1" for name in "ab" for number in range(20)}
+    assert set(file.read_text().splitlines()) == expected
+    assert len(list(Path(os.environ["LIQUID_STUDY_DATA"], "contents").glob("*.toml"))) == 41

@@ -1,0 +1,170 @@
+"""What the designer shows of each kind of element, compared with reviewed texts: outline, form, measures, file."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path as File
+from typing import Any
+
+import pytest
+
+from study_app.designer.document.additions import additions_for, repairs
+from study_app.designer.document.elements import brief, found_fields, outline, position_of, used_by
+from study_app.designer.document.study import Study, read
+from study_app.designer.document.study_facts import facts
+from study_app.designer.form.form import form
+from study_app.designer.measures.measures_page import clipped_sentence
+from study_app.designer.measures.measures_view import MeasuresView, measures_view
+from study_app.designer.measures.observers import (
+    Asked,
+    Detectable,
+    Finding,
+    GroupPrecision,
+    Measurable,
+    Observed,
+    Planted,
+    Simulated,
+)
+from study_app.designer.measures.plots import forces_sentence, function_sentence, track_sentence
+from study_app.designer.measures.simulation import Controls
+from study_app.designer.outline.add_list import addable, fields_to_go_to
+from study_app.designer.outline.outline_rows import outline_rows
+from study_app.designer.place.file import file_text
+from study_app.designer.place.requests import MakeSeries
+from study_app.designer.place.steps import series_prompt, series_titles
+from study_app.designer.problems.problems import problem_rows
+from study_app.protocol.source.document import Path
+from tests.designer.document.test_study_transcripts import elements, generic, studies
+from tests.golden import compare
+from tests.golden_values import changed, one_line, value_lines
+from tests.protocol.edited_studies import CASES, cases_of
+
+GOLDEN = File(__file__).parent / "golden"
+STUDIES = ("rows", "sound", "every_design", "grouped", "slime")
+"""Studies of which each has kinds of elements that none before it has; the first is short."""
+
+
+def measures(view: MeasuresView) -> dict[str, Any]:
+    """Return what is shown of an element: numbers, cards, and each plot in a sentence."""
+    of, observed = view.levels, view.simulated.observed
+    return {
+        "simulated": None if view.words is None else view.words.words(view.controls.threshold),
+        "numbers": view.numbers,
+        "cards": view.cards,
+        "blocks": view.blocks,
+        "function": function_sentence(of.words, observed) if of is not None and observed is not None else "",
+        "track": track_sentence(of.words, observed) if of is not None and observed is not None else "",
+        "forces": "" if of is None else forces_sentence(of),
+        "clipped": "" if of is None else clipped_sentence(of),
+    }
+
+
+class Shown:
+    """What each view of the designer showed last, to note what changes."""
+
+    def __init__(self) -> None:
+        self.before: dict[str, list[str]] = {}
+
+    def note(self, view: str, value: Any) -> Iterator[str]:
+        """Yield the lines of a view that changed since it was last noted."""
+        lines = list(value_lines(value))
+        found = list(changed(self.before.get(view, []), lines))
+        self.before[view] = lines
+        yield from [f"{view}:", *found] if found else ()
+
+    def of_study(self, study: Study) -> Iterator[str]:
+        times = facts(study).steps_s
+        yield from self.note("facts", facts(study))
+        yield from self.note("rows of the outline", outline_rows(study, times))
+        yield from self.note("outline", outline(study))
+        for words in ("viscosity", "hon", "order"):
+            yield f"find {words}"
+            yield from self.note("rows found", outline_rows(study, times, words))
+            yield from self.note("fields found", found_fields(study, words))
+            fields = fields_to_go_to(study, words, ("study",))
+            yield from self.note("fields to go to", [f"{one.words} | {one_line(one.asks)}" for one in fields])
+
+    def of_element(self, study: Study, path: Path) -> Iterator[str]:
+        document = study.document
+        marked = file_text(study, "study.toml", path)
+        yield f"brief: {brief(document, path)} | {used_by(document, path)} | {position_of(document, path)}"
+        yield f"lines: {marked.selected} {marked.faulty}"
+        yield from value_lines(form(study, path), "form")
+        view = measures_view(study, facts(study), path, Controls(12), Simulated(), {})
+        yield from self.note("measures", measures(view))
+        yield from self.note("to add", tuple(addable(study, path)))
+        if (prompt := series_prompt(study, path)) is not None:
+            yield from value_lines(prompt)
+            for field, _ in prompt.fields:
+                yield from value_lines(series_titles(study, MakeSeries(path, field, (2, 5, 9.5))))
+
+
+def transcript(before: Iterable[str], names: Iterable[str]) -> Iterator[str]:
+    """Yield what is shown of some studies, and of each kind of element that none of the studies before has."""
+    seen = {generic(path) for _, study in studies(before) for path in elements(study.document)}
+    shown = Shown()
+    for name, study in studies(names):
+        yield f"== {name}"
+        yield from shown.of_study(study)
+        for path in elements(study.document):
+            if generic(path) not in seen:
+                seen.add(generic(path))
+                yield f"== {name} at {path}"
+                yield from shown.of_element(study, path)
+
+
+def of_faults(study: Study) -> Iterator[str]:
+    """Yield the rows of a study's problems, and what each repair and addition is called and changes."""
+    yield from value_lines(problem_rows(study))
+    for fault in study.faults:
+        for repair in (*repairs(study, fault), *additions_for(study, fault)):
+            yield f"repair {one_line(fault.path)}: {repair.words}"
+            yield from changed(study.text.split("\n"), study.edited(*repair.edits)[0].text.split("\n"), numbered=True)
+
+
+OBSERVED = Observed(
+    0.19, 0.02, 400, 0.75, (0.02, 0.05, 0.1, 0.2, 0.4), (0.5, 0.55, 0.66, 0.78, 0.97),
+    ((0.5, 0.53, 0.6, 0.7, 0.95), (0.5, 0.6, 0.7, 0.85, 0.98)), ((0.05, 0.3), (0.2, 0.7)),
+    ((1, (0.1, 0.15, 0.2, 0.3, 0.5)), (40, (0.15, 0.18, 0.19, 0.2, 0.24))),
+    (Asked(1, 1, 0.2, True), Asked(2, 2, 0.1, False), Asked(3, 1, 0.17, True)), 0.06, 80,
+)  # fmt: skip
+GROUP = GroupPrecision(12, 60, 0.15, 80, 0.7, 107, 0.9, 60, 14)
+SIMULATED = {
+    "viscosityjnd": Simulated(
+        OBSERVED, Measurable((0.05, 0.4), (Planted(0.19, 0.01, 0.95),)), GROUP,
+        warnings=("methods.adaptive.trials: few trials",),
+    ),
+    "thickness": Simulated(measurable=Measurable(None, ()), failed="The process ended."),
+    "physical2": Simulated(detectable=Detectable(12, 200, 7, (Finding("thick", 0.5), Finding("wet", None)))),
+}  # fmt: skip
+"""What simulations could answer, by study: the cards of blocks show it."""
+
+
+def of_blocks(study: Study, simulated: Simulated) -> Iterator[str]:
+    for name in study.document["blocks"]:
+        for people in (1, 13):
+            controls = Controls(people, threshold=0.19, planned=12)
+            view = measures_view(study, facts(study), ("blocks", name), controls, simulated, {}, 2)
+            yield from value_lines(measures(view))
+
+
+@pytest.mark.parametrize("name", [STUDIES[0], *(pytest.param(one, marks=pytest.mark.slow) for one in STUDIES[1:])])
+def test_what_is_shown_of_studies(name: str, pytestconfig: pytest.Config) -> None:
+    before = STUDIES[: STUDIES.index(name)]
+    compare(GOLDEN / f"shown_of_{name}.txt", transcript(before, (name,)), pytestconfig)
+
+
+@pytest.mark.parametrize("name", SIMULATED)
+def test_what_is_shown_of_simulations(name: str, pytestconfig: pytest.Config) -> None:
+    (_, study), *_ = studies((name,))
+    compare(GOLDEN / f"simulations_of_{name}.txt", list(of_blocks(study, SIMULATED[name])), pytestconfig)
+
+
+FAULTS = ("designs", "formats", "adjustment", "groups", "impossible", "methods", "pace", "questions", "sound")
+"""Files of faults that together have each kind of repair; the first two are read fastest."""
+
+
+@pytest.mark.parametrize("name", [*FAULTS[:2], *(pytest.param(one, marks=pytest.mark.slow) for one in FAULTS[2:])])
+def test_repairs_of_faults(name: str, pytestconfig: pytest.Config) -> None:
+    found = list[str]()
+    for case in cases_of(CASES / f"{name}.txt"):
+        found += [f"== {case.study}, {case.name}", *of_faults(read(case.text.encode(), File()))]
+    compare(GOLDEN / f"repairs_in_{name}.txt", found, pytestconfig)

@@ -1,0 +1,248 @@
+"""Numbers of Measures that take simulations: from the worker to their cards, and while a part is broken."""
+
+import time
+from concurrent.futures import Executor, Future
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QSize, Qt
+
+from study_app.analysis.planning.threshold_studies import plans, sweep
+from study_app.designer.document.study import read
+from study_app.designer.document.toml_edits import Set, Unset
+from study_app.designer.measures.cards import UNKNOWN
+from study_app.designer.measures.measures_controller import ANEW, _pages
+from study_app.designer.measures.measures_view import FAILED
+from study_app.designer.measures.observers import ENOUGH
+from study_app.designer.measures.simulation import (
+    THRESHOLD_STUDIES,
+    Controls,
+    Focus,
+    Simulation,
+    carry_out,
+    focus_of,
+    simulation_of,
+    start_measure_worker,
+)
+from study_app.designer.new_study.new_study import template
+from study_app.designer.place.requests import RetypeFile
+from study_app.gui.participant.page_widgets import parts_of
+from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
+from study_app.protocol.checks.expected_precision import imprecise
+from study_app.protocol.load import load
+from study_app.protocol.source.files import shipped_file
+from study_app.protocol.wording.languages import words
+from study_app.workers.server import Crashed, Stopped
+from tests.designer.measures.conftest import Worker, answer_to, jnd, shown
+
+
+@pytest.mark.slow
+def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, worker: Worker) -> None:
+    jnd(designer)
+    page = designer.place.measures
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    assert page.numbers.parts[0].number.text() == UNKNOWN
+    assert page.numbers.parts[0].note.text() == ANEW
+    assert page.numbers.parts[3].number.text() != UNKNOWN  # how long it lasts is known at once
+    worker.answer()
+    shown(qtbot, designer, 0, "5 – 50")
+    shown(qtbot, designer, 1, "± 26")
+    shown(qtbot, designer, 2, "93")
+    assert designer.place.header.problems.words == "1 warning"  # that of the precision takes simulated observers
+    assert page.function.plot.accessibleDescription().startswith("Share of answers that are correct")
+    assert "19 %" in page.track.plot.accessibleDescription()
+    assert page.forces.plot.accessibleDescription().startswith("Force at 31 levels")
+    assert not page.grid.isVisible()  # its cards stay below other tabs
+
+    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
+    qtbot.waitUntil(lambda: len(worker.orders) == 2)
+    assert page.numbers.parts[1].note.text() == ANEW  # grey, with the number of before
+    assert page.numbers.parts[1].number.text() == "± 26"
+    assert page.function.plot.grey
+    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 100))
+    qtbot.waitUntil(lambda: worker.stops == 1)  # what was under way is given up
+    qtbot.waitUntil(lambda: len(worker.orders) == 3)
+    assert worker.orders[2].protocol.methods["adaptive"].trials == 100
+    designer.editing.undo()
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: not page.function.plot.grey)  # kept by what it depends on
+    qtbot.wait(120)
+    assert len(worker.orders) == 3
+    designer.editing.make("Change", Set(("pages", "welcome", "title"), "Hello"))
+    qtbot.wait(120)
+    assert len(worker.orders) == 3  # nothing depends on a text
+
+    designer.window.go("home")
+    assert not worker.works  # a session may begin: nothing is simulated any more
+    designer.controller.measures.fit.found.emit()  # as what was looked for when it was left
+    qtbot.wait(120)
+    assert not designer.controller.measures.rest.isActive()
+
+
+@pytest.mark.slow
+def test_numbers_appear_as_they_come_and_the_others_say_that_their_simulation_crashed(
+    qtbot: Any, designer: Any, worker: Worker
+) -> None:
+    jnd(designer)
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    jnds, one, people, _ = designer.place.measures.numbers.parts
+    assert {part.note.text() for part in (jnds, one, people)} == {ANEW}
+    assert designer.place.measures.function.legend.text().casefold() == ANEW
+    worker.given.append((1, replace(answer_to(worker.orders[0]), group=None, measurable=None)))
+    shown(qtbot, designer, 1, "± 26")
+    worker.given.append((1, Crashed(1)))
+    qtbot.waitUntil(lambda: people.note.text() == FAILED[2])
+    assert (people.number.text(), one.number.text()) == (UNKNOWN, "± 26")
+    assert people.more.text() == "The process ended with exit code 1; the terminal may show why."
+    designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
+    qtbot.waitUntil(lambda: len(worker.orders) == 2)
+    assert people.note.text() == ANEW  # another study, another try
+
+
+@pytest.mark.slow
+def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> None:
+    designer.controller.measures.rest.setInterval(10)
+    jnd(designer)
+    part = designer.place.measures.numbers.parts[1]
+    qtbot.waitUntil(lambda: part.note.text() == FAILED[2])
+    assert part.more.text() == "The process of the simulations does not start."
+    assert designer.place.measures.function.legend.text() == FAILED[2].capitalize()
+    assert designer.place.measures.numbers.parts[3].number.text() == "17"
+
+
+def order(trials: int, **controls: float) -> Simulation:
+    """Return the simulation of the block of a template with so many trials."""
+    block = ("blocks", "viscosity")
+    study, _ = template("viscosity-jnd").edited(
+        Set(("methods", "adaptive", "trials"), trials), Unset((*block, "break_every")), Unset((*block, "break_page")),
+        Unset(("pages", "rest")),
+    )  # fmt: skip
+    assert study.protocol is not None
+    focus = focus_of(study.protocol, block)
+    found = simulation_of(study.protocol, focus, Controls(**controls))  # type: ignore[arg-type]
+    assert found is not None
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+def test_the_worker_process_simulates_observers_and_studies() -> None:
+    client = start_measure_worker()
+    client.order(order(20, participants=6, precision=0.5, threshold=0.2))
+    found: list[Any] = []
+    for _ in range(600):
+        found += client.answers(0.5)
+        if found and found[-1][1] is None:
+            break
+    client.close()
+    last = found[-2][1]
+    assert found[0][1].group is None  # observers come first
+    assert last.observed.threshold == 0.2
+    assert 0.0 <= last.group.share <= 1.0
+    assert last.group.more_trials > last.group.trials == 20
+    assert last.measurable is not None
+
+
+@pytest.mark.slow
+def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worker: Worker) -> None:
+    jnd(designer)
+    page = designer.place.measures
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    worker.answer()
+    shown(qtbot, designer, 2, "93")
+    before = [part.number.text() for part in page.numbers.parts]
+    grey, ink = page.theme.text3, lambda part: part.number.palette().color(part.number.foregroundRole()).name().upper()
+    designer.editing.make("Break", Set(("tasks", "stir", "frequency_hz"), -1))
+    qtbot.waitUntil(page.earlier.isVisible)
+    assert [part.number.text() for part in page.numbers.parts] == before
+    assert {ink(part) for part in page.numbers.parts} == {grey}
+    assert page.function.plot.grey  # drawn in grey, too
+    assert "last valid state" in page.earlier.text()
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: not page.earlier.isVisible())
+    designer.editing.ask(RetypeFile(designer.text.replace("[study]", "[study")))
+    qtbot.waitUntil(page.earlier.isVisible)
+    assert [part.number.text() for part in page.numbers.parts] == before
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: not page.earlier.isVisible())
+    assert grey not in {ink(part) for part in page.numbers.parts}
+    assert not page.function.plot.grey
+
+
+class Serial(Executor):
+    """Computes each case at once."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_the_share_of_studies_is_that_of_the_command_power() -> None:
+    protocol = template("viscosity-jnd").protocol
+    assert protocol is not None
+    planned = plans(protocol, (20,))
+    ((done, found),) = list(sweep(planned, (6,), THRESHOLD_STUDIES, 1, Serial()))[-1:]
+    answers: list[Any] = []
+    carry_out(order(20, participants=6, precision=0.5), answers.append, lambda: False)
+    group = answers[-1].group
+    assert done == group.studies
+    assert group.share == found["viscosity", 20].within(0, 0.5)
+    assert 0.0 < group.share < ENOUGH
+    sizes = range(7, 13)
+    ((_, found),) = list(sweep(planned, sizes, THRESHOLD_STUDIES, 1, Serial()))[-1:]
+    within = [found["viscosity", 20].within(at, 0.5) for at in range(len(sizes))]
+    assert group.enough == next(size for size, share in zip(sizes, within, strict=True) if share >= ENOUGH)
+
+
+@pytest.mark.slow
+def test_warnings_that_take_simulated_observers_are_those_of_check() -> None:
+    protocol = template("viscosity-jnd").edited(Set(("analysis", "participants"), 4))[0].protocol
+    assert protocol is not None
+    wanted = simulation_of(protocol, Focus(), Controls())
+    assert wanted is not None
+    answers: list[Any] = []
+    carry_out(wanted, answers.append, lambda: False)
+    assert answers[-1].warnings == tuple(imprecise(protocol, protocol.blocks["viscosity"]))
+    assert answers[-1].warnings
+
+
+def test_what_is_wanted_depends_on_forces_and_tasks_and_on_no_text() -> None:
+    study = read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
+    path = ("blocks", "liquids")
+
+    def wanted(*changes: Set) -> Simulation:
+        changed, _ = study.edited(*changes)
+        assert changed.formed is not None
+        one = simulation_of(changed.formed, focus_of(changed.formed, path), Controls())
+        assert one is not None
+        return one
+
+    same = wanted(Set(("blocks", "liquids", "title", "en"), "Other"), Set(("pages", "consent", "title", "en"), "Hello"))
+    assert wanted() == same
+    assert wanted() != wanted(Set(("liquids", "honey", "density_kg_m3"), 1300))
+    assert wanted() != wanted(Set(("tasks", "explore", "max_s"), 61))
+
+
+PATH = ("questionnaires", "liquid")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("size", "expected"), [((1366, 768), 1), ((1024, 560), 2), ((800, 420), 3)])
+def test_a_page_never_shown_has_the_parts_of_one_that_is(qtbot: Any, size: tuple[int, int], expected: int) -> None:
+    protocol = load("rek2024")
+    (page, language), _ = _pages(protocol, focus_of(protocol, PATH), PATH)
+    shown = QuestionnaireWidget(page, words(language), time.monotonic)
+    qtbot.addWidget(shown)
+    shown.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
+    shown.resize(QSize(*size))
+    shown.show()
+    assert parts_of(page, words(language), size) == len(shown.parts) == expected
+
+
+def test_an_order_is_given_up_before_its_first_number() -> None:
+    with pytest.raises(Stopped):
+        carry_out(order(20), print, lambda: True)

@@ -1,0 +1,129 @@
+"""Every page of the designer in windows of each size: it fits, its parts have names, none is a window of its own."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractItemView,
+    QApplication,
+    QComboBox,
+    QLineEdit,
+    QPlainTextEdit,
+    QWidget,
+)
+
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.widgets.cards import Chip
+from tests.designer.support.inputs import name_of
+
+pytestmark = [pytest.mark.slow, pytest.mark.variants(2)]
+
+TAKE_KEYS = (QAbstractButton, QLineEdit, QPlainTextEdit, QComboBox, QAbstractItemView)
+SIZES = pytest.mark.parametrize("size", [(1024, 640), (1366, 768), (1600, 1000)])
+
+
+class Shown(QObject):
+    """Notes every window that is shown."""
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self.windows: list[str] = []
+
+    def eventFilter(self, part: Any, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+        window = event.type() == QEvent.Type.Show and isinstance(part, QWidget) and part.isWindow()
+        if window and part.graphicsProxyWidget() is None:  # the participant's page lies within the designer
+            self.windows.append(type(part).__name__)
+        return False
+
+
+@pytest.fixture
+def windows(designer: Any) -> Iterator[list[str]]:
+    """The windows that are shown during a test."""
+    watch = Shown(designer.window)
+    QApplication.instance().installEventFilter(watch)
+    yield watch.windows
+    QApplication.instance().removeEventFilter(watch)
+
+
+def fits(area: Any) -> bool:
+    return bool(area.widget().minimumSizeHint().width() <= area.viewport().width())
+
+
+def nameless(place: Any) -> list[QWidget]:
+    """Return the parts shown that take the keyboard and have no name; a list has parts of its own."""
+    own = [part for part in place.findChildren(QWidget) if isinstance(part, TAKE_KEYS) and part.isVisible()]
+    within = {inner for part in own if isinstance(part, QComboBox) for inner in part.findChildren(QWidget)}
+    takes_keys = [part for part in own if part not in within and part.focusPolicy() != Qt.FocusPolicy.NoFocus]
+    return [part for part in takes_keys if not name_of(part)]
+
+
+def cut(place: Any) -> list[str]:
+    """Return the words shown in chips and empty fields for which there is too little room."""
+    chips = [one for one in place.form.findChildren(Chip) if one.isVisible() and one.width() < one.sizeHint().width()]
+    lines = [one for one in place.form.inside.findChildren(QLineEdit) if one.isVisible() and not one.text()]
+    room = [one.width() - one.fontMetrics().horizontalAdvance(one.placeholderText()) for one in lines]
+    return [one.word for one in chips] + [
+        one.placeholderText() for one, left in zip(lines, room, strict=True) if left < 0
+    ]
+
+
+def go_through_forms(designer: Any) -> None:
+    place = designer.place
+    for path in [row.path for row in place.outline.rows if row.path]:
+        designer.go_to(*path)
+        assert fits(place.form.area), path
+        assert not nameless(place), path
+        assert not cut(place), path
+
+
+@SIZES
+def test_every_form_and_view_fits_and_has_names(
+    designer: Any, editors: None, windows: list[str], size: tuple[int, int]
+) -> None:
+    designer.window.resize(*size)
+    designer.open()
+    place = designer.place
+    assert place.form.isVisible()
+    assert place.pane.isVisible() == (size[0] > 1200)
+    go_through_forms(designer)
+    for button in place.pane.tabs.buttons:
+        place.sides.buttons[1].click()
+        button.click()
+        QApplication.processEvents()
+        assert place.pane.width() > (0.4 if place.form.isVisible() else 0.95) * place.parts.width()
+        assert not nameless(place), button.text()
+    designer.controller.ask_to_delete(("liquids", "thick"))
+    assert not nameless(place)
+    assert (designer.window.width(), designer.window.height()) == size
+    assert not windows
+
+
+@SIZES
+@pytest.mark.parametrize("theme", [LIGHT, DARK])
+def test_measures_and_the_page_of_a_new_study_fit(
+    qtbot: Any, designer: Any, windows: list[str], size: tuple[int, int], theme: Any
+) -> None:
+    designer.window.show_theme(theme)
+    designer.window.resize(*size)
+    designer.controller.ask_for_new()
+    page = designer.place.new_page
+    for one in page.buttons:
+        one.setChecked(True)
+        qtbot.wait(1)
+        assert fits(page.card.area), one.choice.source
+        assert not nameless(page), one.choice.source
+    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.place.sides.buttons[1].click()
+    designer.place.pane.show_tab("measures")
+    measures = designer.place.measures
+    for path in (("blocks", "viscosity"), ("liquids", "damper"), ("study",), ("designs", "pair"), ("tasks", "stir")):
+        designer.go_to(*path)
+        designer.controller.measures.show()
+        assert measures.shown is not None
+        assert fits(measures.area), path
+        assert not nameless(measures), path
+    assert (designer.window.width(), designer.window.height()) == size
+    assert not windows
