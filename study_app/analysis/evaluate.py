@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import Final
 
 import pandas as pd
@@ -13,6 +13,7 @@ from study_app.analysis.data.questions import question_results, score_results
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import SEALED, BlockAnswers, block_answers, summarize_block, untested
+from study_app.analysis.findings.statement_tests import gated
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.results import (
     BlockResult,
@@ -70,11 +71,12 @@ def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
         def tell(what: str) -> None:
             progress(f"testing: {what}", 0.5 * number / len(study.blocks))
 
-        def test() -> BlockResult:
-            return evaluate_block(study, block_answers(study, block, SEED, failures), tell)
-
-        found = failures.attempt("all tests", test, block=block.id)
+        found = failures.attempt("all tests", lambda: evaluate_block(study, answers()[number], tell), block=block.id)
         return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
+
+    @cache
+    def answers() -> tuple[BlockAnswers, ...]:
+        return gated([block_answers(study, block, SEED, failures) for block in study.blocks])
 
     def moved() -> Performance | None:
         """Measure motion and force; None while sealed, since a thick liquid is known by its force."""

@@ -269,7 +269,8 @@ VERDICTS_MEAN: Final = (
     "Shown: adjusted p at most {alpha}. Suggested: the same in a statement that was not decided on before the study, "
     "which is a reason to look again and no finding. Not shown: these data do not settle it; that is not evidence of "
     "sameness. Out of reach: however these answers had been arranged within participants, they could not have shown "
-    "it, the other p of the family being what they are: adjusted p depends on those too."
+    "it, the other p of the family being what they are: adjusted p depends on those too. No adjusted p of a statement "
+    "is below the p of the one test over all statements, corrected by Holm over the parts of the study."
 )
 
 
@@ -410,7 +411,7 @@ def test_name(outcome: Outcome) -> str:
     return {
         "Friedman": "Friedman's test",
         "Wilcoxon signed ranks": "Wilcoxon's signed ranks",
-        "Page's trend": "Page's test of a trend",
+        "trend over participants": "the test of a trend over participants",
     }.get(outcome.test, outcome.test)
 
 

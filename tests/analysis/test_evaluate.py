@@ -33,6 +33,9 @@ pytestmark = pytest.mark.slow
 DECIDED = Decided(True, False, 0.05, 1.0, ("a", "b"), (), (), (), None)
 
 
+NOBODY = of_tables(Block("b", "Block", "liquids", (), (), (), None), DECIDED, (), {})
+
+
 def found(folder: Folder) -> Results:
     return evaluate(load_study(folder.folder))
 
@@ -68,7 +71,7 @@ def test_primary_statements_are_a_holm_family_and_the_others_exploratory() -> No
         item: friedman([[draw.gauss(shift * place, 1) for place in range(3)] for _ in range(8)])
         for item, shift in zip("abcd", (2.0, 0.1, 1.5, 0.0), strict=True)
     }
-    tested = {one.item: one for one in judged(outcomes, DECIDED, "family")}
+    tested = {one.item: one for one in judged(outcomes, NOBODY, "family")}
     assert list(tested) == list("abcd")
     ps = {item: outcome.p for item, outcome in outcomes.items()}
     assert (tested["a"].p_adjusted, tested["b"].p_adjusted) == holm([ps["a"], ps["b"]])
@@ -81,12 +84,12 @@ def test_primary_statements_are_a_holm_family_and_the_others_exploratory() -> No
 def test_what_could_not_have_been_shown_is_out_of_reach() -> None:
     three = friedman([[1, 2, 3], [1, 2, 3], [3, 1, 2]])
     assert three.smallest_p == pytest.approx(1 / 36)
-    (one, _) = judged({"a": three, "b": three}, DECIDED, "family")
+    (one, _) = judged({"a": three, "b": three}, NOBODY, "family")
     assert (one.verdict, one.p_adjusted) == ("out of reach", 1.0)
-    (alone,) = judged({"a": three}, DECIDED, "family")
+    (alone,) = judged({"a": three}, NOBODY, "family")
     assert alone.verdict == "not shown"  # one test of its own could have come to .028
     flat = friedman([[4, 4, 4]] * 5)
-    (none,) = judged({"a": flat}, DECIDED, "family")
+    (none,) = judged({"a": flat}, NOBODY, "family")
     assert (none.verdict, none.p_adjusted) == ("not tested", None)
 
 
@@ -109,7 +112,11 @@ def test_of_five_no_pair_and_no_model_is_there_and_it_says_why(rek: Folder) -> N
     assert [one.what for one in liquids.absent] == ["comparison of two settings", "mixed model of the settings"]
     assert "5 participants cannot show it: the smallest p that 5 pairs can give is 0.0625" in liquids.absent[0].why
     assert "0.1875, which is above 0.05" in liquids.absent[0].why
-    assert [one.what for one in delays.absent] == ["mixed model of the delay"]
+    assert [one.what for one in delays.absent] == [
+        "lowest delay that shows",
+        "detection threshold",
+        "mixed model of the delay",
+    ]
 
 
 def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
@@ -122,7 +129,7 @@ def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
     why = {one.what: one.why for one in (*liquids.absent, *delays.absent)}
     assert "chosen by the answers" in why["test of equivalence"]
     assert "does not say which statements name" in why["test of recognition"]
-    assert "rise or fall with delay (Different, Task harder" in why["test of a trend (Page)"]
+    assert {one.outcome.method.split(", ")[1] for one in DelayTrend.of(delays)} == {"two-sided"}
     assert "no statement that asks" in why["detection threshold"]
 
 

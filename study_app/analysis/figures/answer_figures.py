@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -207,6 +207,50 @@ def draw_threshold(found: Threshold, lowest_ms: float | None, look: Look) -> She
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
     axes.plot(levels[there], shares, "o", **dots)
     sheet.text(MARGIN_PT, sheet.height_pt - 5, "Added delay, ms", size=6.5, colour=style.TEXT_SOFT)
+    return sheet
+
+
+EFFECT_PT: Final = 9.0
+EFFECT_GAP_PT: Final = 7.0
+EFFECTS_LEFT_PT: Final = 190.0
+EFFECTS_TOP_PT: Final = 26.0
+MOST_AWAY: Final = 6.3
+"""The scale of differences reaches no further: two answers of seven points differ by six at most."""
+
+EffectRow: TypeAlias = tuple[str, Sequence[tuple[str, float, float | None, float | None]]]
+"""A statement, and of each setting its name, the mean difference and the ends of its interval."""
+
+
+@style.own_settings()
+def draw_effects(rows: Sequence[EffectRow], bound: float | None, foot: str, look: Look) -> Sheet:
+    """Draw differences with their intervals as lines, a row a setting, statement by statement, about a line at 0."""
+    lines = sum(len(settings) for _, settings in rows)
+    height = lines * EFFECT_PT + len(rows) * EFFECT_GAP_PT
+    sheet = look.sheet(EFFECTS_TOP_PT + height + 30)
+    axes = sheet.axes(EFFECTS_LEFT_PT, EFFECTS_TOP_PT, sheet.width_pt - EFFECTS_LEFT_PT - MARGIN_PT - 6, height)
+    ends = [end for _, settings in rows for _, *numbers in settings for end in numbers if end is not None]
+    reach = min(MOST_AWAY, 1.08 * max(1.0, bound or 0.0, *map(abs, ends)))
+    axes.set_xlim(-reach, reach)
+    axes.set_ylim(height, 0)
+    ticks = [tick for tick in MaxNLocator(nbins=8, integer=True).tick_values(-reach, reach) if abs(tick) <= reach]
+    sheet.scale(axes, "x", ticks, [f"{tick:g}".replace("-", "−") for tick in ticks], lines=True)
+    if bound is not None:
+        axes.axvspan(-bound, bound, color=style.GRID, alpha=0.6, linewidth=0, zorder=0, gid="bound")
+    axes.axvline(0, color=style.TEXT_SOFT, linewidth=0.8, zorder=1)
+    y = 0.0
+    for statement, settings in rows:
+        words = sheet.wrap(statement, EFFECTS_LEFT_PT - 70, LABEL_SIZE, "bold")
+        for number, line in enumerate(words):
+            top = EFFECTS_TOP_PT + y + EFFECT_GAP_PT + 6 + number * TITLE_LINE_PT
+            sheet.text(MARGIN_PT, top, line, size=LABEL_SIZE, weight="bold")
+        for place, (setting, mean, low, high) in enumerate(settings):
+            at = y + EFFECT_GAP_PT + (place + 0.5) * EFFECT_PT
+            sheet.text(EFFECTS_LEFT_PT - 6, EFFECTS_TOP_PT + at + 2.3, setting, size=6.5, ha="right")
+            if low is not None and high is not None:
+                axes.plot([low, high], [at, at], color=style.ACCENT, linewidth=1.2, zorder=2)
+            axes.plot([mean], [at], "o", color=style.ACCENT, markersize=3.2, zorder=3)
+        y += EFFECT_GAP_PT + len(settings) * EFFECT_PT
+    sheet.text(EFFECTS_LEFT_PT, sheet.height_pt - 6, foot, size=6.5, colour=style.TEXT_SOFT)
     return sheet
 
 

@@ -41,7 +41,9 @@ def _of_blocks(
         yield block.id, name, partial(answer_figures.answers_picture, study, block, name, forms, lowest)
         for finding in all_findings():
             if finding.figure_name:
-                name = block_name(study, block, finding.figure_name)
+                several = len(finding.kinds) > 1 and len(study.blocks) > 1
+                own = f"{finding.figure_name}-{block.id}" if several else ""
+                name = own or block_name(study, block, finding.figure_name)
                 drawing = Drawing(study, block, found, results, name, forms)
                 yield block.id, name, partial(finding(found, results).figure, drawing)
 

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
-from study_app.analysis.data.blocks import Block, Direction
+from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.motion import OF_REACHES
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.finding import (
     FOUND,
-    HOLM,
     MANY,
     NO_EVIDENCE,
     Absent,
@@ -45,37 +44,23 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.statistics.equivalence import Equivalence, fewest, tost
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
-from study_app.analysis.statistics.outcome import holm
 from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.analysis.statistics.trend import StepDown, step_down
 
 
 @dataclass(frozen=True, slots=True)
 class ContrastWithControl:
-    """One delay compared with the shortest in one statement.
-
-    ``found`` holds the verdict; ``p_adjusted`` is p of a difference, corrected over the ``members`` comparisons of
-    the block; ``expected`` the direction that was stated before the study, None where none was.
-    """
+    """One delay compared with the shortest in one statement: whether the answers are equivalent."""
 
     item: str
     delay_ms: float
     control_ms: float
     found: Equivalence
-    p_adjusted: float | None
-    members: int
-    expected: Direction | None = None
 
     @property
     def verdict(self) -> Nearness:
-        """What may be said: "equivalent" where every test shows it, "different" by the corrected p."""
+        """What may be said: "equivalent" where every test shows it."""
         return self.found.verdict
-
-    @property
-    def as_expected(self) -> bool:
-        """Whether answers went where they were expected to, or nothing was expected."""
-        away = self.found.effect or 0.0
-        return self.expected is None or (away > 0) == (self.expected == "increasing")
 
 
 def equivalent_up_to(against: tuple[ContrastWithControl, ...]) -> dict[str, float | None]:
@@ -94,52 +79,22 @@ def equivalent_up_to(against: tuple[ContrastWithControl, ...]) -> dict[str, floa
     return found
 
 
-def _differs(found: BlockResult, against: ContrastWithControl) -> dict[str, Any]:
-    """Return the row of the same comparison asked the other way: whether the delay differs at all."""
-    outcome = against.found
-    by = "the larger p of a t test and of exact signed ranks, two-sided"
-    return test_row(found, "a delay differs", outcome) | {
-        "test": "difference, paired",
-        "statistic": outcome.t,
-        "p": outcome.p_difference,
-        "method": "t test, two-sided" if outcome.p_different_ranks is None else by,
-        "p_adjusted": against.p_adjusted,
-        "smallest_p": None if outcome.p_different_ranks is None else 0.5 ** (outcome.n - 1),
-        "family": f"{found.id}: each delay against the shortest",
-        "members": against.members,
-        "correction": HOLM,
-        "note": None if outcome.t is not None else outcome.note,
-    }
-
-
-def _p_different(one: ContrastWithControl) -> str:
-    """Return the adjusted p of a difference, unless no answers of so many participants could have shown one."""
-    out = min(1.0, 2 * 0.5**one.found.n) * one.members > one.found.alpha
-    return "out of reach" if out and one.p_adjusted is not None else p_value(one.p_adjusted)
-
-
 def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     """Yield how the comparisons with the shortest delay were made, and what they could not show."""
     first = against[0].found
     yield (
         f"Two one-sided t tests with a bound of ±{first.bound:g}, intervals of {percent(1 - 2 * first.alpha)}. "
         "Equivalent: the t tests, changes of signs, signed ranks and the bootstrap-t all show that the mean lies "
-        f"within the bound, with {enough(first.alpha)}. Different: the larger p of a two-sided t test and of exact "
-        f"signed ranks, Holm-adjusted over the {len(against)} comparisons of this table, is at most {first.alpha:g}. "
-        "Inconclusive: neither. Out of reach: no answers of so many participants could have given either."
+        f"within the bound, with {enough(first.alpha)}. Inconclusive: they do not, which is no evidence of a "
+        "difference: that is what the test of a trend asks. Out of reach: no answers of so many participants could "
+        "have shown it."
     )
-    differing = 0.5 ** (first.n - 1) if first.n else 1.0
-    if differing * len(against) > first.alpha:
-        yield (
-            f"With {counted(first.n, 'pair')} no comparison here can be called different after the correction; a trend "
-            "over all delays can be shown."
-        )
     disagree = sum(one.found.checks_agree is False for one in against)
     if disagree:
         yield f"*: p with and without normality decide differently ({disagree}); equivalent is only what all show."
 
 
-VERDICTS: Final = ("equivalent", "different", "inconclusive", "out of reach")
+VERDICTS: Final = ("equivalent", "inconclusive", "out of reach")
 
 
 def by_delay(found: BlockResult) -> list[list[str]]:
@@ -166,21 +121,15 @@ def _said_of(found: BlockResult, delay_ms: float, here: Sequence[ContrastWithCon
 def evidence_up_to(found: BlockResult, delay_ms: float) -> tuple[str, ...]:
     """Return what shows that delays up to this one change answers, with the error rate held over all statements.
 
-    That is a trend up to this delay or a shorter one, or else a difference at one of them.
+    That is a trend up to this delay or a shorter one.
     """
     exploratory = {trend.item for trend in DelayTrend.of(found) if not trend.primary}
-    reasons = {
-        one.item: f"“{short(found, one.item)}” follows the delay up to {ms(shown_ms)}"
+    return tuple(
+        f"“{short(found, one.item)}” follows the delay up to {ms(shown_ms)}"
         + (" (exploratory)" if one.item in exploratory else "")
         for one in LowestDelay.of(found)
         if (shown_ms := one.over_all_ms) is not None and shown_ms <= delay_ms
-    }
-    for one in sorted(ContrastsWithControl.of(found), key=lambda one: one.delay_ms):
-        if one.verdict == "different" and one.delay_ms <= delay_ms:
-            away = "" if one.as_expected else ", against the direction stated before the study"
-            difference = f"“{short(found, one.item)}” differs at {ms(one.delay_ms)} by {number(one.found.effect)}{away}"
-            reasons.setdefault(one.item, difference)
-    return tuple(reasons.values())
+    )
 
 
 def common_ms(found: BlockResult) -> float | None:
@@ -191,7 +140,7 @@ def common_ms(found: BlockResult) -> float | None:
 
 
 class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
-    """Equivalence of each delay to the shortest one, and difference from it."""
+    """Equivalence of each delay to the shortest one."""
 
     key = "against"
     place = 7
@@ -211,7 +160,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         if bound is None:
             why = "the protocol decided no bound of equivalence, and one chosen now would be chosen by the answers"
             return (), (NotTested(cls.what, why),)
-        outcomes = []
+        compared = []
         for item in answers.block.items:
             values = answers.values[item.id]
             for place, delay_ms in enumerate(delays_ms[1:], start=1):
@@ -224,20 +173,8 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
                     checks=answers.n <= MANY,
                     verdict_only=answers.verdicts_only,
                 )
-                outcomes.append((item.id, delay_ms, tested))
-        adjusted = holm([tested.p_difference for _, _, tested in outcomes])
-        return tuple(
-            ContrastWithControl(
-                item,
-                delay_ms,
-                delays_ms[0],
-                tested.judged(p, len(outcomes)),
-                p,
-                len(outcomes),
-                answers.decided.direction(item),
-            )
-            for (item, delay_ms, tested), p in zip(outcomes, adjusted, strict=True)
-        ), ()
+                compared.append(ContrastWithControl(item.id, delay_ms, delays_ms[0], tested))
+        return tuple(compared), ()
 
     @classmethod
     def entries(cls, found: BlockResult) -> Mapping[str, Any]:
@@ -247,15 +184,17 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
 
     def rows(self) -> Iterator[Row]:
         for against in self.value:
-            about = {
-                "item": against.item,
-                "comparison": f"{against.delay_ms:g} ms − {against.control_ms:g} ms",
-                "verdict": against.verdict,
-                "codes": codes_of(self.found, against.delay_ms, against.control_ms),
-            }
             row = test_row(self.found, "a delay is equivalent", against.found)
-            yield row | rows_alone(self.found, f"{against.item} at {against.delay_ms:g} ms") | about
-            yield _differs(self.found, against) | about
+            yield (
+                row
+                | rows_alone(self.found, f"{against.item} at {against.delay_ms:g} ms")
+                | {
+                    "item": against.item,
+                    "comparison": f"{against.delay_ms:g} ms − {against.control_ms:g} ms",
+                    "verdict": against.verdict,
+                    "codes": codes_of(self.found, against.delay_ms, against.control_ms),
+                }
+            )
 
     def section(self) -> Iterator[str]:
         """Yield the comparisons of each delay with the shortest."""
@@ -273,7 +212,6 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             ("people beyond the bound", lambda one: beyond(one.found)),
             ("p equivalent", lambda one: p_value(one.found.p)),
             ("p without normality", lambda one: p_value(one.found.p_without_normality)),
-            ("p different, adjusted", _p_different),
             ("Verdict", lambda one: one.verdict + (" *" if one.found.checks_agree is False else "")),
             words=2,
             last=1,
@@ -290,7 +228,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         if undecided:
             yield (
                 f"{lead(found)}: inconclusive or out of reach: {len(undecided)} of {len(against)} comparisons with "
-                f"{ms(undecided[0].control_ms)}, which show neither a difference nor that it stays within the bound."
+                f"{ms(undecided[0].control_ms)}, which do not show that the mean stays within the bound."
             )
 
     def methods(self) -> Iterator[str]:
@@ -302,9 +240,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
                 f"Equivalence to {self.found.delays_ms[0]:g} ms was tested by two one-sided t tests on paired "
                 f"differences with a bound of ±{bound:g} {points}{beforehand}, and {level} intervals, and called "
                 "equivalent only where changes of signs, signed ranks and the bootstrap-t agreed, and with "
-                f"{least(self.results.decided.alpha)}; it was called different where the larger p of a t test and of "
-                "exact signed ranks, Holm-adjusted over all these comparisons, was at most alpha, and otherwise "
-                "inconclusive."
+                f"{least(self.results.decided.alpha)}, and otherwise inconclusive."
             )
 
 
@@ -325,7 +261,7 @@ class Lowest:
         """The lowest delay that shows with the error rate held over all statements; None without any."""
         lowest = None
         for step in self.steps.steps:
-            if step.page.p is None or step.page.p > self.steps.alpha / self.members:
+            if step.trend.p is None or step.trend.p > self.steps.alpha / self.members:
                 break
             lowest = step.longest_ms
         return lowest
@@ -349,8 +285,8 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         trends, lowest = DelayTrend.of(found), []
         showing = [one for one in trends if one.verdict in FOUND]
         for one in showing:
-            direction = answers.decided.direction(one.item) or "increasing"
-            steps = step_down(answers.values[one.item], answers.block.delays_ms, direction, alpha=answers.decided.alpha)
+            direction, alpha = answers.decided.direction(one.item), answers.decided.alpha
+            steps = step_down(answers.values[one.item], answers.block.delays_ms, direction, alpha=alpha)
             lowest.append(Lowest(one.item, steps, one.members))
         if trends and not showing:
             why = "no statement shows a trend over all delays; that is not evidence that none is noticed"
@@ -360,7 +296,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
     def rows(self) -> Iterator[Row]:
         for lowest in self.value:
             for step in lowest.steps.steps:
-                row = test_row(self.found, "answers follow the delay, stepping down", step.page)
+                row = test_row(self.found, "answers follow the delay, stepping down", step.trend)
                 row |= rows_alone(self.found, f"stepping down within {lowest.item}") | {
                     "members": len(lowest.steps.steps)
                 }
@@ -379,7 +315,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
             ("uncorrected", lambda one: "–" if one.steps.lowest_ms is None else f"≤ {ms(one.steps.lowest_ms)}"),
             (
                 "steps down: longest delay, p",
-                lambda one: "; ".join(f"{ms(step.longest_ms)} {p_value(step.page.p)}" for step in one.steps.steps),
+                lambda one: "; ".join(f"{ms(step.longest_ms)} {p_value(step.trend.p)}" for step in one.steps.steps),
             ),
             words=4,
         )
@@ -411,8 +347,10 @@ class DetectionThreshold(Finding[Threshold | None]):
         item = answers.decided.noticed
         if item is None or item not in answers.values:
             return None, (NotTested(cls.what, "the protocol names no statement that asks for it"),)
-        single, delays_ms = answers.single[item], answers.block.delays_ms
-        return noticed(single, delays_ms, alpha=answers.decided.alpha, seed=answers.seed), ()
+        rising = [one.item for one in DelayTrend.of(found) if one.verdict in FOUND and (one.outcome.effect or 0.0) > 0]
+        if item not in rising:
+            return None, (NotTested(cls.what, "noticing is not shown to rise with the delay"),)
+        return noticed(answers.single[item], answers.block.delays_ms), ()
 
     def rows(self) -> Iterator[Row]:
         threshold = self.value
@@ -471,8 +409,8 @@ class DetectionThreshold(Finding[Threshold | None]):
             yield (
                 "The detection threshold is the 50 % point between guesses and lapses of a logistic function: the "
                 "posterior median from agreement (5 to 7) in single answers, all participants pooled, with a 95 % "
-                "interval that is scaled by how far participants differ. It is stated only where a permutation test "
-                "against a flat line shows a rise, and where it lies among the delays that were presented."
+                "interval that is scaled by how far participants differ. It is stated only where the statement shows a "
+                "trend, and where it lies among the delays that were presented."
             )
 
 
@@ -510,12 +448,6 @@ class NoticedFrom(Finding[None]):
                 f"From {ms(at)} on at the latest {listed(first)} {'changes' if len(first) == 1 else 'change'} with the "
                 "delay; shorter delays may be noticed too."
             )
-        different = [
-            one for one in ContrastsWithControl.of(self.found) if one.verdict == "different" and one.item in items
-        ]
-        if different:
-            at, control = min(one.delay_ms for one in different), different[0].control_ms
-            return f"No trend is shown, but answers at {ms(at)} differ from those at {ms(control)}."
         return ""
 
 

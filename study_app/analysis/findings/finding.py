@@ -38,7 +38,9 @@ class BlockAnswers:
     ``values`` (participants, settings) are the medians of ``single`` answers (participants, settings, presentations);
     ``sessions`` of the same shape are the sessions in which these were given. ``sites`` are those of
     the participants of a merged study. ``verdicts_only``: leave out what decides no verdict, for thousands of simulated
-    studies.
+    studies. ``over_all`` is the one test over all statements, ``gate`` its p corrected by Holm over the blocks of the
+    study: no adjusted p of a statement is below it, so that in a study where nothing differs anything is found at most
+    as often as alpha says.
     """
 
     block: Block
@@ -51,6 +53,8 @@ class BlockAnswers:
     sessions: Mapping[str, Array]
     verdicts_only: bool = False
     sites: tuple[str, ...] = ()
+    over_all: Outcome | None = None
+    gate: float = 0.0
 
     @property
     def n(self) -> int:
@@ -74,6 +78,12 @@ class BlockAnswers:
         So many that their number never decides whether something can be shown.
         """
         return draws_for(self.decided.alpha, DRAWS, len(self.block.items))
+
+    def verdict(self, p: float | None, least: float | None, *, primary: bool) -> Verdict:
+        """Return what may be said of a test of one statement, see `verdict`; nothing is shown that the gate hides."""
+        smallest = 0.0 if self.over_all is None else self.over_all.smallest_p or 0.0
+        bounds = None if least is None else max(least, smallest)
+        return verdict(None if p is None else max(p, self.gate), bounds, self.decided.alpha, primary=primary)
 
     @property
     def draws_over_all(self) -> int:
@@ -174,15 +184,15 @@ FDR: Final = "Benjamini-Hochberg"
 ALONE: Final = "none"
 
 
-def judged(outcomes: Mapping[str, Outcome], decided: Decided, family: str) -> tuple[Tested, ...]:
+def judged(outcomes: Mapping[str, Outcome], answers: BlockAnswers, family: str) -> tuple[Tested, ...]:
     """Return the tests of statements (item → outcome): primary ones as a Holm family, the others exploratory by FDR."""
-    primary = {item: outcome for item, outcome in outcomes.items() if decided.is_primary(item)}
+    primary = {item: outcome for item, outcome in outcomes.items() if answers.decided.is_primary(item)}
     others = {item: outcome for item, outcome in outcomes.items() if item not in primary}
     found = {
-        **{one.item: one for one in in_family(primary, decided.alpha, family, holm, HOLM, primary=True)},
+        **{one.item: one for one in in_family(primary, answers, family, holm, HOLM, primary=True)},
         **{
             one.item: one
-            for one in in_family(others, decided.alpha, f"{family}, exploratory", false_discovery, FDR, primary=False)
+            for one in in_family(others, answers, f"{family}, exploratory", false_discovery, FDR, primary=False)
         },
     }
     return tuple(found[item] for item in outcomes)
@@ -190,7 +200,7 @@ def judged(outcomes: Mapping[str, Outcome], decided: Decided, family: str) -> tu
 
 def in_family(
     outcomes: Mapping[str, Outcome],
-    alpha: float,
+    answers: BlockAnswers,
     family: str,
     correct: Correct,
     correction: str,
@@ -203,14 +213,15 @@ def in_family(
     found = []
     for place, ((item, outcome), p) in enumerate(zip(outcomes.items(), correct(ps), strict=True)):
         least = correct([*ps[:place], outcome.smallest_p, *ps[place + 1 :]])[place]
-        said = verdict(p, least, alpha, primary=of_primary[place])
-        found.append(Tested(item, outcome, family, len(ps), correction, p, of_primary[place], said))
+        said = answers.verdict(p, least, primary=of_primary[place])
+        adjusted = None if p is None else max(p, answers.gate)
+        found.append(Tested(item, outcome, family, len(ps), correction, adjusted, of_primary[place], said))
     return tuple(found)
 
 
-def alone(outcome: Outcome, item: str, decided: Decided, family: str) -> Tested:
+def alone(outcome: Outcome, item: str, answers: BlockAnswers, family: str) -> Tested:
     """Return a test that asks again what another one asked: it is not corrected, and never more than exploratory."""
-    said = verdict(outcome.p, outcome.smallest_p, decided.alpha, primary=False)
+    said = answers.verdict(outcome.p, outcome.smallest_p, primary=False)
     return Tested(item, outcome, family, 1, ALONE, outcome.p, False, said)
 
 

@@ -60,7 +60,7 @@ class MixedModel(Finding[tuple[Tested, ...]]):
             item: ordinal(single, columns, sessions=answers.sessions[item], sites=sites)
             for item, single in answers.single.items()
         }
-        return tuple(alone(model, item, answers.decided, family) for item, model in models.items()), ()
+        return tuple(alone(model, item, answers, family) for item, model in models.items()), ()
 
     def rows(self) -> Iterator[Row]:
         return (judged_row(self.found, "settings differ, mixed model", one) for one in self.value)

@@ -19,7 +19,6 @@ from study_app.analysis.findings.finding import (
     Row,
     rows_alone,
     test_row,
-    verdict,
 )
 from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer
 from study_app.analysis.report.html_page import heading, paragraph, table_of
@@ -78,7 +77,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         ratings = np.stack([answers.values[label] for label in labels], axis=2)
         truth = [None if label is None else labels.index(label) for label in right]
         tested = recognition(named(ratings), truth, len(labels), seed=answers.intervals)
-        said = verdict(tested.p, tested.smallest_p, answers.decided.alpha, primary=answers.decided.binding)
+        said = answers.verdict(tested.p, tested.smallest_p, primary=answers.decided.binding)
         return RecognitionResult(labels, answers.block.codes, right, tested, said), ()
 
     def rows(self) -> Iterator[Row]:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import Any, ClassVar, Final
 
@@ -11,6 +12,8 @@ import numpy as np
 from study_app import number_text
 from study_app.analysis.data.blocks import KINDS
 from study_app.analysis.data.measures import medians
+from study_app.analysis.figures import answer_figures
+from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.findings.finding import (
     FDR,
     HOLM,
@@ -42,9 +45,9 @@ from study_app.analysis.results import (
     statistic,
     test_name,
 )
-from study_app.analysis.statistics.outcome import Outcome, false_discovery, holm
+from study_app.analysis.statistics.outcome import Outcome, false_discovery, holm, student_interval
 from study_app.analysis.statistics.rank_tests import Paired, friedman, global_permutation, paired
-from study_app.analysis.statistics.trend import page
+from study_app.analysis.statistics.trend import trend
 
 ONE_DELAY: Final = "the block has one delay: there is nothing to compare it with"
 
@@ -110,7 +113,7 @@ def compared(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
     if answers.k < 2:
         return (), (NotTested("test of settings", "the block has one setting: there is nothing to compare it with"),)
     outcomes = {item: _alike(answers, values) for item, values in answers.values.items()}
-    return judged(outcomes, answers.decided, f"{answers.block.id}: settings differ"), ()
+    return judged(outcomes, answers, f"{answers.block.id}: settings differ"), ()
 
 
 def _alike(answers: BlockAnswers, values: Any) -> Outcome:
@@ -175,12 +178,12 @@ def _first_tested(tests: Sequence[Tested]) -> Tested:
 
 
 class DelayTrend(StatementTests):
-    """Page's test of a trend over the delay, in every statement whose direction was stated."""
+    """The test of a trend over the delay in every statement, in the direction that was stated or in either."""
 
     key = "trends"
     place = 5
     row_place = 3
-    what = "test of a trend (Page)"
+    what = "test of a trend"
     part = "trends"
     kinds = ("delays",)
     waits = ("delays",)
@@ -192,24 +195,22 @@ class DelayTrend(StatementTests):
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY),)
-        outcomes = {}
-        for item in answers.block.items:
-            if (direction := answers.decided.direction(item.id)) is not None:
-                outcomes[item.id] = page(answers.values[item.id], direction, seed=answers.intervals)
-        undirected = [item.short for item in answers.block.items if item.id not in outcomes]
-        why = f"the protocol does not say whether answers should rise or fall with delay ({', '.join(undirected)})"
-        tested = judged(outcomes, answers.decided, f"{answers.block.id}: trend over delay")
-        return tested, (NotTested(cls.what, why),) if undirected else ()
+        outcomes = {
+            item: trend(values, answers.decided.direction(item), seed=answers.intervals)
+            for item, values in answers.values.items()
+        }
+        return judged(outcomes, answers, f"{answers.block.id}: trend over delay"), ()
 
     def methods(self) -> Iterator[str]:
         if trends := self.value:
+            stated = "beforehand" if self.results.decided.binding else "by the protocol"
             yield (
-                "Trends over the delay were tested by Page's L "
-                f"({_first_tested(trends).outcome.method.split(',')[0]}), one-sided in the direction stated "
-                f"{'beforehand' if self.results.decided.binding else 'by the protocol'}, {families(trends)}; where a "
-                "trend showed, the longest delay was dropped and the test repeated until it no longer did, which gives "
-                "an upper bound of the lowest delay that is noticed (every step at alpha over the number of "
-                "statements, so that the error rate holds over all of them)."
+                "Trends over the delay were tested by changing the signs of each participant's rank correlation of "
+                f"answers and delays ({_first_tested(trends).outcome.method.split(',')[0]}), which is about the "
+                f"population, one-sided where a direction was stated {stated}, {families(trends)}; where a trend "
+                "showed, the longest delay was dropped and the test repeated until it no longer did, which gives an "
+                "upper bound of the lowest delay that is noticed (every step at alpha over the number of statements, "
+                "so that the error rate holds over all of them)."
             )
 
 
@@ -240,19 +241,31 @@ class SessionsDiffer(StatementTests):
             each = np.stack([medians(np.where(of == one, single, np.nan)) for one in numbers], axis=2)
             common = np.asarray(~np.isnan(each).any(axis=2))
             outcomes[item.id] = _alike(answers, medians(np.where(common[..., None], each, np.nan).transpose(0, 2, 1)))
-        family, alpha = f"{answers.block.id}: sessions", answers.decided.alpha
-        tested = in_family(outcomes, alpha, family, false_discovery, FDR, primary=False)
+        ungated = replace(answers, gate=0.0)  # sessions may differ where settings do not
+        tested = in_family(outcomes, ungated, f"{answers.block.id}: sessions", false_discovery, FDR, primary=False)
         if all(one.outcome.n == 0 for one in tested):
             return (), (NotTested(cls.what, f"no one answered the same setting in all of sessions {numbers}"),)
         return tested, ()
 
 
-def over_all(answers: BlockAnswers, draws: int | None = None) -> Outcome | None:
-    """Test once over all statements whether the settings are answered alike; ``draws`` of them if not as usual."""
-    if answers.k < 2 or (answers.verdicts_only and draws is None):
-        return None
-    values = np.array(list(answers.values.values()))
-    return global_permutation(values, draws=draws or answers.draws_over_all, seed=answers.seed)
+def gated(blocks: Sequence[BlockAnswers], draws: int | None = None) -> tuple[BlockAnswers, ...]:
+    """Return the answers of a study's blocks, each with its test over all statements and the gate that it gives.
+
+    ``draws``: so many rearrangements, if not as usual.
+    """
+    tests = [
+        None
+        if answers.k < 2
+        else global_permutation(
+            np.array(list(answers.values.values())), draws=draws or answers.draws_over_all, seed=answers.seed
+        )
+        for answers in blocks
+    ]
+    adjusted = holm([None if test is None else test.p for test in tests])
+    return tuple(
+        replace(answers, over_all=test, gate=1.0 if p is None else p)
+        for answers, test, p in zip(blocks, tests, adjusted, strict=True)
+    )
 
 
 class OverAll(Finding[Outcome | None]):
@@ -267,7 +280,7 @@ class OverAll(Finding[Outcome | None]):
 
     @classmethod
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[Outcome | None, Absent]:
-        return over_all(answers), ()
+        return answers.over_all, ()
 
     def rows(self) -> Iterator[Row]:
         if (overall := self.value) is not None:
@@ -293,6 +306,78 @@ class OverAll(Finding[Outcome | None]):
                 "once by permuting them within participants, the statistic being the sum of the statements' Friedman "
                 "statistics."
             )
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """The mean difference of a setting (code) from the first one in one statement, of ``n`` participants.
+
+    ``low`` and ``high`` are the ends of Student's 95 % interval, None where there is none.
+    """
+
+    item: str
+    code: str
+    n: int
+    mean: float | None
+    low: float | None
+    high: float | None
+
+
+class Effects(Finding[tuple[Effect, ...]]):
+    """The figure of effects: how far each setting differs from the first, statement by statement, with intervals."""
+
+    key = "effects"
+    place = 0.5
+    what = "figure of effects"
+    part = "figure of effects"
+    empty = ()
+    figure_name = "effects"
+    figure_title = "Differences from the first setting"
+
+    @classmethod
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Effect, ...], Absent]:
+        if answers.verdicts_only or answers.k < 2:
+            return (), ()
+        codes = dict.fromkeys(answers.block.columns.values())
+        firsts = {column: code for code, column in reversed(answers.block.columns.items())}
+        effects = []
+        for item, values in answers.values.items():
+            for column in list(codes)[1:]:
+                away = values[:, column] - values[:, 0]
+                away = away[~np.isnan(away)]
+                ends = student_interval(away)
+                mean = float(away.mean()) if len(away) else None
+                effects.append(Effect(item, firsts[column], len(away), mean, *ends))
+        return tuple(effects), ()
+
+    def section(self) -> Iterator[str]:
+        yield from self.drawn()
+
+    def figure(self, drawing: Drawing) -> Picture | None:
+        found = self.found
+        first = name(found, found.settings[0].code)
+        bound = drawing.results.decided.equivalence_bound if found.delays_ms else None
+        rows = [
+            (
+                short(found, item),
+                [
+                    (name(found, one.code), one.mean, one.low, one.high)
+                    for one in self.value
+                    if one.item == item and one.mean is not None
+                ],
+            )
+            for item in dict.fromkeys(one.item for one in self.value)
+        ]
+        if not any(settings for _, settings in rows):
+            return None
+        caption = (
+            f"Mean difference of answers from those to {first} ({drawing.simulated}n = "
+            f"{counted(found.n, 'participant')}). Lines: Student's 95 % interval, not corrected for their number; no "
+            "line where all differences are equal. What is shown is decided by the tests below."
+            + (f" Grey: the bound of equivalence, ±{bound:g}." if bound else "")
+        )
+        draw = partial(answer_figures.draw_effects, rows, bound, f"Difference from {first}, points of the scale")
+        return drawing.picture(self.figure_title, caption, draw, (counted(found.n, "participant"),))
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,7 +418,7 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
         for item, first, second in each
     }
     primary = [answers.decided.is_primary(item) for item, *_ in each]
-    tested = in_family(outcomes, alpha, f"{answers.block.id}: all pairs of settings", holm, HOLM, primary=primary)
+    tested = in_family(outcomes, answers, f"{answers.block.id}: all pairs of settings", holm, HOLM, primary=primary)
     return tuple(
         Pair(codes[first], codes[second], replace(one, item=item))
         for (item, first, second), one in zip(each, tested, strict=True)

@@ -304,10 +304,10 @@ def _explained(question: Question, found: Powers) -> list[str]:
         case "settings differ":
             return ["Friedman's permutation test, or signed ranks where two settings are compared."]
         case "trend":
-            return ["Page's test in the direction that the protocol states."]
+            return ["The trend of participants' rank correlations, in the direction that the protocol states."]
         case "lowest delay":
             return [
-                "Page's test stepping down from the longest delay: what it finds bounds the noticeable one from above."
+                "The same, stepping down from the longest delay: what it finds bounds the noticeable one from above."
             ]
         case "equivalence":
             return [

@@ -183,7 +183,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     kinds = {protocol.compared_in(block.id) for block in asked}
     if "delays" in kinds:
         yield (
-            "Delays: Page's permutation test in the stated direction, stepping down from the longest delay; "
+            "Delays: a trend in the population, by changing the signs of each participant's rank correlation with the "
+            "delay, in the stated direction, otherwise two-sided, stepping down from the longest delay; "
             "equivalence to no delay by two one-sided tests, where a bound is given; the detection threshold from "
             "agreement."
         )
@@ -192,6 +193,10 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             f"{' and '.join(sorted(map(str, others))).capitalize()}: Friedman's permutation test of each statement, "
             "signed ranks where two conditions are compared."
         )
+    yield (
+        "No statement counts whose part of the study shows no difference by the permutation test over all its "
+        "statements, corrected by Holm over the parts."
+    )
     yield (
         f"α = {decided.alpha:g}; primary statements ({', '.join(decided.primary) or 'all'}) are corrected by Holm, the "
         "others, exploratory, by Benjamini and Hochberg."

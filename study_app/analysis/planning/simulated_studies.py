@@ -21,7 +21,7 @@ from study_app.analysis.data.blocks import Block as StatementBlock
 from study_app.analysis.data.blocks import Decided, Item, Setting, read_decided, spoken
 from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
-from study_app.analysis.statistics.equivalence import sizes
+from study_app.analysis.statistics.equivalence import p_above, sizes
 from study_app.analysis.statistics.outcome import false_discovery, holm
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
@@ -217,14 +217,17 @@ def friedman(ranked: Single, rng: np.random.Generator) -> tuple[Array, Array]:
     return _p(squares, seen), _p(of_all, seen_of_all * np.float32(1 - 1e-5))
 
 
-def trend(ranked: Single, rng: np.random.Generator) -> Array:
-    """Return Page's one-sided p (studies, items) that answers rise; ``ranked``: (studies, people, settings, items)."""
+def trend(ranked: Single, both_ways: NDArray[np.bool_], rng: np.random.Generator) -> Array:
+    """Return the p (studies, items) that answers rise; ``ranked``: (studies, people, settings, items).
+
+    Two-sided for the items (items,) that may go ``both_ways``.
+    """
     studies, n, k, items = ranked.shape
-    weights = (rng.random((PLANNED_DRAWS, n, k)).argsort(axis=-1) + 1).astype(np.float32)
-    columns = np.ascontiguousarray(ranked.transpose(1, 2, 0, 3)).reshape(n * k, studies * items)
-    drawn = (weights.reshape(PLANNED_DRAWS, n * k) @ columns).reshape(PLANNED_DRAWS, studies, items)
-    seen = np.einsum("snki,k->si", ranked, np.arange(1, k + 1, dtype=np.float32))
-    return _p(drawn, seen)
+    scores = np.einsum("snki,k->sin", ranked, np.arange(1, k + 1, dtype=np.float32)).reshape(-1, n)
+    away = scores - np.float32(k * (k + 1) ** 2 / 2)
+    up = (rng.random((PLANNED_DRAWS, n)) < 0.5).astype(np.float32)
+    rising, falling = (p_above(np.abs(away), side * away > 0, up).reshape(studies, items) for side in (1, -1))
+    return np.where(both_ways, np.minimum(1.0, 2 * np.minimum(rising, falling)), rising)
 
 
 def signed(answers: Array, rng: np.random.Generator) -> Array:
@@ -272,73 +275,68 @@ settings, items) are sums of mean answers.
 def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int) -> Counts:
     """Simulate ``studies`` of the studies of a batch (from 0, of `BATCH`) and count what is found at every size."""
     held = [people(plan, max(sizes), seed, batch * BATCH + number) for number in range(studies)]
-    counts: Counts = {}
-    for place, block in enumerate(plan.blocks):
-        answers = together(held, place, EFFECTS)
-        rngs = [np.random.default_rng([seed, batch, place, n]) for n in sizes]
-        judge = _delays if block.kind == "delays" else _liquids
-        found = judge(block, plan.decided, answers, sizes, rngs)
-        found["means"] = answers.mean(axis=2).sum(axis=1)
-        counts |= {(block.id, what): np.asarray(number, dtype=np.float64) for what, number in found.items()}
-    return counts
+    given = [together(held, place, EFFECTS) for place, _ in enumerate(plan.blocks)]
+    flat = [answers.reshape(-1, *answers.shape[2:]) for answers in given]
+    ranked = [ranks(answers) for answers in flat]
+    of_sizes: dict[tuple[str, str], list[Array]] = {}
+    for n in sizes:
+        rngs = [np.random.default_rng([seed, batch, place, n]) for place, _ in enumerate(plan.blocks)]
+        ps = [friedman(one[:, :n], rng) for one, rng in zip(ranked, rngs, strict=True)]
+        gates = np.array([holm(of_study) for of_study in np.array([p_all for _, p_all in ps]).T.tolist()], float).T
+        for place, block in enumerate(plan.blocks):
+            judge = _delays if block.kind == "delays" else _liquids
+            shown = gates[place] <= plan.decided.alpha
+            found = judge(block, plan.decided, given[place][:, :, :n], ps[place][0], shown, rngs[place])
+            for what, number in found.items():
+                of_sizes.setdefault((block.id, what), []).append(number)
+    counts = {what: np.array(numbers, dtype=np.float64) for what, numbers in of_sizes.items()}
+    means = {(one.id, "means"): here.mean(axis=2).sum(axis=1) for one, here in zip(plan.blocks, given, strict=True)}
+    return counts | means
+
+
+def _counted(found: NDArray[np.bool_], shown: NDArray[np.bool_], effects: int) -> dict[str, Array]:
+    """Return the numbers of studies (effects, …) of what is ``found`` (studies, items), in all and by statement."""
+    by_effect = found.reshape(effects, -1, found.shape[-1])
+    return {
+        "found": by_effect.sum(axis=1),
+        "any": by_effect.any(axis=2).sum(axis=1),
+        "all": shown.reshape(effects, -1).sum(axis=1),
+    }
 
 
 def _liquids(
-    block: Planned, decided: Decided, answers: Array, sizes: Sequence[int], rngs: Sequence[np.random.Generator]
+    block: Planned, decided: Decided, answers: Array, ps: Array, shown: NDArray[np.bool_], rng: np.random.Generator
 ) -> dict[str, Array]:
-    effects, studies, _, k, items = answers.shape
-    flat = answers.reshape(effects * studies, *answers.shape[2:])
-    ranked = ranks(flat)
-    found, over_all = [], []
-    for n, rng in zip(sizes, rngs, strict=True):
-        if k == 2:
-            ps, p_all = signed(flat[:, :n], rng), None
-        else:
-            ps, p_all = friedman(ranked[:, :n], rng)
-        found.append(_family(block, decided, ps, range(len(block.items))).reshape(effects, studies, items))
-        if p_all is not None:
-            over_all.append((p_all <= decided.alpha).reshape(effects, studies))
-    counted = {"found": np.array([one.sum(axis=1) for one in found])}
-    counted["any"] = np.array([one.any(axis=2).sum(axis=1) for one in found])
-    if over_all:
-        counted["all"] = np.array([one.sum(axis=1) for one in over_all])
-    return counted
+    """Count what is found where the test over all statements (studies,) shows a difference; ``ps`` are Friedman's."""
+    effects = len(answers)
+    if block.k == 2:
+        ps = signed(answers.reshape(-1, *answers.shape[2:]), rng)
+    return _counted(_family(block, decided, ps) & shown[:, None], shown, effects)
 
 
 def _delays(
-    block: Planned, decided: Decided, answers: Array, sizes: Sequence[int], rngs: Sequence[np.random.Generator]
+    block: Planned, decided: Decided, answers: Array, _ps: Array, shown: NDArray[np.bool_], rng: np.random.Generator
 ) -> dict[str, Array]:
-    effects, studies, _, _, items = answers.shape
-    flat = answers.reshape(effects * studies, *answers.shape[2:])
-    directed = [place for place, item in enumerate(block.items) if decided.direction(item.id) is not None]
-    rising = flat[..., directed] * _signs(block, decided, directed)
-    ranked = ranks(rising)
-    counted: dict[str, list[Array]] = {}
-    for n, rng in zip(sizes, rngs, strict=True):
-        if directed:
-            only = _family(block, decided, trend(ranked[:, :n], rng), directed)
-            found = np.zeros((effects, studies, items), dtype=bool)
-            found[..., directed] = only.reshape(effects, studies, len(directed))
-            lowest = np.zeros((items, len(block.names)))
-            full = rising.reshape(effects, studies, *rising.shape[1:])[FULL, :, :n]
-            lowest[directed] = _step_down(full, found[FULL][:, directed], decided.alpha, rng)
-            counted.setdefault("found", []).append(found.sum(axis=1))
-            counted.setdefault("any", []).append(found.any(axis=2).sum(axis=1))
-            counted.setdefault("lowest", []).append(lowest)
-        if decided.equivalence_bound is not None:
-            here = answers[[0, FULL], :, :n]
-            away = here[:, :, :, 1:] - here[:, :, :, :1]
-            bound = decided.equivalence_bound
-            shown = [equivalent(one, bound, decided.alpha, rng).sum(axis=0) for one in away]
-            counted.setdefault("equivalent", []).append(np.array(shown).transpose(0, 2, 1))
-    return {what: np.array(numbers) for what, numbers in counted.items()}
+    effects, studies = answers.shape[:2]
+    directions = [decided.direction(item.id) for item in block.items]
+    rising = answers * np.array([-1.0 if one == "decreasing" else 1.0 for one in directions])
+    both_ways = np.array([one is None for one in directions])
+    ps = trend(ranks(rising.reshape(-1, *rising.shape[2:])), both_ways, rng)
+    found = _family(block, decided, ps) & shown[:, None]
+    counted = _counted(found, shown, effects)
+    at_full = found.reshape(effects, studies, -1)[FULL]
+    counted["lowest"] = _step_down(rising[FULL], at_full, both_ways, decided.alpha, rng)
+    if decided.equivalence_bound is not None:
+        here = answers[[0, FULL]]
+        away = here[:, :, :, 1:] - here[:, :, :, :1]
+        equal = [equivalent(one, decided.equivalence_bound, decided.alpha, rng).sum(axis=0) for one in away]
+        counted["equivalent"] = np.array(equal).transpose(0, 2, 1)
+    return counted
 
 
-def _signs(block: Planned, decided: Decided, directed: Sequence[int]) -> Array:
-    return np.array([1.0 if decided.direction(block.items[place].id) == "increasing" else -1.0 for place in directed])
-
-
-def _step_down(rising: Array, shown: NDArray[np.bool_], alpha: float, rng: np.random.Generator) -> Array:
+def _step_down(
+    rising: Array, shown: NDArray[np.bool_], both_ways: NDArray[np.bool_], alpha: float, rng: np.random.Generator
+) -> Array:
     """Return how often a trend is shown up to each delay or a shorter one (items, delays).
 
     ``shown`` (studies, items) says where the trend over all delays is; the steps after it are not corrected.
@@ -348,17 +346,17 @@ def _step_down(rising: Array, shown: NDArray[np.bool_], alpha: float, rng: np.ra
     going = shown
     for longest in range(k - 1, 0, -1):
         if longest < k - 1:
-            going = going & (trend(ranks(rising[:, :, : longest + 1]), rng) <= alpha)
+            going = going & (trend(ranks(rising[:, :, : longest + 1]), both_ways, rng) <= alpha)
         counted[:, longest] = going.sum(axis=0)
     return counted
 
 
-def _family(block: Planned, decided: Decided, ps: Array, places: Sequence[int]) -> NDArray[np.bool_]:
-    """Return what is significant of ``ps`` (studies, tests): primary statements by Holm, the others by their rate.
+def _family(block: Planned, decided: Decided, ps: Array) -> NDArray[np.bool_]:
+    """Return what is significant of ``ps`` (studies, items): primary statements by Holm, the others by their rate.
 
     Without any decision all are tested as if they were primary: planning asks what the study could show.
     """
-    primary = np.array([not decided.made or decided.is_primary(block.items[place].id) for place in places])
+    primary = np.array([not decided.made or decided.is_primary(item.id) for item in block.items])
     found = np.zeros(ps.shape, dtype=bool)
     for members, adjusted in ((primary, holm), (~primary, false_discovery)):
         if members.any():

@@ -21,8 +21,7 @@ from study_app.analysis.data.study_tables import By, Study, group_counts, group_
 from study_app.analysis.figures.answer_figures import people_a_setting
 from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.findings import all_findings
-from study_app.analysis.findings.finding import NO_EVIDENCE, Answer, Finding
-from study_app.analysis.findings.statement_tests import OverAll
+from study_app.analysis.findings.finding import Answer, Finding
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_methods, level_section
 from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.report.html_page import attempted, bullets, drawn, heading, paragraph, render, table, table_of
@@ -45,7 +44,7 @@ from study_app.analysis.results import (
     settings_noun,
     short,
 )
-from study_app.analysis.statistics.outcome import FEW, holm
+from study_app.analysis.statistics.outcome import FEW
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.exclusions import named
 
@@ -270,27 +269,22 @@ def first_page(results: Results, limits: Sequence[str]) -> Markup:
 def answers(results: Results) -> tuple[Answer, ...]:
     """Return the answers that a study gives, block by block; none of a block in which nobody's answers count.
 
-    They claim something about a block only where the one test over all its statements finds a difference, corrected
-    by Holm over the blocks: in a study where nothing differs they then claim anything at most so often as alpha says.
+    They claim something about a block only where the one test over all its statements finds a difference: this is the
+    gate of every verdict of the block.
     """
-    overall = holm([None if (one := OverAll.of(found)) is None else one.p for found in results.blocks])
     return tuple(
-        _answer(finding(found, results), differs=p is not None and p <= results.decided.alpha)
-        for found, p in zip(results.blocks, overall, strict=True)
+        _answer(finding(found, results))
+        for found in results.blocks
         for finding in all_findings()
         if found.n and finding.question and found.kind in finding.kinds
     )
 
 
-def _answer(finding: Finding[Any], *, differs: bool) -> Answer:
-    """Return the answer of a finding; without its claim unless the test over all statements ``differs``."""
+def _answer(finding: Finding[Any]) -> Answer:
+    """Return the answer of a finding."""
     if not finding.found.revealed:
         return finding.answered("sealed", "This waits for the key to be opened: until then settings are codes.")
-    answer = finding.answer()
-    if differs or not answer.claims:
-        return answer
-    text = f"Single tests find something, but the test over all statements does not find a difference. {NO_EVIDENCE}"
-    return finding.answered("not shown", text)
+    return finding.answer()
 
 
 def empty_studies(participants: int) -> str:
@@ -326,8 +320,10 @@ def _parts(
     """Yield what the parts of a block's section are, and how each is made."""
     if said := said_of_presentations(found):
         yield "presentations", lambda: [paragraph(" ".join(said))]
+    effects, *others = all_findings()
+    yield effects.part, effects(found, results, pictures).section
     yield "figure of answers", lambda: drawn(pictures, found.kind)
-    for finding in all_findings():
+    for finding in others:
         yield finding.part, finding(found, results, pictures).section
     if found.absent:
         lines = [f"{line[:1].upper()}{line[1:]}" for line in missing(found)]

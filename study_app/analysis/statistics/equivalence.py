@@ -32,7 +32,7 @@ from study_app.analysis.statistics.outcome import (
     clopper_pearson,
     doubled_ranks,
 )
-from study_app.analysis.statistics.rank_tests import Alternative, signed, signed_p
+from study_app.analysis.statistics.rank_tests import signed, signed_p
 from study_app.errors import AnalysisError
 from study_app.number_text import counted
 
@@ -78,7 +78,7 @@ def _shares(n: int, seed: int, resamples: int) -> NDArray[np.float32]:
     return np.asarray(counts / n, dtype=np.float32)
 
 
-Verdict: TypeAlias = Literal["equivalent", "different", "inconclusive", "out of reach"]
+Verdict: TypeAlias = Literal["equivalent", "inconclusive", "out of reach"]
 
 ALL_SIGNS_UP_TO: Final = 14
 """Up to so many participants all signs are gone through; beyond that they are drawn."""
@@ -112,21 +112,17 @@ class Equivalence(Outcome):
     ranks alone decide: ``p`` is the larger of theirs. No test sees people who are not in the sample: ``p_unseen`` is
     the probability that it holds no member of a group of the share ``UNSEEN`` of all people.
 
-    ``verdict`` is "equivalent" where every p is at most alpha; else "different" where the larger p of a t test against
-    0 (``p_different``) and of signed ranks (``p_different_ranks``) is; else "out of reach" where no answers of so many
-    participants could have been either, else "inconclusive". ``smallest_check_p`` is the smallest p that signs and
-    ranks can give. ``beyond`` tells how many single participants differ by more than the bound: equivalent means say
-    nothing about them.
+    ``verdict`` is "equivalent" where every p is at most alpha; else "out of reach" where no answers of so many
+    participants could have been, else "inconclusive", which is no evidence of a difference. ``smallest_check_p`` is the
+    smallest p that signs and ranks can give. ``beyond`` tells how many single participants differ by more than the
+    bound: equivalent means say nothing about them.
     """
 
     bound: float
     alpha: float
     verdict: Verdict
-    t: float | None = None
     t_lower: float | None = None
     t_upper: float | None = None
-    p_different: float | None = None
-    p_different_ranks: float | None = None
     p_lower: float | None = None
     p_upper: float | None = None
     p_permutation: float | None = None
@@ -149,20 +145,6 @@ class Equivalence(Outcome):
         """The largest p of the tests for equivalence that do not ask for normality."""
         asked = (self.p_permutation, self.p_ranks, self.p_bootstrap)
         return max((p for p in asked if p is not None), default=None)
-
-    @property
-    def p_difference(self) -> float | None:
-        """P that the mean differs from 0: the larger of the t test's and the signed ranks', of those there are."""
-        return max((p for p in (self.p_different, self.p_different_ranks) if p is not None), default=None)
-
-    def judged(self, p_adjusted: float | None, members: int) -> Equivalence:
-        """Return this with the verdict that holds among ``members`` comparisons, whose p is ``p_adjusted`` here."""
-        if self.equal:
-            return replace(self, verdict="equivalent")
-        if p_adjusted is not None and p_adjusted <= self.alpha:
-            return replace(self, verdict="different")
-        hopeless = min(p_unseen(self.n, equal=True), 2 * members * 0.5**self.n) > self.alpha
-        return replace(self, verdict="out of reach" if hopeless else "inconclusive")
 
 
 def tost(
@@ -189,8 +171,8 @@ def tost(
     checks : bool
         Whether to ask without normality too, which takes long for many hundreds of participants.
     verdict_only : bool
-        Whether to leave out those of these tests that cannot change the verdict: those for equivalence where the t
-        tests or ``p_unseen`` do not show it, and the one of a difference where the t test does not.
+        Whether to leave out those of these tests that cannot change the verdict, where the t tests or ``p_unseen`` do
+        not show equivalence.
     """
     if not (bound > 0.0 and math.isfinite(bound)):
         raise AnalysisError(f"a bound of equivalence of {bound} means nothing; give one above 0 in points of the scale")
@@ -230,8 +212,6 @@ def _compared(
             if found.equal or not verdict_only:
                 p_bootstrap = float(p_within(kept[None], bound, seed, resamples_for(alpha))[0])
                 found = replace(found, **_by_signs(kept, bound, seed), p_bootstrap=p_bootstrap)
-            if (found.p_different or 0.0) <= alpha or not verdict_only:
-                found = replace(found, p_different_ranks=_ranks(kept, "two-sided"))
     else:
         by_signs = _by_signs(kept, bound, seed)
         found = replace(
@@ -239,14 +219,14 @@ def _compared(
             **by_signs,
             p=max(by_signs.values()),
             method=f"signs and signed ranks, bound ±{bound:g} points: all differences are equal",
-            p_different_ranks=_ranks(kept, "two-sided"),
             p_unseen=p_unseen(found.n, equal=True),
         )
     asked = (found.p_permutation, found.p_ranks, found.p_bootstrap)
-    if found.p_ranks is not None and found.t is not None:
+    if found.p_ranks is not None and found.statistic is not None:
         by_t = found.p is not None and found.p <= alpha
         found = replace(found, checks_agree=all((p is None or p <= alpha) == by_t for p in asked))
-    found = found.judged(found.p_difference, 1)
+    verdict: Verdict = "out of reach" if p_unseen(found.n, equal=True) > alpha else "inconclusive"
+    found = replace(found, verdict="equivalent" if found.equal else verdict)
     return replace(found, note=_note(found))
 
 
@@ -285,10 +265,8 @@ def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
         "p": max(p_lower, p_upper),
         "method": f"t({df}), bound ±{bound:g} points",
         "interval": Interval(mean - reach, mean + reach, 1 - 2 * alpha, "t"),
-        "t": mean / error,
         "t_lower": lower,
         "t_upper": upper,
-        "p_different": 2 * float(stdtr(df, -abs(mean) / error)),
         "p_lower": p_lower,
         "p_upper": p_upper,
         "p_unseen": p_unseen(len(kept), equal=False),
@@ -303,17 +281,13 @@ def _by_signs(kept: Array, bound: float, seed: int) -> dict[str, Any]:
 
 
 def _note(found: Equivalence) -> str:
-    p = found.p_difference
-    differs = p is not None and p <= found.alpha
     if found.verdict == "equivalent":
-        return "different from 0, but within the bound" if differs else ""
-    if found.verdict == "different":
-        return "the difference is shown, and it is not shown to stay within the bound"
+        return ""
     if max(p for p in (found.p, found.p_permutation, found.p_ranks, found.p_bootstrap, 0.0) if p is not None) <= (
         found.alpha
     ):
         return f"too few participants to call it equivalent: {fewest(found.alpha)} are needed"
-    return "neither a difference nor equivalence is shown"
+    return "equivalence is not shown"
 
 
 def _smallest(n: int) -> float:
@@ -321,10 +295,10 @@ def _smallest(n: int) -> float:
     return least if n <= ALL_SIGNS_UP_TO else max(least, 1 / (1 + DRAWS))
 
 
-def _ranks(shifted: Array, alternative: Alternative = "greater") -> float:
-    """Return the p of signed ranks that ``shifted`` lies above 0 (or elsewhere); 1 if all of it is 0."""
+def _ranks(shifted: Array) -> float:
+    """Return the p of signed ranks that ``shifted`` lies above 0; 1 if all of it is 0."""
     ranks, signs = signed(shifted)
-    p, _, _ = signed_p(ranks, int(ranks[signs > 0].sum()), alternative)
+    p, _, _ = signed_p(ranks, int(ranks[signs > 0].sum()), "greater")
     return 1.0 if p is None else p
 
 

@@ -6,17 +6,12 @@ correlation with the order of the trials. Between-person variance by Paule & Man
 
 The detection threshold is that of the answers of all participants together: the posterior median, with the rates of
 guesses and lapses free. Its interval ends where its density has fallen as a normal one does, scaled by how far
-participants differ. A number is given only where noticing rises with the level and the levels presented hold it.
-
-The width and the place of a curve mean nothing where it is flat, so that the ratio of likelihoods has no chi-square
-distribution. Here each participant's answers change places among the levels presented to him or her, which holds the
-error rate however participants differ from each other.
+participants differ. A number is given only where the levels presented hold it.
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -25,13 +20,11 @@ from scipy.optimize import brentq
 from scipy.special import xlogy
 from scipy.stats import t as student
 
-from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked, draws_for
+from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked
 from study_app.psychophysics.grid import Grid, Posterior, Values, evenly, fit, geometric, tables
 
 NOTICED_FROM: Final = 5.0
 """Agreement from "somewhat agree" on counts as having noticed."""
-
-NO_RISE: Final = "noticing is not shown to rise with the level (likelihood ratio against a flat line, p = {p:.3f})"
 
 SURE: Final = 0.95
 Z: Final = 1.959964
@@ -48,28 +41,17 @@ WIDTHS: Final = (1 / 40, 3.0, 12)
 WIDTH_PRIOR: Final = (0.3, 2.5)
 """Median [spans] and factor."""
 
-RISE_DRAWS: Final = 999
-CELLS: Final = 2_000_000
-"""So many answers are rearranged, and fewer times than ``RISE_DRAWS`` where there are many participants."""
-
-AT_ONCE: Final = 20_000
-"""So many rearrangements are compared with all curves together: more take more memory."""
-
-RISE_PLACES: Final = 11
-RISE_WIDTHS: Final = (0.05, 0.2, 0.5, 1.2, 3.0)
-RISE_RATES: Final[Values] = (0.0, 0.1, 0.35)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Threshold(Outcome):
     """The detection threshold (``effect``, in ms): half-way between ``guess`` and 1 − ``lapse``.
 
-    ``statistic`` is the deviance; ``p`` is that of a rise against a flat line, by the likelihood ratio. ``yes`` of
-    ``asked`` answers noticed something at each of ``levels``, where the curve expects ``expected``. ``effect`` and all
-    that belongs to the curve are None where no threshold can be stated; ``note`` then says why in one sentence, and
-    otherwise what must be said with the number. ``lower`` and ``upper`` are the ends of the interval that exist: where
-    one is None there is no interval, and ``no_interval`` says which end is open. ``dispersion`` is how many times more
-    than independent answers the participants' answers vary (1: no more, or not known).
+    ``statistic`` is the deviance. ``yes`` of ``asked`` answers noticed something at each of ``levels``, where the curve
+    expects ``expected``. ``effect`` and all that belongs to the curve are None where no threshold can be stated;
+    ``note`` then says why in one sentence, and otherwise what must be said with the number. ``lower`` and ``upper`` are
+    the ends of the interval that exist: where one is None there is no interval, and ``no_interval`` says which end is
+    open. ``dispersion`` is how many times more than independent answers the participants' answers vary (1: no more, or
+    not known).
     """
 
     levels: tuple[float, ...]
@@ -84,7 +66,7 @@ class Threshold(Outcome):
     dispersion: float | None = None
 
 
-def noticed(values: ArrayLike, levels: Sequence[float], *, alpha: float = 0.05, seed: int = 1) -> Threshold:
+def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
     """Return the threshold of raw answers: `NOTICED_FROM` or more means noticed, NaN is missing.
 
     Parameters
@@ -93,10 +75,10 @@ def noticed(values: ArrayLike, levels: Sequence[float], *, alpha: float = 0.05, 
         Answers in points of the scale.
     levels : sequence of float
         What was presented; equal levels are replicates of one.
-    alpha : float
-        No threshold is stated where p of a rise is above it.
-    seed : int
-        Of the rearrangements.
+
+    Notes
+    -----
+    Whether noticing rises with the level at all is asked elsewhere: where it does not, the curve means nothing.
     """
     array = np.asarray(values, float)
     array = checked(array[..., None] if array.ndim == 2 else array, "participants, levels, presentations")
@@ -107,10 +89,7 @@ def noticed(values: ArrayLike, levels: Sequence[float], *, alpha: float = 0.05, 
     yes, asked = (one[used].sum(axis=2) @ same for one in (there & (array >= NOTICED_FROM), there))
     of_yes, of_asked = yes.sum(axis=0), asked.sum(axis=0)
     found: dict[str, Any] = {}
-    p, note = None, _impossible(order, of_yes, of_asked)
-    if not note:
-        p = p_of_rise(yes, asked, order, seed, alpha)
-        note = NO_RISE.format(p=p) if p > alpha else ""
+    note = _impossible(order, of_yes, of_asked)
     if not note:
         curve, dispersion, (lower, upper) = _pooled(order, yes, asked)
         note = _outside(order, curve.threshold, lower, upper)
@@ -139,7 +118,6 @@ def noticed(values: ArrayLike, levels: Sequence[float], *, alpha: float = 0.05, 
         n=int(used.sum()),
         dropped=int((~used).sum()),
         statistic_name="deviance",
-        p=p,
         method="posterior median, logistic function of level",
         effect_name="detection threshold",
         note=note,
@@ -246,43 +224,6 @@ def _remarks(levels: Array, lower: float | None, upper: float | None, people: in
 def _open(lower: float | None, upper: float | None) -> str:
     side = "on both sides" if lower is None and upper is None else "below" if lower is None else "above"
     return f"no interval: the answers leave it open {side}"
-
-
-def p_of_rise(yes: Array, asked: Array, levels: Array, seed: int, alpha: float) -> float:
-    """Return p that the share of ``yes`` of ``asked`` answers (participants, levels) rises with the level, ascending.
-
-    One row where answers are independent. So many rearrangements are drawn that their number does not decide whether p
-    reaches ``alpha``.
-    """
-    slope, no = _curves(tuple(levels.tolist()))
-    flat = no @ asked.sum(axis=0)
-    found = float((slope @ yes.sum(axis=0) + flat).max())
-    drawn = _rearranged(yes, asked, seed, alpha)
-    different, times = np.unique(drawn, axis=0, return_counts=True)
-    parts = (different[first : first + AT_ONCE] for first in range(0, len(different), AT_ONCE))
-    highest = np.concatenate([(part @ slope.T + flat).max(axis=1) for part in parts])
-    reached = highest >= found - 1e-9 * abs(found)
-    return (1 + int(times[reached].sum())) / (1 + len(drawn))
-
-
-@lru_cache(maxsize=8)
-def _curves(levels: Values) -> tuple[Array, Array]:
-    """Return the log odds of yes, and the log of the share of no, of all curves (curves, levels)."""
-    widths = tuple(width * (levels[-1] - levels[0]) for width in RISE_WIDTHS)
-    places = evenly(levels[0], levels[-1], RISE_PLACES)
-    psi = Grid("logistic", places, widths, None, RISE_RATES, RISE_RATES, RISE_RATES).success(levels)
-    no = np.log1p(-psi).reshape(len(levels), -1).T
-    return np.log(psi).reshape(len(levels), -1).T - no, no
-
-
-def _rearranged(yes: Array, asked: Array, seed: int, alpha: float) -> Array:
-    """Return the yes counts (draws, levels) after each participant's answers changed places."""
-    rng = np.random.default_rng(seed)
-    draws = draws_for(alpha, min(RISE_DRAWS, CELLS // max(1, int(asked.sum()))))
-    drawn = np.zeros((draws, asked.shape[1]))
-    for said, presented in zip(yes.astype(np.int64), asked.astype(np.int64), strict=True):
-        drawn += rng.multivariate_hypergeometric(presented, int(said.sum()), size=draws, method="marginals")
-    return drawn
 
 
 SETS: Final = 999

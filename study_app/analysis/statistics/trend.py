@@ -1,14 +1,16 @@
-"""Page's test of a trend over ordered settings, and the lowest delay at which a trend can be shown.
+"""The trend of answers over ordered settings, in the population, and the lowest delay at which one can be shown.
 
-Page (1963), J. Am. Stat. Assoc. 58, 216–230. L is a sum over participants of one number each, so its exact
-distribution, with the ties as they are, is a convolution of the participants' own.
+Each participant has one number, the rank correlation of his or her answers with the order of the settings. The p that
+decides changes the signs of these numbers: participants may have trends of their own around zero. Page (1963), J. Am.
+Stat. Assoc. 58, 216–230, permutes the answers of each participant instead: his null hypothesis is that no participant
+has any trend, so that his p is small, too, where people differ but have no trend in common.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Final, Literal, TypeAlias
@@ -28,36 +30,37 @@ from study_app.analysis.statistics.outcome import (
     doubled_ranks,
     total,
 )
+from study_app.analysis.statistics.rank_tests import Alternative, signed_p
 from study_app.errors import AnalysisError
 from study_app.number_text import counted
 
 Direction: TypeAlias = Literal["increasing", "decreasing"]
 
 EXACT_UP_TO: Final = 200
-"""Up to so many participants p is exact; beyond that normal, corrected for ties."""
+"""Up to so many participants Page's p is exact; beyond that normal, corrected for ties."""
 
 MOST: Final = 12
 """Exact distributions over more settings take too long."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Page(Outcome):
-    """Page's L, one-sided in ``direction``; ``effect`` is the mean rank correlation of answers with the order.
+class Trend(Outcome):
+    """Page's L and the p of a trend in the population; ``effect`` is the mean rank correlation with the order.
 
-    ``p`` takes the ties as they are; ``p_untied`` is that of the printed tables and of R, which take every rank to be
-    different: the larger with ties, as a rule. A participant who answered alike everywhere has correlation 0.
+    One-sided in ``direction``, two-sided where it is None. ``p_page`` is Page's exact p of the answers with their ties,
+    one-sided (None without a direction). A participant who answered alike everywhere has correlation 0.
     """
 
-    direction: Direction
-    p_untied: float | None
+    direction: Direction | None
+    p_page: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step down: Page's test of all delays up to ``longest_ms``."""
+    """One step down: the test of all delays up to ``longest_ms``."""
 
     longest_ms: float
-    page: Page
+    trend: Trend
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,47 +77,51 @@ class StepDown:
     note: str
 
 
-def page(values: ArrayLike, direction: Direction = "increasing", *, seed: int | None = 1) -> Page:
+def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed: int | None = 1) -> Trend:
     """Test whether answers (participants, settings) follow the order of the settings, in the direction stated before.
 
-    NaN where an answer is missing: such participants are dropped. ``seed`` is of the bootstrap interval of the effect,
-    from ten participants; None: no interval.
+    NaN where an answer is missing: such participants are dropped. ``direction`` None: either way. ``seed`` is of the
+    bootstrap interval of the effect, from ten participants; None: no interval.
     """
     rows, dropped = complete(values, at_least=2, why=" for a trend")
-    ranks = doubled_ranks(rows if direction == "increasing" else -rows)
+    ranks = doubled_ranks(rows if direction != "decreasing" else -rows)
     n, k = ranks.shape
     scores = ranks @ np.arange(1, k + 1)
-    varies = bool(n) and bool((ranks != k + 1).any())
-    middle = k * (k + 1) ** 2 / 2
+    middle = k * (k + 1) ** 2 // 2
     correlations = (scores - middle) / (k * (k * k - 1) / 6)
-    p, smallest, method = _p(ranks, int(scores.sum())) if varies else (None, None, "none")
-    note = "" if varies else "no participant answered under all settings" if n == 0 else NO_VARIATION
-    interval, reason = None, note
-    if not note:
-        alike = "no interval: all participants have the same correlation"
-        interval, reason = bootstrap(n, seed, lambda people: correlations[people].mean(axis=1), alike)
-    return Page(
-        test="Page's trend",
+    found = Trend(
+        test="trend over participants",
         n=n,
         dropped=dropped,
         statistic_name="L",
-        statistic=float(scores.sum()) / 2 if varies else None,
-        p=p,
-        smallest_p=smallest,
-        method=f"{method}, one-sided ({direction})",
         effect_name="mean rank correlation with the order",
-        effect=float(correlations.mean()) if varies else None,
+        direction=direction,
+    )
+    if not n or (ranks == k + 1).all():
+        note = "no participant answered under all settings" if n == 0 else NO_VARIATION
+        return replace(found, no_interval=note, note=note)
+    side: Alternative = "two-sided" if direction is None else "greater"
+    away = scores - middle
+    p, smallest, method = signed_p(np.sort(np.abs(away[away != 0])), int(away[away > 0].sum()), side)
+    p_page = None if direction is None else _page(ranks, int(scores.sum()))
+    alike = "no interval: all participants have the same correlation"
+    interval, reason = bootstrap(n, seed, lambda people: correlations[people].mean(axis=1), alike)
+    return replace(
+        found,
+        statistic=float(scores.sum()) / 2,
+        p=1.0 if p is None else p,
+        smallest_p=smallest,
+        method=f"{method}, {'two-sided' if direction is None else f'one-sided ({direction})'}",
+        effect=float(correlations.mean()),
         interval=interval,
         no_interval=reason,
-        note=note,
-        direction=direction,
-        # Without ties L is whole: half a rank is cut off, as in R and scipy.
-        p_untied=_p(np.tile(2 * np.arange(1, k + 1), (n, 1)), int(scores.sum()) // 2 * 2)[0] if varies else None,
+        note="" if p_page is None else f"Page's p, of no participant having a trend: {p_page:.4g}",
+        p_page=p_page,
     )
 
 
 def step_down(
-    values: ArrayLike, delays_ms: Sequence[float], direction: Direction = "increasing", *, alpha: float = 0.05
+    values: ArrayLike, delays_ms: Sequence[float], direction: Direction | None = "increasing", *, alpha: float = 0.05
 ) -> StepDown:
     """Drop the longest delay as long as a trend is shown over those that are left.
 
@@ -131,7 +138,7 @@ def step_down(
     steps: list[Step] = []
     lowest: float | None = None
     for last in range(len(delays_ms), 1, -1):
-        result = page(np.vstack([rows[:, :last], np.full((dropped, last), np.nan)]), direction, seed=None)
+        result = trend(np.vstack([rows[:, :last], np.full((dropped, last), np.nan)]), direction, seed=None)
         steps.append(Step(float(delays_ms[last - 1]), result))
         if result.p is None or result.p > alpha:
             break
@@ -142,24 +149,23 @@ def step_down(
 def _note(first: Step, lowest: float | None) -> str:
     if lowest is None:
         return (
-            f"no trend was shown up to {first.longest_ms:g} ms with {counted(first.page.n, 'participant')}; "
+            f"no trend was shown up to {first.longest_ms:g} ms with {counted(first.trend.n, 'participant')}; "
             "that is not evidence that there is none"
         )
     return (
         f"{lowest:g} ms is an upper bound: the lowest delay at which the answers of "
-        f"{counted(first.page.n, 'participant')} show a trend; shorter delays may be noticed too"
+        f"{counted(first.trend.n, 'participant')} show a trend; shorter delays may be noticed too"
     )
 
 
-def _p(ranks: Whole, found: int) -> tuple[float, float | None, str]:
-    """Return P(L ≥ found) for (doubled) ranks (n, k), the smallest it could have been, and the method."""
+def _page(ranks: Whole, found: int) -> float:
+    """Return P(L ≥ found) for (doubled) ranks (n, k), every order of every participant being equally likely."""
     n, k = ranks.shape
     if n > EXACT_UP_TO or k > MOST:
         mean = n * k * (k + 1) ** 2 / 2
         spread = ((ranks - (k + 1.0)) ** 2).sum() / (k - 1) * k * (k * k - 1) / 12
-        return float(norm.sf((found - mean) / math.sqrt(spread))), None, "normal approximation, corrected for ties"
-    sums = _sums(tuple(sorted(tuple(sorted(row)) for row in ranks.tolist())))
-    return sums.at_least(found), sums.highest, "exact permutation"
+        return float(norm.sf((found - mean) / math.sqrt(spread)))
+    return _sums(tuple(sorted(tuple(sorted(row)) for row in ranks.tolist()))).at_least(found)
 
 
 @lru_cache(maxsize=256)

@@ -6,7 +6,7 @@ import pytest
 from study_app.analysis.planning import simulated_studies
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired
-from study_app.analysis.statistics.trend import page
+from study_app.analysis.statistics.trend import trend
 
 pytestmark = pytest.mark.slow
 
@@ -36,10 +36,13 @@ def test_friedman_is_the_reports(n: int, k: int) -> None:
 
 
 @pytest.mark.parametrize("n", [5, 14])
-def test_page_is_the_reports(n: int) -> None:
+def test_the_trend_is_the_reports(n: int) -> None:
     answers = answered(3, (20, n, 7, 2), rise=0.15)
-    ps = simulated_studies.trend(simulated_studies.ranks(answers), rng())
-    expected = [[page(study[:, :, item], seed=None).p for item in range(2)] for study in answers]
+    ps = simulated_studies.trend(simulated_studies.ranks(answers), np.array([False, True]), rng())
+    expected = [
+        [trend(study[:, :, item], direction, seed=None).p for item, direction in enumerate(("increasing", None))]
+        for study in answers
+    ]
     assert np.abs(ps - np.array(expected)).max() < CLOSE
 
 
@@ -55,7 +58,7 @@ def test_where_everybody_answers_alike_nothing_is_found() -> None:
     ps, of_all = simulated_studies.friedman(simulated_studies.ranks(same), rng())
     assert (ps == 1).all()
     assert (of_all == 1).all()
-    assert (simulated_studies.trend(simulated_studies.ranks(same), rng()) == 1).all()
+    assert (simulated_studies.trend(simulated_studies.ranks(same), np.array([False, True]), rng()) == 1).all()
     assert (simulated_studies.signed(same[:, :, :2], rng()) == 1).all()
     assert simulated_studies.equivalent(same[:, :, 0] - same[:, :, 1], 1.0, 0.05, rng()).all()  # eleven zeros
     assert not simulated_studies.equivalent((same[:, :, 0] - same[:, :, 1])[:, :10], 1.0, 0.05, rng()).any()

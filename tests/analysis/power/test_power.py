@@ -195,7 +195,7 @@ def test_a_study_of_two_liquids_without_decisions_can_be_study_plantoo(tmp_path:
     assert study_plan.unknown == ("smooth", "warm")
     studies, counts = swept(study_plan)
     found = powers(study_plan, SIZES, studies, studies, 1, counts)
-    assert not [one for one in found.curves if one.over == "all statements at once"]
+    assert [one.question for one in found.curves if one.over == "all statements at once"] == ["settings differ"]
     assert "knows nothing of smooth, warm" in power_markdown(found)
     assert write_power(found, tmp_path / "power")
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.analysis.data.blocks import Decided
-from study_app.analysis.evaluate import evaluate
+from study_app.analysis.data.blocks import Block, Decided, Item
+from study_app.analysis.evaluate import evaluate, evaluate_block
 from study_app.analysis.findings.delays import (
     ContrastsWithControl,
     DetectionThreshold,
@@ -15,9 +15,9 @@ from study_app.analysis.findings.delays import (
     common_ms,
     equivalent_up_to,
 )
-from study_app.analysis.findings.finding import Answer
+from study_app.analysis.findings.finding import Answer, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, given, recognised
-from study_app.analysis.findings.statement_tests import OverAll, Pairs
+from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, gated
 from study_app.analysis.report.sections import CLAIMS, STUDIES, answers, empty_studies, first_page
 from study_app.analysis.results import Results
 from study_app.analysis.statistics.recognition import recognition
@@ -208,23 +208,22 @@ def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int
 
 
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
-    results = rising(3)
-    assert OverAll.of(results.blocks[0]) is not None
-
-    def with_p(*ps: float) -> list[bool]:
-        blocks = tuple(
-            OverAll.add_to(results.blocks[0], replace(OverAll.of(results.blocks[0]), p=p))  # type: ignore[type-var]
-            for p in ps
-        )
-        return [one.claims for one in answers(replace(results, blocks=blocks)) if one.question == "noticed from"]
-
-    assert with_p(0.05) == [True]
-    assert with_p(0.051) == [False]
-    assert with_p(0.03, 0.9) == [False, False]
-    assert with_p(0.02, 0.04) == [True, True]
-    none = replace(results, blocks=(OverAll.add_to(results.blocks[0], None),))
-    assert named(none, "noticed from").verdict == "not shown"
-    assert named(none, "noticed from").text.startswith("Single tests find something, but the test over all statements")
+    """One statement rises a little: alone it is significant; the others, which scatter, hide it."""
+    rng = np.random.default_rng(4)
+    items = tuple(Item(name, name, name) for name in (*ITEMS, *"abcdefgh"))
+    block = Block("b", "Block", "delays", delays(DELAYS), items, tuple("1234567"), None)
+    single = {item.id: rng.integers(1, 8, (14, 4, 1)).astype(float) for item in items}
+    single[ITEMS[0]] = np.clip(np.arange(1, 5)[:, None] + rng.integers(0, 3, (14, 4, 1)), 1, 7).astype(float)
+    decided = replace(DECIDED, primary=ITEMS[:1])
+    asked = of_tables(block, decided, tuple(map(str, range(14))), single)
+    (one,) = gated([asked])
+    two = gated([replace(asked, values={ITEMS[1]: asked.values[ITEMS[1]]}), asked])[1]
+    assert one.over_all is not None
+    assert one.gate == one.over_all.p
+    assert two.gate > one.gate  # Holm, over both blocks
+    for gate, verdict in ((0.05, "shown"), (0.051, "not shown")):
+        (tested,) = (one for one in DelayTrend.of(evaluate_block(None, replace(asked, gate=gate))) if one.primary)
+        assert (tested.verdict, tested.p_adjusted) == (verdict, gate)
 
 
 def test_a_liquid_is_recognised_where_its_interval_lies_above_the_share_of_its_name() -> None:

@@ -103,8 +103,6 @@ def test_r_computes_the_same_numbers(of_twelve: Path) -> None:
     for one in delays["against"]:
         what = f"delays {one['item']} ({one['delay_ms']:g} ms − 0 ms)"
         assert computed[f"{what}, a delay is equivalent: equivalence p"] == pytest.approx(one["found"]["p"], rel=1e-5)
-        p = max(one["found"]["p_different"], one["found"]["p_different_ranks"])
-        assert computed[f"{what}, a delay differs: difference p"] == pytest.approx(p, rel=1e-5)
     pairs = [name for name in computed if name.endswith("two settings differ: p")]
     assert len(pairs) == len(liquids["pairs"]) > 0
 

@@ -12,7 +12,7 @@ from study_app.analysis.statistics.outcome import false_discovery, holm
 from study_app.analysis.statistics.rank_tests import friedman, paired
 from study_app.analysis.statistics.recognition import kappa
 from study_app.analysis.statistics.thresholds import group_mean
-from study_app.analysis.statistics.trend import page
+from study_app.analysis.statistics.trend import trend
 
 pytestmark = pytest.mark.slow
 
@@ -71,14 +71,20 @@ def test_statsmodels_models() -> None:
     assert [one.error for one in ours.coefficients] == pytest.approx(theirs.bse[:2], rel=1e-4)
 
 
-def test_scipy_page_is_our_untied_p() -> None:
-    from scipy.stats import page_trend_test
+def test_the_trend_is_scipys() -> None:
+    from scipy.stats import page_trend_test, permutation_test, spearmanr
 
     values = answers(8, 5, seed=6)
-    theirs, ours = page_trend_test(values, method="exact"), page(values)
-    assert (ours.statistic, ours.p_untied) == pytest.approx((theirs.statistic, theirs.pvalue))
-    assert ours.p is not None
-    assert ours.p < theirs.pvalue  # ties as they are, not the larger p of ranks that all differ
+    theirs, ours = page_trend_test(values, method="exact"), trend(values)
+    assert ours.statistic == pytest.approx(theirs.statistic)
+    assert ours.p_page is not None
+    assert ours.p_page < theirs.pvalue  # ties as they are, not the larger p of ranks that all differ
+    untied = np.argsort(np.random.default_rng(1).random((8, 5)), axis=1)
+    assert trend(untied).p_page == pytest.approx(page_trend_test(untied, method="exact").pvalue)
+    slopes = untied @ np.arange(5.0) - 10 * 2
+    flips = permutation_test((slopes,), np.sum, permutation_type="samples", alternative="greater", n_resamples=np.inf)
+    assert trend(untied).p == pytest.approx(flips.pvalue)
+    assert trend(untied).effect == pytest.approx(np.mean([spearmanr(row, range(5)).statistic for row in untied]))
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.02, 0.1])

@@ -17,7 +17,7 @@ from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired
 from study_app.analysis.statistics.recognition import UNANSWERED, UNDECIDED, Recognition, named, recognition
 from study_app.analysis.statistics.thresholds import noticed
-from study_app.analysis.statistics.trend import page, step_down
+from study_app.analysis.statistics.trend import step_down, trend
 from study_app.errors import AnalysisError
 
 RNG = np.random.default_rng(11)
@@ -41,8 +41,8 @@ TESTS: dict[str, Callable[[np.ndarray], Outcome]] = {
     "friedman": friedman,
     "global": lambda values: global_permutation(values[None]),
     "paired": lambda values: paired(values[:, 0], values[:, 2]),
-    "page": page,
-    "step down": lambda values: step_down(values, (0, 100, 200)).steps[0].page,
+    "trend": trend,
+    "step down": lambda values: step_down(values, (0, 100, 200)).steps[0].trend,
     "tost": lambda values: tost(values[:, 2] - values[:, 0], 1.0),
     "threshold": lambda values: noticed(values, (0, 100, 200)),
     "recognition": lambda values: recognition(named(np.stack([values, values[:, ::-1]], axis=1)), [0, 2], 3),
@@ -79,7 +79,7 @@ def test_every_result_holds_what_it_promises(test: str, table: str) -> None:
     assert "no effect" not in said
 
 
-@pytest.mark.parametrize("test", ["friedman", "global", "page", "paired", "tost"])
+@pytest.mark.parametrize("test", ["friedman", "global", "trend", "paired", "tost"])
 def test_the_order_of_people_does_not_matter(test: str) -> None:
     there, back = TESTS[test](ANSWERS[:7]), TESTS[test](ANSWERS[:7][::-1])
     assert (there.statistic, there.effect) == pytest.approx((back.statistic, back.effect))

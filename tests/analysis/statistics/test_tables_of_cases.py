@@ -74,9 +74,9 @@ def named_(number: int, count: int) -> dict[str, Any]:
 def of_settings() -> Iterator[str]:
     yield from results(rank_tests.friedman, SAMPLES)
     yield from results(rank_tests.friedman, {"long": answers(60, 5, 1, 0.2)}, draws=500, seed=2)
-    yield from results(trend.page, SAMPLES)
-    yield from results(trend.page, SAMPLES, "decreasing")
-    yield from results(trend.page, {"long": answers(210, 3, 2, 0.1)}, seed=None)
+    yield from results(trend.trend, SAMPLES)
+    yield from results(trend.trend, SAMPLES, "decreasing")
+    yield from results(trend.trend, {"long": answers(210, 3, 2, 0.1)}, seed=None)
     wide = {name: (one, LEVELS[: one.shape[1]]) for name, one in SAMPLES.items() if one.shape[1] <= 4}
     yield from results(trend.step_down, wide)
     yield from results(trend.step_down, wide, "decreasing", alpha=0.2)

@@ -1,7 +1,7 @@
 # Computes the main numbers of the report again, in base R (4.0 or newer, no packages), and says where they differ:
 #   Rscript report.R [TABLES [TESTS]]   the folders of the exported tables and of tests.csv; default: this one
 # Exit code 1 if any number differs, or if there is nothing to compare. Exact p of trends and of pairs come from all
-# rearrangements; of Friedman's test only an approximate p is compared, and no p that was drawn at random.
+# changes of signs; of Friedman's test only an approximate p is compared, and no p that was drawn at random.
 
 folders <- c(commandArgs(trailingOnly = TRUE), ".", ".")
 folders <- if (length(folders) == 3) folders[c(1, 1)] else folders[1:2]
@@ -35,10 +35,6 @@ add <- function(chances, values, each = rep(1 / length(values), length(values)))
   sums
 }
 at_least <- function(chances, value) sum(chances[(value + 1):length(chances)])
-orders <- function(k) if (k == 1) matrix(1) else {
-  less <- orders(k - 1)
-  do.call(rbind, lapply(seq_len(k), function(place) cbind(place, ifelse(less >= place, less + 1, less))))
-}
 
 # One row a participant, one column a setting ("L1 L2", or "D1+D4 D2" where two codes present one delay); a
 # participant's repeated answers count by their median. Of sessions: one column a session, medians over the settings
@@ -63,18 +59,16 @@ friedman <- function(what, table, row) {
   same(paste(what, "Friedman chi2"), row$statistic, unname(found$statistic))
   if (startsWith(row$method, "chi-square")) same(paste(what, "p by chi2"), row$p, found$p.value)
 }
-page <- function(what, table, row) {
+trend <- function(what, table, row) {
   x <- whole(table); if (grepl("decreasing", row$method)) x <- -x
-  ranks <- t(apply(x, 1, rank)); n <- nrow(x); k <- ncol(x)
-  found <- sum(ranks %*% seq_len(k))
-  same(paste(what, "Page's L"), row$statistic, found)
-  if (!startsWith(row$method, "exact") || k > 8) return(invisible())
-  every <- orders(k); chances <- 1
-  for (person in seq_len(n)) {
-    counts <- table(matrix(2 * ranks[person, ][every], nrow(every)) %*% seq_len(k))
-    chances <- add(chances, as.numeric(names(counts)), counts / nrow(every))
-  }
-  same(paste(what, "exact p"), row$p, at_least(chances, 2 * found))
+  k <- ncol(x); scores <- 2 * t(apply(x, 1, rank)) %*% seq_len(k)
+  same(paste(what, "Page's L"), row$statistic, sum(scores) / 2)
+  if (!startsWith(row$method, "exact")) return(invisible())
+  away <- scores - k * (k + 1)^2 / 2; chances <- 1
+  for (one in abs(away)[away != 0]) chances <- add(chances, c(0, one))
+  up <- sum(away[away > 0]); down <- -sum(away[away < 0])
+  both <- grepl("two-sided", row$method)
+  same(paste(what, "exact p"), row$p, if (both) min(1, 2 * at_least(chances, max(up, down))) else at_least(chances, up))
 }
 signed_ranks_p <- function(d) {
   d <- d[d != 0]; chances <- 1
@@ -96,13 +90,6 @@ equivalent <- function(what, d, row) {
   same(paste(what, "interval, low"), row$low, limits[1])
   same(paste(what, "interval, high"), row$high, limits[2])
 }
-different <- function(what, d, row) {
-  if (is.na(row$statistic)) return(invisible())  # all differences are equal
-  found <- t.test(d)
-  same(paste(what, "t"), row$statistic, unname(found$statistic))
-  ranks <- if (grepl("signed ranks", row$method)) signed_ranks_p(d) else 0
-  same(paste(what, "difference p"), row$p, max(found$p.value, ranks))
-}
 for (place in seq_len(nrow(tests))) {
   row <- tests[place, ]
   if (is.na(row$item) || is.na(row$statistic) && is.na(row$p) || grepl("stepping down", row$question)) next
@@ -112,10 +99,9 @@ for (place in seq_len(nrow(tests))) {
   d <- if (ncol(x) == 2) x[, 1] - x[, 2]; d <- d[!is.na(d)]
   switch(row$test,
     "Friedman" = if (nrow(whole(x)) > 1) friedman(what, x, row),
-    "Page's trend" = page(what, x, row),
+    "trend over participants" = trend(what, x, row),
     "Wilcoxon signed ranks" = pair(what, d, row),
-    "equivalence, two one-sided t tests" = equivalent(what, d, row),
-    "difference, paired" = different(what, d, row))
+    "equivalence, two one-sided t tests" = equivalent(what, d, row))
 }
 numbers <- sum(!is.na(tests[c("statistic", "p", "low", "high")]))
 

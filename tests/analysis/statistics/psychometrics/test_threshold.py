@@ -58,37 +58,6 @@ def test_the_interval_covers_the_threshold_of_people_who_differ(n: int, spread_m
     assert covered >= binom.ppf(0.05, len(printed), 0.93)
 
 
-@pytest.mark.slow
-def test_a_threshold_needs_a_rise_at_the_alpha_that_was_decided() -> None:
-    answers = np.array([[2, 6, 6, 6], [2, 2, 6, 6], [2, 2, 6, 6], [2, 6, 6, 6]])  # p is 1 in 4 · 6 · 6 · 4
-    usual = noticed(answers, (0, 50, 100, 150))
-    assert usual.p is not None
-    assert 0.001 < usual.p <= 0.05
-    assert usual.effect is not None
-    strict = noticed(answers, (0, 50, 100, 150), alpha=0.001)
-    assert strict.effect is None
-    assert strict.note.startswith("noticing is not shown to rise with the level")
-    clear = noticed(np.where(np.arange(7) > 3, 6.0, 2.0) * np.ones((12, 1)), STUDY, alpha=0.001)
-    assert clear.effect is not None
-    assert clear.p is not None
-    assert clear.p <= 0.001 / 20
-
-
-@pytest.mark.parametrize("n", [5, 12])
-def test_where_nothing_is_noticed_a_threshold_is_seldom_stated(n: int) -> None:
-    rng = np.random.default_rng(n)
-    stated = flat = 0
-    for _ in range(25):
-        answers = np.rint(3.5 + rng.normal(0, 1, (n, 1)) + rng.normal(0, 0.8, (n, 7)))
-        found = noticed(answers, STUDY)
-        stated += found.effect is not None
-        flat += found.note.startswith("noticing is not shown to rise with the level")
-        assert found.effect is not None or found.note
-        assert found.effect is None or (found.p is not None and found.p <= 0.05)
-    assert flat >= 15
-    assert stated <= binom.ppf(0.999, 25, 0.05)
-
-
 def test_equal_levels_are_replicates_of_one() -> None:
     values = people_who_notice(np.random.default_rng(1), 8, 10, 0)
     doubled = noticed(np.hstack([values, values[:, 3:4]]), (*STUDY, 100))
@@ -114,8 +83,7 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
     [
         ([0] * 7, "no participant noticed anything up to 300"),
         ([5] * 7, "everybody noticed"),
-        ([5, 4, 3, 2, 1, 0, 0], "not shown to rise with the level"),
-        ([1, 0, 0, 1, 0, 1, 1], "not shown to rise with the level"),
+        ([5, 4, 3, 2, 1, 0, 0], "the fitted threshold lies outside the levels"),
     ],
 )
 def test_answers_without_a_threshold_are_told(yes: list[int], note: str) -> None:
@@ -134,8 +102,6 @@ def test_people_who_never_agree_are_lapses() -> None:
 def test_a_threshold_that_the_levels_do_not_hold_is_not_stated() -> None:
     above = noticed(pooled([0, 0, 0, 0, 0, 1, 6], 20), DELAYS)
     assert (above.effect, above.width, above.lower, above.expected) == (None, None, None, ())
-    assert above.p is not None
-    assert above.p < 0.05
     assert above.note == "the fitted threshold lies outside the levels that were presented (0 to 300)"
 
 
