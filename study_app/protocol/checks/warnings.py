@@ -13,14 +13,18 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.checks.delayed_force import delay_warnings
 from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.checks.force_limits import PACED, clipped_unpaced, fastest_hz
-from study_app.protocol.model import Follow, Protocol, Reach
+from study_app.protocol.model import Follow, Protocol, Published, Reach
 from study_app.protocol.questionnaires import instrument
+from study_app.protocol.questions import POINTS
 from study_app.protocol.trials.presented_levels import highest_damping
-from study_app.protocol.trials.tracks import design_of, method_of, tracks_of
+from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of, tracks_of
 
 TELLING = 0.39
 """Twice the difference of viscosity that people just tell, 19 % (Jones, Hunter & Lafontaine 1997): what two liquids
 need for reliable discrimination; the thesis' water and honey differ by 40 %."""
+
+NARROW = 1.3
+"""A log-normal prior with a smaller factor decides the width: 95 % of it lie within a factor of 1.7. [choice]"""
 
 
 def warnings(protocol: Protocol, *, simulates: bool = True) -> tuple[str, ...]:
@@ -32,6 +36,7 @@ def warnings(protocol: Protocol, *, simulates: bool = True) -> tuple[str, ...]:
         *liquid_warnings(protocol),
         *level_warnings(protocol, simulates=simulates),
         *delay_warnings(protocol),
+        *_unanswerable(protocol),
         *_incomplete(protocol),
         *_from_memory(protocol),
     )
@@ -174,6 +179,62 @@ def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
         yield (
             f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator takes more than "
             f"{error_percent:g} % of a damper's force: such trials are repeated: {PACED}"
+        )
+
+
+def _unanswerable(protocol: Protocol) -> Iterator[str]:
+    """Yield why the study may not answer its question, whatever participants answer."""
+    decided = protocol.analysis
+    for block in protocol.main_blocks:
+        if block.order == "fixed" and len(block.conditions) > 1:
+            yield (
+                f"blocks.{block.id}.order: all participants meet the {protocol.compared_in(block.id)} in one order: "
+                'their effect cannot be told from practice and fatigue: choose "shuffled", "latin" or "williams"'
+            )
+        yield from _choices(protocol, block)
+    half = (POINTS - 1) / 2
+    if decided is not None and (decided.equivalence_bound or 0.0) > half:
+        yield (
+            f"analysis.equivalence_bound: {decided.equivalence_bound:g} points are more than half the scale "
+            f"({half:g}): almost any answers would be called equivalent"
+        )
+    if protocol.format > 1 and decided is not None and decided.participants is None:
+        yield (
+            "analysis.participants: no number of participants is planned: who looks at results and goes on until "
+            "something shows finds chance"
+        )
+    for number, one in enumerate(() if decided is None else decided.published):
+        yield from _not_bracketed(protocol, number, one)
+
+
+def _choices(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield what is missing in a block of forced choices at levels."""
+    if block.stimulus is None or block.design is None or block.method is None:
+        return
+    design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
+    if block.catch is None and has_correct_answer(design, stimulus):
+        yield (
+            f"blocks.{block.id}.catch: no catch trials: participants who guess cannot be told from those with a high "
+            "threshold"
+        )
+    factor = method_of(protocol, block).assumed(stimulus, design).width_prior[1]
+    if factor < NARROW:
+        yield (
+            f"methods.{block.method}.width_prior: a factor of {factor:g} lets the prior decide how steep the function "
+            f"is, and bias the threshold of everybody else: choose {NARROW:g} or more"
+        )
+
+
+def _not_bracketed(protocol: Protocol, number: int, published: Published) -> Iterator[str]:
+    """Yield a published value that the study's own levels do not hold between them."""
+    block = protocol.blocks[published.block]
+    if published.measure == "exponent" or block.stimulus is None or block.method is None:
+        return
+    levels = method_of(protocol, block).levels_of(stimulus_of(protocol, block))
+    if not min(levels) <= published.value <= max(levels):
+        yield (
+            f"analysis.published.{number}.value: {published.value:g} is outside the levels of block {block.id}, "
+            f"{min(levels):g} to {max(levels):g}: such a threshold could not be measured"
         )
 
 
