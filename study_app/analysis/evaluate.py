@@ -7,6 +7,7 @@ from typing import Final
 
 import pandas as pd
 
+from study_app.analysis.contrasts import contrast_results
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.motion import Performance, performance
 from study_app.analysis.data.questions import question_results, score_results
@@ -88,10 +89,12 @@ def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
 
     blocks = tuple(tested(number, block) for number, block in enumerate(study.blocks))
     levels = failures.value("the answers at each level", lambda: level_results(study), ())
+    asked = failures.value("the answers to statements", answers, ())
     return Results(
         decided=study.decided,
         people=study.people,
         blocks=blocks,
+        contrasts=failures.value("the hypotheses", lambda: contrast_results(study, asked, levels), ()),
         delivered=failures.value("the delays as they were shown", lambda: delivered(study), ()),
         orders=failures.value("the orders as run", lambda: orders(study), {}),
         seed=SEED,

@@ -13,7 +13,7 @@ from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynami
 from study_app.analysis.data.motion import Performance
 from study_app.analysis.statistics.equivalence import UNSEEN, UNSEEN_EQUAL, Equivalence, fewest
 from study_app.analysis.statistics.outcome import Interval, Outcome
-from study_app.protocol.model import Published
+from study_app.protocol.model import Contrast, Published
 from study_app.protocol.orders.balance import Evenness
 
 
@@ -241,12 +241,27 @@ class LevelsResult:
     device: OwnDynamics | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContrastResult(Outcome):
+    """The test of a contrast; ``ratio``: the effect is first ÷ second, otherwise first − second.
+
+    ``equivalent`` says whether the effect is shown to stay within the study's bound; None where it has none.
+    """
+
+    contrast: Contrast
+    ratio: bool
+    p_adjusted: float | None
+    members: int
+    verdict: Verdict | Literal["equivalent"]
+    equivalent: bool | None
+
+
 @dataclass(frozen=True, slots=True)
 class Results:
     """All that was found in a study; ``failures`` are the parts that could not be computed.
 
-    ``questions`` and ``scores`` are the answers to questions other than statements, ``levels`` the blocks of levels;
-    JSON omits them where there are none.
+    ``questions`` and ``scores`` are the answers to questions other than statements, ``levels`` the blocks of levels,
+    ``contrasts`` the study's hypotheses; JSON omits them where there are none.
     """
 
     decided: Decided
@@ -260,6 +275,7 @@ class Results:
     questions: tuple[QuestionResult, ...] = ()
     scores: tuple[ScoreResult, ...] = ()
     levels: tuple[LevelsResult, ...] = ()
+    contrasts: tuple[ContrastResult, ...] = ()
 
 
 _SMALL: Final = "no one two three four five six seven eight nine ten eleven twelve"

@@ -6,7 +6,7 @@ can decide by itself is checked by its class; what needs two tables is in ``chec
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
+from typing import Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
@@ -276,6 +276,58 @@ class Published(Table):
         return f"{self.block}: {self.measure} {self.value:g}{''.join(about)}"
 
 
+OF_LEVELS: Final = ("threshold", "exponent", "d_prime", "pse")
+"""What contrasts compare of blocks of levels."""
+
+
+class Contrast(Table):
+    """A hypothesis: two blocks, conditions or groups differ in a measure; it is tested, planned and reported first."""
+
+    measure: Id = Field(
+        description='"threshold", "exponent", "d_prime" or "pse" of blocks of levels, or the id of a statement.'
+    )
+    blocks: tuple[Id, ...] = Field(
+        min_length=1, max_length=2, description="The two blocks that are compared, or the one of conditions or groups."
+    )
+    conditions: tuple[Id, Id] | None = Field(
+        default=None, description="The two conditions of the block that are compared, within participants."
+    )
+    groups: tuple[Id, Id] | None = Field(default=None, description="The two groups that are compared.")
+    expected: Literal["higher", "lower"] | None = Field(
+        default=None,
+        description="higher: the first is expected to be above the second; lower: below it; left out: either.",
+    )
+    bound: Annotated[float, within(1e-9, 1e9, "no larger difference is published")] | None = Field(
+        default=None,
+        description="Largest difference that would not matter, of thresholds the largest ratio, such as 1.25; left "
+        "out: equivalence is not tested.",
+    )
+
+    @model_validator(mode="after")
+    def _compares_two(self) -> Self:
+        two = [len(self.blocks) == 2, self.conditions is not None, self.groups is not None]
+        if sum(two) != 1:
+            raise invalid("give two blocks, or one block and two conditions, or one block and two groups", "blocks")
+        if self.compared[0] == self.compared[1]:
+            raise invalid(f'compares "{self.compared[0]}" with itself', "blocks")
+        return self
+
+    @property
+    def compared(self) -> tuple[str, str]:
+        """The ids of what is compared: blocks, conditions or groups."""
+        first, second = self.conditions or self.groups or self.blocks
+        return first, second
+
+    def described(self) -> str:
+        """Return it in words."""
+        first, second = self.compared
+        where = "" if len(self.blocks) == 2 else f" in block {self.blocks[0]}"
+        moves = "differs between" if self.expected is None else f"is {self.expected} in"
+        joint = "and" if self.expected is None else "than in"
+        near = "" if self.bound is None else f"; equivalent within {self.bound:g}"
+        return f"{self.measure.replace('_', ' ')} {moves} {first} {joint} {second}{where}{near}"
+
+
 class Analysis(Table):
     """Decisions about the analysis; without this table the report calls all its results exploratory."""
 
@@ -308,6 +360,7 @@ class Analysis(Table):
         default=None, description="Half the 95 % interval of the group's mean that is planned, as a share of the mean."
     )
     published: tuple[Published, ...] = later(default=(), description="Published values to compare with.")
+    contrasts: tuple[Contrast, ...] = later(default=(), description="Hypotheses that are tested, and reported first.")
 
     def described(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield a row in words for each decision; ``named_by`` says which item names each condition."""
@@ -329,8 +382,8 @@ class Analysis(Table):
             yield "Participants", f"{self.participants} planned"
         if self.precision is not None:
             yield "Precision", f"group mean ±{100 * self.precision:g} % (half its 95 % interval)"
-        for one in self.published:
-            yield "Published", one.described()
+        yield from (("Hypothesis", one.described()) for one in self.contrasts)
+        yield from (("Published", one.described()) for one in self.published)
 
 
 T = TypeVar("T")

@@ -47,7 +47,7 @@ def without_conditions(protocol: Protocol) -> dict[str, Any]:
         exclude={
             **dict.fromkeys(("liquids", "conditions", "stimuli", "methods"), True),
             "designs": {"__all__": {"modulus"}},
-            "analysis": {"published"},
+            "analysis": {"published", "contrasts"},
         },
     )
     for name, block in protocol.blocks.items():

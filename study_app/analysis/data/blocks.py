@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase
-from study_app.protocol.model import Protocol, Published
+from study_app.protocol.model import Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import every_step_of
 from study_app.protocol.questionnaires import Score
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
@@ -287,6 +287,11 @@ class LevelBlock:
         if self.method is None:
             return assumed_for(self.stimulus, self.design)
         return self.method.assumed(self.stimulus, self.design)
+
+
+def contrasts_of(key: Key) -> tuple[Contrast, ...]:
+    """Return the contrasts that the opened key holds."""
+    return tuple(Contrast.model_validate(one) for one in key.tables.get("analysis", {}).get("contrasts", ()))
 
 
 def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlock, ...]:

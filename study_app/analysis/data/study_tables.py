@@ -36,6 +36,7 @@ from study_app.analysis.data.blocks import (
     PlacedScore,
     QuestionPlace,
     Setting,
+    contrasts_of,
     read_decided,
     settings_of,
 )
@@ -49,6 +50,7 @@ from study_app.analysis.data.session_files import (
     with_excluded,
 )
 from study_app.errors import AnalysisError, StoreError
+from study_app.protocol.model import Contrast
 from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
@@ -156,8 +158,8 @@ class Study:
     ``answered`` has the rows of all questions as they were recorded, of which ``responses`` are those of statements;
     ``own_dynamics`` are the device's, where receipts record a measurement; ``estimator`` names that of the velocity,
     "device" where the device measured it; None where receipts do not say it. ``withdrawn`` is how many participants
-    withdrew, so that their data were erased. ``sites`` are the names of the sites of a merged study, whose participants
-    are SITE-ID.
+    withdrew, so that their data were erased. ``contrasts`` are the study's hypotheses, once the key is open. ``sites``
+    are the names of the sites of a merged study, whose participants are SITE-ID.
     """
 
     folder: Path
@@ -181,6 +183,7 @@ class Study:
     estimator: str | None = None
     withdrawn: int = 0
     sites: tuple[str, ...] = ()
+    contrasts: tuple[Contrast, ...] = ()
 
     @property
     def people(self) -> tuple[str, ...]:
@@ -396,6 +399,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
         doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
         others=records[0].others,
         decided=read_decided([session.protocol.get("analysis") for session in records]),
+        contrasts=() if key is None else contrasts_of(key),
         protocol=records[0].protocol,
         own_dynamics=mean_dynamics(records),
         estimator=estimators_of(records),
@@ -490,6 +494,12 @@ def _of_statements(table: pd.DataFrame) -> pd.DataFrame:
 
 
 By: TypeAlias = Literal["group", "site"]
+
+
+def group_members(study: Study) -> dict[str, str]:
+    """Return the group of every participant who counts; none without groups, and while the key is sealed."""
+    members = _members(study, "group")
+    return dict(zip(map(str, members["participant"]), map(str, members["group"]), strict=True))
 
 
 def group_counts(study: Study, by: By = "group") -> dict[str, int]:

@@ -89,7 +89,9 @@ FAMILIES: Final[dict[Family, str]] = {"weibull": "Weibull", "normal": "cumulativ
 
 
 def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
-    """Yield what each main block asks; what a test would show is marked as a hypothesis."""
+    """Yield the contrasts, and what each main block asks; what a test would show is marked as a hypothesis."""
+    for contrast in () if protocol.analysis is None else protocol.analysis.contrasts:
+        yield f"Hypothesis: {contrast.described()}."
     for block in protocol.main_blocks:
         if block.design is not None:
             yield from _of_intervals(protocol, block)

@@ -12,6 +12,9 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import nct
+from scipy.stats import t as student
 
 from study_app import __version__
 from study_app.analysis.data.blocks import spoken
@@ -32,6 +35,7 @@ from study_app.protocol.table import text_in
 from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
+POWER: Final = 0.8
 BATCH: Final = 10
 """Studies of one case; which studies these are does not depend on how many are asked for."""
 TRACKS_AT_ONCE: Final = 200
@@ -301,7 +305,46 @@ def threshold_markdown(precisions: Precisions) -> str:
                 spread = f"{found.spread:.0%}" if math.isfinite(found.spread) else "–"
                 cells = (str(trials), str(size), spread, f"±{half:.0%}" if math.isfinite(half) else "–")
                 lines.append(f"| {' | '.join((*cells, *([share] if wanted else [])))} |")
+    lines += _contrasts(precisions)
     return "\n".join(lines) + "\n"
+
+
+def _contrasts(precisions: Precisions) -> Iterator[str]:
+    """Yield for each contrast of two blocks a table of the smallest difference that 80 % of studies show."""
+    if (decided := precisions.protocol.analysis) is None:
+        return
+    for one in decided.contrasts:
+        spreads = [
+            found.spread / math.sqrt(planned.standards if isinstance(planned, ThresholdPlan) else 1)
+            for block in one.blocks
+            for planned in plans(precisions.protocol, ()).get(block, {}).values()
+            if (found := precisions.found.get((block, planned.trials))) is not None
+        ]
+        if len(one.blocks) != 2 or len(spreads) != 2 or not all(map(math.isfinite, spreads)):
+            continue
+        spread = math.hypot(*spreads, math.log(BETWEEN_PEOPLE))
+        yield from ("", f"## Contrast: {one.described()}", "")
+        yield (
+            f"The difference of one participant has a standard deviation of {spread:.0%}: that of both estimates, and "
+            f"of people, whose differences vary by a factor of {BETWEEN_PEOPLE:g}. Half the 95 % interval of the mean, "
+            f"and the smallest difference that {POWER:.0%} of studies show at α = {decided.alpha:g}, "
+            f"{'two-sided' if one.expected is None else 'one-sided'}:"
+        )
+        yield from ("", "| participants | half the 95 % interval | smallest difference |", "|---:|---:|---:|")
+        for n in precisions.sizes:
+            half = float(student.ppf(0.975, n - 1)) * spread / math.sqrt(n)
+            tail = decided.alpha / (2 if one.expected is None else 1)
+            shown = detectable(n, tail) * spread
+            yield f"| {n} | ×/÷ {math.exp(half):.2f} | ×/÷ {math.exp(shown):.2f} |"
+
+
+def detectable(n: int, tail: float) -> float:
+    """Return the smallest mean difference, in standard deviations, that a t test of ``n`` pairs shows with ``POWER``.
+
+    ``tail`` is the probability of each tail that counts as significant.
+    """
+    critical = float(student.isf(tail, n - 1))
+    return float(brentq(lambda size: nct.sf(critical, n - 1, size * math.sqrt(n)) - POWER, 0.0, 30.0))
 
 
 def _assumed(plans_of_block: Mapping[int, Plan]) -> str:

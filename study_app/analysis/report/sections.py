@@ -7,6 +7,7 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from study_app import __version__
+from study_app.analysis.contrasts import answer, question
 from study_app.analysis.data.measures import QUARTILES, number_or_none
 from study_app.analysis.data.motion import (
     OF_REACHES,
@@ -248,18 +249,13 @@ def first_page(results: Results, limits: Sequence[str]) -> Markup:
     asked = {one.key: one.question for one in all_findings() if one.question}
     kinds = {found.id: found.kind for found in results.blocks}
     given = answers(results)
-    verdicts = table_of(
-        given,
-        ("Part", lambda one: one.title),
-        ("Question", lambda one: asked[one.question].format(kind=kinds[one.block])),
-        ("Verdict", lambda one: one.verdict),
-        ("What can be said", lambda one: one.text),
-        words=4,
-    )
+    rows: list[tuple[str, ...]] = [("Hypothesis", question(one), one.verdict, answer(one)) for one in results.contrasts]
+    rows += [(one.title, asked[one.question].format(kind=kinds[one.block]), one.verdict, one.text) for one in given]
+    verdicts = table(("Part", "Question", "Verdict", "What can be said"), rows, words=4)
     return render(
         "first_page.html",
-        verdicts=verdicts if given else "",
-        sentences=of_levels(results) or (() if given else (none_found(results),)),
+        verdicts=verdicts if rows else "",
+        sentences=of_levels(results) or (() if rows else (none_found(results),)),
         limits=list(limits),
         shown=LIMITS_SHOWN,
         empty=empty_studies(max(found.n for found in results.blocks)) if given else "",

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from functools import partial
 from importlib import metadata, resources
+from itertools import chain
 from pathlib import Path
 from platform import python_version
 from typing import Any, Final
@@ -14,6 +15,7 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from study_app import __version__
+from study_app.analysis.contrasts import contrast_rows, contrast_section
 from study_app.analysis.data.blocks import Setting
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
@@ -44,7 +46,7 @@ from study_app.analysis.results import (
     silent,
 )
 from study_app.errors import AnalysisError
-from study_app.protocol.model import Published
+from study_app.protocol.model import Contrast, Published
 from study_app.store.blinded.unblinding import reveals_of
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
@@ -52,7 +54,10 @@ from study_app.store.output_files import write_output
 from study_app.store.sites.merged import MANIFEST, folders_of
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
-OF_FORMAT_2: Final = {Results: frozenset({"questions", "scores", "levels"}), Setting: frozenset({"link", "view"})}
+OF_FORMAT_2: Final = {
+    Results: frozenset({"questions", "scores", "levels", "contrasts"}),
+    Setting: frozenset({"link", "view"}),
+}
 """Results that reports of earlier versions do not have; omitted where there are none."""
 
 
@@ -67,6 +72,8 @@ def plain(value: Any) -> Any:
         held = {field.name: getattr(value, field.name) for field in fields(value)}
         omitted = OF_FORMAT_2.get(type(value), frozenset())
         return {name: plain(entry) for name, entry in held.items() if entry or name not in omitted}
+    if isinstance(value, Contrast):
+        return value.model_dump()
     if isinstance(value, Published):
         return value.model_dump(exclude={"block"})
     if isinstance(value, Mapping):
@@ -112,7 +119,8 @@ MOTION: Final = (
 def tests(results: Results) -> list[dict[str, Any]]:
     """Return a row for every test."""
     in_order = sorted(all_findings(), key=lambda finding: finding.row_place)
-    return [row for found in results.blocks for finding in in_order for row in finding(found, results).rows()]
+    of_blocks = (finding(found, results).rows() for found in results.blocks for finding in in_order)
+    return [*contrast_rows(results), *chain.from_iterable(of_blocks)]
 
 
 def tests_csv(results: Results) -> bytes:
@@ -302,6 +310,7 @@ def _page(
     study: Study, results: Results, drawn: Sequence[Picture], texts: Mapping[str, Any], failures: Failures
 ) -> str:
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
+        ("Hypotheses", lambda: contrast_section(results)),
         *((found.title, partial(sections.block, found, results, drawn, failures)) for found in results.blocks),
         *(
             (title, partial(sections.question_section, where, study, results, drawn))

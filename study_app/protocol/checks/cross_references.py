@@ -30,6 +30,9 @@ REFERENCES = {
     "blocks.*.standard": "conditions",
     "stimuli.*.condition": "conditions",
     "designs.*.scale": "scales",
+    "analysis.contrasts.*.blocks.*": "blocks",
+    "analysis.contrasts.*.conditions.*": "conditions",
+    "analysis.contrasts.*.groups.*": "groups",
 }
 
 CHOICES = {

@@ -12,7 +12,7 @@ from typing import Any, Final
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import Protocol, Published
+from study_app.protocol.model import OF_LEVELS, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.quantities import can_vary
 from study_app.protocol.source.document import Path, entries, names
@@ -68,6 +68,8 @@ def designs(protocol: Protocol) -> Iterator[Fault]:
             yield from _block(protocol, block)
     for number, one in enumerate(protocol.analysis.published if protocol.analysis is not None else ()):
         yield from _published(protocol, one, ("analysis", "published", number))
+    for number, contrast in enumerate(protocol.analysis.contrasts if protocol.analysis is not None else ()):
+        yield from _contrast(protocol, contrast, ("analysis", "contrasts", number))
 
 
 def _block(protocol: Protocol, block: Block) -> Iterator[Fault]:
@@ -133,6 +135,21 @@ def _published(protocol: Protocol, one: Published, place: Path) -> Iterator[Faul
     ends = (one.value if one.low is None else one.low, one.value, one.value if one.high is None else one.high)
     if list(ends) != sorted(ends):
         yield Fault((*place, "low"), "low, value and high must ascend", "order them")
+
+
+def _contrast(protocol: Protocol, one: Contrast, place: Path) -> Iterator[Fault]:
+    """Check that the blocks of a contrast have its measure, and its conditions."""
+    for name in one.blocks:
+        block, asked = protocol.blocks[name], protocol.questionnaire_of(name)
+        items = [item.id for item in asked.statements] if asked is not None else []
+        known = OF_LEVELS if block.design is not None else items
+        if one.measure not in known:
+            yield unknown((*place, "measure"), f'block "{name}" has no {one.measure}', one.measure, known)
+        missing = [condition for condition in one.conditions or () if condition not in block.conditions]
+        if missing:
+            yield unknown((*place, "conditions"), f"block {name} has no {missing[0]}", missing[0], block.conditions)
+        if one.conditions is not None and block.design is not None:
+            yield Fault((*place, "conditions"), f"the results of {name} are of all its levels", "compare two blocks")
 
 
 def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault]:

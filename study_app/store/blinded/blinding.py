@@ -260,8 +260,10 @@ def _tables(protocol: Protocol) -> dict[str, Any]:
             name: {key: value for key, value in block.model_dump(mode="json").items() if key in _OF_DESIGNS}
             for name, block in named.items()
         }
-    if protocol.analysis is not None and protocol.analysis.published:
-        tables["analysis"] = protocol.model_dump(mode="json", include={"analysis": {"published"}})["analysis"]
+    if protocol.analysis is not None:
+        telling = protocol.analysis.model_dump(mode="json", include={"published", "contrasts"})
+        if hidden := {key: values for key, values in telling.items() if values}:
+            tables["analysis"] = hidden
     return tables
 
 

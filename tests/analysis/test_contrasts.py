@@ -1,0 +1,134 @@
+"""Contrasts: the tests of the hypotheses that a study file states."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import ttest_ind, ttest_rel
+
+from study_app.analysis.contrasts import answer, question
+from study_app.analysis.data.study_tables import Study, load_study
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.levels.thresholds import Thresholds
+from study_app.analysis.planning.threshold_studies import detectable
+from study_app.analysis.report import write_report
+from study_app.analysis.report.write_report import report
+from study_app.protocol.model import Contrast
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store.blinded.unblinding import unblind
+from tests.analysis.made_up import ITEMS, everybody, liquids, study
+from tests.studies import quick_pdfs
+
+pytestmark = pytest.mark.slow
+
+DELAYED = """
+format = 2
+study.name = "delayed"
+liquids.damper.drag = { law = "linear", damping_nspm = 8 }
+conditions.prompt_one = { liquid = "damper" }
+conditions.late_one = { liquid = "damper", delay_ms = 60 }
+tasks.stir.kind = "follow"
+stimuli.prompt = { vary = "damping_nspm", levels = [0.02, 0.6], condition = "prompt_one" }
+stimuli.late = { vary = "damping_nspm", levels = [0.02, 0.6], condition = "late_one" }
+blocks.prompt = { stimulus = "prompt", design = "2ifc", method = "m", task = "stir" }
+blocks.late = { stimulus = "late", design = "2ifc", method = "m", task = "stir" }
+methods.m = { kind = "questplus", trials = 20 }
+
+[analysis]
+participants = 6
+contrasts = [{ measure = "threshold", blocks = ["late", "prompt"], expected = "higher", bound = 1.25 }]
+"""
+
+
+@pytest.fixture(scope="module")
+def delayed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("delayed")
+    (folder / "delayed.toml").write_text(DELAYED)
+    return rehearse_answers(folder / "delayed.toml", participants=6, seed=3, results=folder / "study", features={})
+
+
+def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_path: Path) -> None:
+    assert load_study(delayed).contrasts == ()
+    receipts = "".join(path.read_text() for path in delayed.rglob("session.json"))
+    assert "late_one" not in receipts
+    assert '"contrasts"' not in receipts
+    unblind(delayed, "AB", "to analyse")
+    results = evaluate(load_study(delayed))
+    (found,) = results.contrasts
+    of_blocks = {level.block: level for level in results.levels}
+    each = {
+        block: {one.participant: one.threshold for one in Thresholds.own(of_blocks[block]) if one.beyond is None}
+        for block in ("late", "prompt")
+    }
+    both = sorted(each["late"].keys() & each["prompt"].keys())
+    late, prompt = (np.log([each[block][person] for person in both]) for block in ("late", "prompt"))
+    expected = ttest_rel(late, prompt, alternative="greater")
+    assert (found.n, found.dropped, found.effect_name) == (len(both), 6 - len(both), "ratio")
+    assert (found.statistic, found.p) == pytest.approx((expected.statistic, expected.pvalue))
+    assert found.effect == pytest.approx(math.exp((late - prompt).mean()))
+    ends = ttest_rel(late, prompt).confidence_interval(0.95)
+    assert found.interval is not None
+    assert (found.interval.low, found.interval.high) == pytest.approx((math.exp(ends.low), math.exp(ends.high)))
+    assert question(found) == "Threshold is higher in late than in prompt; equivalent within 1.25"
+    assert f"Threshold in late is {found.effect:.2f} times that in prompt" in answer(found)
+    with quick_pdfs():
+        page = report(delayed, tmp_path / "report", failed=pytest.fail)[0].read_text(encoding="utf-8")
+    first = page[page.index('class="first"') :]
+    assert first.index("Threshold is higher in late than in prompt") < first.index("Prompt: ")
+
+
+def statements(contrast: Contrast, shift: float = 0.0) -> Study:
+    rng = np.random.default_rng(5)
+    made = study(
+        liquids(3),
+        list(everybody(liquids(3), 14, lambda _p, _s, code, _i: round(rng.normal(4 + shift * (code == "L2"), 0.6)))),
+    )
+    return replace(made, contrasts=(contrast,))
+
+
+def test_two_conditions_of_a_statement_are_compared_and_can_be_equivalent() -> None:
+    contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"), bound=1.0)
+    (higher,) = evaluate(statements(contrast, 2.0)).contrasts
+    assert higher.verdict == "shown"
+    assert higher.effect == pytest.approx(2, abs=0.5)
+    (same,) = evaluate(statements(contrast)).contrasts
+    assert (same.verdict, same.equivalent) == ("equivalent", True)
+    (narrow,) = evaluate(statements(contrast.model_copy(update={"bound": 0.01}))).contrasts
+    assert (narrow.verdict, narrow.equivalent) == ("not shown", False)
+    rows = write_report.tests_csv(evaluate(statements(contrast))).decode().splitlines()
+    assert "hypotheses" in rows[1]
+
+
+def test_two_groups_are_compared_by_welch() -> None:
+    contrast = Contrast(measure=ITEMS[0], blocks=("b",), groups=("one", "two"))
+    made = statements(contrast)
+    people = sorted(made.trials["participant"].unique())
+    members = {person: "one" if number % 3 else "two" for number, person in enumerate(people)}
+    made = replace(made, trials=made.trials.assign(group=made.trials["participant"].map(members).astype("string")))
+    (found,) = evaluate(made).contrasts
+    rows = made.responses[made.responses["item"] == ITEMS[0]]
+    means = rows.groupby("participant")["response"].mean().astype(float)
+    one, two = (means[[person for person in people if members[person] == group]] for group in ("one", "two"))
+    expected = ttest_ind(one, two, equal_var=False)
+    assert (found.statistic, found.p) == pytest.approx((expected.statistic, expected.pvalue))
+    assert found.effect == pytest.approx(one.mean() - two.mean())
+
+
+def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> None:
+    contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"))
+    alike = Contrast(measure=ITEMS[1], blocks=("b",), groups=("one", "two"))
+    first, second = evaluate(replace(statements(contrast, 2.0), contrasts=(contrast, alike))).contrasts
+    assert first.p is not None
+    assert first.p_adjusted == pytest.approx(2 * first.p)
+    assert (second.verdict, second.p) == ("not tested", None)
+    assert answer(second).startswith("Not tested: fewer than two participants have both numbers")
+    assert pd.isna(second.statistic) or second.statistic is None
+
+
+def test_the_smallest_difference_is_that_of_published_tables() -> None:
+    """Cohen 1988, table 2.4.1: d = 0.5, two-sided α = .05, power .8: 34 pairs."""
+    assert detectable(34, 0.025) == pytest.approx(0.495, abs=0.001)
+    assert detectable(27, 0.05) == pytest.approx(0.4912, abs=0.002)
