@@ -235,10 +235,9 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
         )
 
 
-STUDIES: Final = 2000
-CLAIMS: Final[dict[int, int]] = {5: 11, 12: 33, 24: 36}
-"""Participants → in how many of so many empty studies the first page claims something, half of them by the answer model
-and half by the ordinal probit model: ``liquid-study validate-report --studies 1000``."""
+CLAIMS: Final[dict[int, tuple[int, int]]] = {5: (4, 2000), 12: (47, 3000), 24: (42, 3000)}
+"""Participants → in how many empty studies anything in the report claims something, and of how many studies, by the
+answer model and by the ordinal probit model: ``liquid-study validate-report --studies 1000``."""
 
 LIMITS_SHOWN: Final = 6
 """So many limits are listed on the first page; the others are folded."""
@@ -284,12 +283,13 @@ def _answer(finding: Finding[Any]) -> Answer:
 
 
 def empty_studies(participants: int) -> str:
-    """Return in how many of a hundred empty studies the first page claims something; ``participants`` take part."""
+    """Return in how many of a hundred empty studies the report claims something; ``participants`` take part."""
     n = min(CLAIMS, key=lambda size: abs(size - participants))
-    share, low, high = (100 * one for one in (CLAIMS[n] / STUDIES, *share_interval(CLAIMS[n] / STUDIES, STUDIES)))
+    claims, studies = CLAIMS[n]
+    share, low, high = (100 * one for one in (claims / studies, *share_interval(claims / studies, studies)))
     return (
-        f"Of simulated studies of three liquids and seven delays in which nothing differs, with {n} participants, this "
-        f"table claims a difference or a noticed delay in {share:.1f} of a hundred ({CLAIMS[n]} of {STUDIES} studies, "
+        f"Of simulated studies of three liquids and seven delays in which nothing differs, with {n} participants, "
+        f"a report claims a difference or a noticed delay in {share:.1f} of a hundred ({claims} of {studies} studies, "
         f"95 % interval {low:.1f} to {high:.1f}; liquid-study validate-report)."
     )
 

@@ -18,7 +18,7 @@ from study_app.analysis.findings.delays import (
 from study_app.analysis.findings.finding import Answer, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, given, recognised
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, gated
-from study_app.analysis.report.sections import CLAIMS, STUDIES, answers, empty_studies, first_page
+from study_app.analysis.report.sections import CLAIMS, answers, empty_studies, first_page
 from study_app.analysis.results import Results
 from study_app.analysis.statistics.recognition import recognition
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
@@ -204,7 +204,7 @@ def test_a_threshold_alone_is_exploratory_unless_its_statement_is_primary(
 def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int) -> None:
     told = empty_studies(participants)
     assert f"with {n} participants" in told
-    assert f"({CLAIMS[n]} of {STUDIES} studies, 95 % interval" in told
+    assert "({} of {} studies, 95 % interval".format(*CLAIMS[n]) in told
 
 
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
