@@ -14,7 +14,7 @@ from study_app.analysis.data.blocks import spoken
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.report.html_page import bullets, heading, paragraph
-from study_app.analysis.results import counted, listed
+from study_app.analysis.results import counted, least, listed
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows, threshold_plan
@@ -187,8 +187,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
         yield (
             "Delays: a trend in the population, by changing the signs of each participant's rank correlation with the "
             "delay, in the stated direction, otherwise two-sided, stepping down from the longest delay; "
-            "equivalence to no delay by two one-sided tests, where a bound is given; the detection threshold from "
-            "agreement."
+            "equivalence to no delay by two one-sided tests, where a bound is given, with "
+            f"{least(decided.alpha)}; the detection threshold from agreement, where it shows a trend."
         )
     if others := kinds - {None, "delays"}:
         yield (
@@ -197,7 +197,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
         )
     yield (
         "No statement counts whose part of the study shows no difference by the permutation test over all its "
-        "statements, corrected by Holm over the parts."
+        "statements, corrected by Holm over the parts; the report's first page says nothing else. Contrasts are a Holm "
+        "family of their own."
     )
     yield (
         f"α = {decided.alpha:g}; primary statements ({', '.join(decided.primary) or 'all'}) are corrected by Holm, the "
@@ -274,7 +275,12 @@ def _design(protocol: Protocol) -> Iterator[str]:
 
 def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Iterator[str]:
     """Yield how many participants there are and why."""
-    planned = "Their number is not decided." if one.participants is None else f"{one.participants} are planned."
+    planned = "Their number is not decided: there is no stopping rule."
+    if one.participants is not None:
+        planned = (
+            f"{one.participants} are planned. The study ends when so many sessions that count are complete; the key is "
+            "opened, and anything tested, only then."
+        )
     wanted = (
         ""
         if one.precision is None

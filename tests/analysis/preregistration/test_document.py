@@ -53,7 +53,8 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     assert "Weber fraction of damping at the hand at 4, 8, 16 and 32 N·s/m?" in text
     assert "exponent 1, Weber's law" in text
     assert "weber 0.19, at 71 % correct, n = 10" in text
-    assert "20 are planned. The aim is a 95 % interval of the group's mean within ±15 %." in text
+    assert "20 are planned. The study ends when so many" in text
+    assert "only then. The aim is a 95 % interval of the group's mean within ±15 %." in text
     assert "50 trials per standard" in text
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
     assert "presented again, up to 3 times" in text
@@ -77,7 +78,7 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
     assert "within ±1 points?" in text
     assert "like_water, honey by like_honey and light_oil by like_oil) more often than by chance?" in text
     assert "α = 0.05; primary statements (all) are corrected by Holm" in text
-    assert "Their number is not decided." in text
+    assert "Their number is not decided: there is no stopping rule." in text
     assert "`liquid-study power rek2024 --to DIR`" in text
 
 
