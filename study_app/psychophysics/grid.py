@@ -18,6 +18,8 @@ from study_app.psychophysics.families import CLIP, Family, success
 
 Values = tuple[float, ...]
 
+Z_975: Final = 1.959964
+
 FREE_GUESSES: Final[Values] = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
 """Guess rates if the answers to noise trials determine it."""
 
@@ -40,6 +42,9 @@ class Grid:
         The lapse rates and their prior weights.
     guesses : tuple of float or None
         Guess rates, of equal prior weight; None: the guess rate equals the lapse rate.
+    wander : tuple of float
+        Standard deviation of a person's threshold from one session to the next: a constant part [u], and a part that
+        is a share of the threshold.
     """
 
     family: Family
@@ -49,6 +54,7 @@ class Grid:
     lapses: Values
     lapse_prior: Values
     guesses: Values | None
+    wander: tuple[float, float] = (0.0, 0.0)
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -108,14 +114,22 @@ class Posterior:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The ends of the threshold's equal-tailed 95 % interval [u]."""
-        return self.quantile(0.025), self.quantile(0.975)
+        """The ends of the 95 % interval of the person's threshold [u]: equal-tailed, widened by `wander`."""
+        middle, own = self.threshold, Z_975 * self.wander
+        below, above = (math.hypot(self.quantile(share) - middle, own) for share in (0.025, 0.975))
+        return middle - below, middle + above
+
+    @cached_property
+    def wander(self) -> float:
+        """Standard deviation of the person's threshold about that of the answers [u]."""
+        constant, share = self.grid.wander
+        return math.hypot(constant, share * self.threshold)
 
     @property
     def variance(self) -> float:
-        """The variance of the threshold [u²]."""
+        """The variance of the person's threshold [u²]."""
         thresholds = np.array(self.grid.thresholds)
-        return float(self.marginal @ (thresholds - float(self.marginal @ thresholds)) ** 2)
+        return float(self.marginal @ (thresholds - float(self.marginal @ thresholds)) ** 2) + self.wander**2
 
     @property
     def others(self) -> tuple[float, float, float]:
@@ -132,7 +146,12 @@ class Posterior:
 
     def band(self, levels: ArrayLike) -> NDArray[np.float64]:
         """Return the ends of the pointwise 95 % band of ψ at ``levels`` [u], shape (2, levels)."""
-        weights, ends = self.weights.ravel(), []
+        weights, ends = self.weights, []
+        if self.wander:
+            thresholds = np.array(self.grid.thresholds)
+            kernel = np.exp(-0.5 * ((thresholds[:, None] - thresholds) / self.wander) ** 2)
+            weights = np.einsum("ax,xbcd->abcd", kernel / kernel.sum(axis=0), weights)
+        weights = weights.ravel()
         for row in self.grid.success(levels).reshape(np.size(levels), -1):
             order = np.argsort(row)
             ends.append(np.interp((0.025, 0.975), np.cumsum(weights[order]), row[order]))
@@ -151,7 +170,9 @@ def fit(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid
     grid : Grid
         The cells and their prior.
     """
-    _, log_success, log_failure = tables(replace(grid, width_prior=None), tuple(np.asarray(levels, float).tolist()))
+    _, log_success, log_failure = tables(
+        replace(grid, width_prior=None, wander=(0.0, 0.0)), tuple(np.asarray(levels, float).tolist())
+    )
     log_likelihood = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
     log_likelihood += np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure)
     weights = grid.prior * np.exp(log_likelihood - log_likelihood.max())

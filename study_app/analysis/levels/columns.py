@@ -161,6 +161,11 @@ THRESHOLDS: Final[tuple[Column, ...]] = (
         maximum=1,
     ),
     optional("drift", "number", "Correlation of trial number and deviance residual.", minimum=-1, maximum=1),
+    optional(
+        "change",
+        "number",
+        "Change of the threshold from first to last trial, as a share of it; 0: none beyond two standard errors.",
+    ),
 )
 
 

@@ -37,10 +37,20 @@ from study_app.analysis.levels.statistic import (
 from study_app.analysis.levels.tracks import TRACK, answers_of, setting_of
 from study_app.analysis.results import LevelsResult, counted, listed, number
 from study_app.analysis.statistics.outcome import Array
-from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, drift, drifts, group_mean, p_of_fit
-from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, Stimulus, analysis_grid
+from study_app.analysis.statistics.thresholds import (
+    CHANGE_PRIOR,
+    CHANGED,
+    FEWEST,
+    SETS,
+    WORST,
+    drift,
+    group_mean,
+    p_of_fit,
+    trend,
+)
+from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, WANDER_DECADES, Assumed, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
-from study_app.psychophysics.grid import Grid, fit
+from study_app.psychophysics.grid import Posterior, fit
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
@@ -56,7 +66,8 @@ MOST_NAMED: Final = 6
 class ThresholdEstimate:
     """A participant's threshold at one standard, as in `columns.RESULTS`, or the group's of ``n`` participants.
 
-    ``flat_width`` is the threshold under a flat prior on the width, ``variance`` the posterior variance in u, and
+    ``flat_width`` is the threshold under a flat prior on the width, ``variance`` the posterior variance in u,
+    ``change`` that of the threshold from the first to the last trial as a share of it, 0 where none is found, and
     ``compared`` the level at the percentage of successes of the published value, see `compared_percent`. Of the group
     only threshold and ``compared`` are known, each with its interval.
     """
@@ -75,6 +86,7 @@ class ThresholdEstimate:
     variance: float | None = None
     fit_p: float | None = None
     drift: float | None = None
+    change: float | None = None
     reversal_mean: float | None = None
     target_percent: float | None = None
     compared: float | None = None
@@ -88,8 +100,8 @@ class ThresholdEstimate:
 
     @property
     def drifts(self) -> bool:
-        """Whether answers became better or worse over the trials, beyond 2/√n."""
-        return drifts(self.drift, self.n)
+        """Whether the threshold changed over the trials."""
+        return bool(self.change)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,11 +140,10 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
         return
-    grid = analysis_grid(stimulus, block.design, assumed)
     all_rows = opened[(opened["block"] == block.id) & opened["success"].notna()].sort_values(["session", "trial"])
     for standard, at_standard in all_rows.groupby("standard", dropna=False, sort=True):
         own = [
-            _own(block, stimulus, grid, standard, person, one)
+            _own(block, stimulus, assumed, standard, person, one)
             for person, one in at_standard.groupby("participant")
             if one["analysed"].any()
         ]
@@ -141,14 +152,34 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
         yield from own
 
 
+def _fitted(
+    block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.DataFrame
+) -> tuple[Counts, Posterior, float]:
+    """Return a participant's answers, what they say about the person, and the change of the threshold [decades].
+
+    A threshold that changed is uncertain by the standard deviation of one that changes evenly, in addition to how far
+    it is from one session to the next.
+    """
+    counts, wander = counts_of(stimulus, rows), WANDER_DECADES / math.sqrt(rows["session"].nunique())
+    grid = analysis_grid(stimulus, block.design, assumed, wander)
+    found = fit(counts.levels, counts.successes, counts.failures, grid)
+    score, information = trend(rows["success"].to_numpy(dtype=bool), counts.levels[counts.places], found)
+    if score**2 <= CHANGED**2 * information:
+        return counts, found, 0.0
+    decade = 1.0 if stimulus.spacing == "log" else abs(found.threshold) * math.log(10)
+    change = score * decade / (information * decade**2 + math.log10(CHANGE_PRIOR) ** -2)
+    grid = analysis_grid(stimulus, block.design, assumed, math.hypot(wander, change / math.sqrt(12)))
+    return counts, replace(found, grid=grid), change
+
+
 def _own(
-    block: LevelBlock, stimulus: Stimulus, grid: Grid, standard: Any, person: Any, heard: pd.DataFrame
+    block: LevelBlock, stimulus: Stimulus, assumed: Assumed, standard: Any, person: Any, heard: pd.DataFrame
 ) -> ThresholdEstimate:
     """Return a participant's threshold; of the rows those that are analysed enter the fit."""
     rows = heard[heard["analysed"]]
-    counts = counts_of(stimulus, rows)
-    answers = counts.levels, counts.successes, counts.failures
-    found, flat = fit(*answers, grid), fit(*answers, replace(grid, width_prior=None))
+    counts, found, change = _fitted(block, stimulus, assumed, rows)
+    grid, answers = found.grid, (counts.levels, counts.successes, counts.failures)
+    flat = fit(*answers, replace(grid, width_prior=None))
     level_of, threshold, (low, high) = stimulus.level_of, found.threshold, found.interval
     width, guess, lapse = found.others
     psi, shown = found.success(counts.levels), counts.levels[np.isfinite(counts.levels)]
@@ -170,6 +201,7 @@ def _own(
         variance=found.variance,
         fit_p=p_of_fit(counts.successes, counts.successes + counts.failures, psi),
         drift=drift(rows["success"].to_numpy(dtype=bool), psi[counts.places]),
+        change=10.0**change - 1.0,
         reversal_mean=_reversal_mean(block, stimulus, heard),
         target_percent=None if block.method is None else block.method.target_percent,
         compared=None if math.isnan(compared) else level_of(compared),
@@ -224,12 +256,11 @@ def psychometric_bands(
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
         return {}
-    grid, u = analysis_grid(stimulus, block.design, assumed), np.linspace(*ends, PLACES)
+    u = np.linspace(*ends, PLACES)
     rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["success"].notna()]
     found = {}
     for person, own in rows[rows["participant"].isin(people)].groupby("participant"):
-        counts = counts_of(stimulus, own)
-        posterior = fit(counts.levels, counts.successes, counts.failures, grid)
+        _, posterior, _ = _fitted(block, stimulus, assumed, own.sort_values(["session", "trial"]))
         found[str(person)] = np.array([u, *posterior.band(u)])
     return found
 
@@ -371,10 +402,12 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"guesses and lapses{at}: posterior median with an equal-tailed 95 % interval, from all counted answers, "
             f"at the levels delivered to the hand. The width, from 5 to 95 % of the rise, has a log-normal prior; "
             f"the next column is the threshold under a flat one. “Above” and “below” mark thresholds beyond the "
-            f"levels presented. The group is the random-effects mean (Paule–Mandel), with the interval of Hartung and "
-            f"Knapp from three participants on."
+            "levels presented. Intervals include that a person’s threshold differs between sessions by a factor of "
+            f"{10**WANDER_DECADES:.2f} (one standard deviation), and a change over the trials. The group is the "
+            "random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from three participants on."
             f"{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of "
-            f"trial number and deviance residual, with “!” beyond 2/√n. n counts answers{catch}."
+            f"trial number and deviance residual, with “!” where the threshold changes over the trials by more than "
+            f"{CHANGED:g} standard errors. n counts answers{catch}."
         )
 
     def compares(self, measure: str) -> bool:
@@ -412,15 +445,17 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "a threshold lies below the lowest level presented; how far is not known",
             ),
             (lambda one: not one.fits, "the function does not fit the answers, so that a threshold may be biased"),
-            (
-                lambda one: one.drifts,
-                "answers became better or worse over the trials, which one threshold does not show",
-            ),
             (lambda one: one.n < FEW_ANSWERS, f"fewer than {FEW_ANSWERS} answers, so that intervals are wide"),
         )
         for applies, words in kinds:
             if some := [one for one in own if applies(one)]:
                 yield f"{title}: {words} ({_named_people(own, some)})."
+        if some := [one for one in own if one.drifts]:
+            sizes = listed([f"{100 * (one.change or 0.0):+.0f} %".replace("-", "−") for one in some[:MOST_NAMED]])
+            yield (
+                f"{title}: the threshold changed over the trials, which the interval includes "
+                f"({_named_people(own, some)}: {sizes} from the first trial to the last)."
+            )
         if (people := len({one.participant for one in own})) < FEWEST:
             yield (
                 f"{title}: {counted(people, 'participant')}; below {FEWEST} the group has no interval, since "
@@ -473,8 +508,11 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "Thresholds are posterior medians over a grid with equal-tailed 95 % intervals, from all counted "
                 "answers at the levels delivered to the hand. The deviance was compared with that of "
                 f"{SETS} simulated sets of answers, and drift is the correlation of trial number and deviance residual "
-                "(Wichmann & Hill 2001). Group means are random-effects means with the between-person variance of "
-                f"Paule and Mandel (1982) and, from {FEWEST} participants on, the interval of Hartung and Knapp (2001)."
+                "(Wichmann & Hill 2001). Intervals include that a person’s threshold differs between sessions by a "
+                f"factor of {10**WANDER_DECADES:.2f} (one standard deviation; from data of Jäkel & Wichmann 2006), and "
+                f"how far it changed over the trials where that exceeded {CHANGED:g} standard errors. Group means are "
+                "random-effects means with the between-person variance of Paule and Mandel (1982) and, from "
+                f"{FEWEST} participants on, the interval of Hartung and Knapp (2001)."
             )
 
 

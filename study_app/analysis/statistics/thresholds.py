@@ -21,6 +21,8 @@ from scipy.special import xlogy
 from scipy.stats import t as student
 
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked
+from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked, draws_for
+from study_app.psychophysics.families import success
 from study_app.psychophysics.grid import Grid, Posterior, Values, evenly, fit, geometric, tables
 
 NOTICED_FROM: Final = 5.0
@@ -251,6 +253,12 @@ def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
     return float(1 + np.count_nonzero(simulated >= found - 1e-9)) / (SETS + 1)
 
 
+CHANGED: Final = 2.0
+"""A threshold that changes over the trials by more than so many standard errors drifts."""
+CHANGE_PRIOR: Final = 1.5
+"""Factor by which a threshold changes from the first trial to the last (one standard deviation). [choice]"""
+
+
 def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:
     """Return the correlation of trial number and deviance residual; None where either does not vary.
 
@@ -263,9 +271,32 @@ def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:
     return float(np.corrcoef(np.arange(len(y)), residuals)[0, 1])
 
 
-def drifts(correlation: float | None, n: int) -> bool:
-    """Return whether a correlation over ``n`` trials is beyond 2/√n."""
-    return correlation is not None and abs(correlation) > 2.0 / math.sqrt(n)
+STEP: Final = 0.01
+"""By so many widths a threshold is moved to differentiate the function."""
+
+
+def trend(successes: ArrayLike, levels: ArrayLike, found: Posterior) -> tuple[float, float]:
+    """Return score and information, at none, of a change of the threshold from first to last trial [1/u, 1/u²].
+
+    Parameters
+    ----------
+    successes, levels : (n,) array
+        In the order of the trials; levels are in u.
+    found : Posterior
+        Of these answers, as if the threshold were constant.
+    """
+    y, u, (width, *rates) = np.asarray(successes, float), np.asarray(levels, float), found.others
+    below, above = (
+        success(found.grid.family, u, found.threshold + way * STEP * width, width, *rates) for way in (-1, 1)
+    )
+    psi, slope = found.success(u), (above - below) / (2 * STEP * width)
+    information = slope**2 / (psi * (1.0 - psi))
+    if not information.any():
+        return 0.0, 0.0
+    time = np.linspace(0.0, 1.0, len(y))
+    time = time - np.average(time, weights=information)
+    score = float((slope * (y - psi) / (psi * (1.0 - psi)) * time).sum())
+    return score, float((information * time**2).sum())
 
 
 FEWEST: Final = 3

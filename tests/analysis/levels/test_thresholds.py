@@ -143,7 +143,7 @@ def test_family_and_prior_on_the_width_are_those_that_questplus_states() -> None
 
 
 def test_the_band_holds_the_function_and_is_narrow_with_many_answers() -> None:
-    grid = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")))
+    grid = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")), wander=0.0)
     u = [math.log10(level) for level in LEVELS]
     psi = success("weibull", u, -0.7, 1.4, 0.5, 0.02)
     for n, widest in ((20, 0.5), (2000, 0.05)):
@@ -176,6 +176,28 @@ def test_a_function_that_does_not_fit_and_answers_that_drift_are_said_to() -> No
     _, turned = thresholds(block(), second)
     assert turned.drift is not None
     assert turned.drift < 0
+
+
+def test_a_threshold_that_changes_is_named_with_its_size_and_widens_the_interval() -> None:
+    draw, levels = np.random.default_rng(4), np.tile(LEVELS, 60)
+    change = np.linspace(0.3, -0.3, len(levels))  # by a factor of four
+    psi = success("weibull", np.log10(levels), math.log10(0.15) + change, 1.4, 0.5, 0.01)
+    steady = rows({"P001": 0.15}, trials=len(levels))
+    learns = steady.assign(level=levels, level_delivered=levels, success=draw.random(len(levels)) < psi)
+    learns = learns.astype({"level_delivered": "Float64", "success": "boolean"})
+    (_, one), (_, other) = thresholds(block(), learns), thresholds(block(), steady)
+    assert one.drifts
+    assert one.change == pytest.approx(-0.75, abs=0.15)
+    assert (other.drifts, other.change) == (False, 0.0)
+    assert math.log(one.high / one.low) > 1.3 * math.log(other.high / other.low)
+
+
+def test_answers_of_two_sessions_tell_more_about_a_person_than_those_of_one() -> None:
+    one = rows({"P001": 0.2}, trials=400)
+    two = one.assign(session=np.where(one["trial"] <= 200, "01", "02"))
+    (_, alone), (_, both) = thresholds(block(), one), thresholds(block(), two)
+    assert both.threshold == alone.threshold
+    assert both.variance == pytest.approx(alone.variance - 0.065**2 / 2, rel=0.01)
 
 
 def tracks_of_staircases(method: UpDown, trials: int) -> pd.DataFrame:

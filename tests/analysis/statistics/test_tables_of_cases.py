@@ -136,9 +136,6 @@ def of_thresholds() -> Iterator[str]:
     shares = ([0.9, 0.6, 0.7, 0.8], [0.7] * 4)
     drifting = {f"{given} {own}": (given, own[: len(given)]) for given, own in product(flags, shares)}
     yield from results(thresholds.drift, drifting)
-    yield from results(
-        thresholds.drifts, {f"{drift} {n}": (drift, n) for drift in (None, 0.2, -0.3) for n in (1, 30, 100, 101)}
-    )
 
 
 def of_models() -> Iterator[str]:

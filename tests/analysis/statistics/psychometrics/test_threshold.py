@@ -5,7 +5,7 @@ import pytest
 from scipy.special import expit
 from scipy.stats import binom
 
-from study_app.analysis.statistics.thresholds import deviances, drift, drifts, noticed, p_of_fit
+from study_app.analysis.statistics.thresholds import deviances, drift, noticed, p_of_fit
 from study_app.psychophysics.families import success
 
 pytestmark = pytest.mark.slow
@@ -157,4 +157,3 @@ def test_drift_is_positive_where_answers_become_better_and_near_0_where_they_do_
     assert drift(~better[::-1], psi) > 2 / math.sqrt(n)
     assert abs(drift(steady, psi)) < 2 / math.sqrt(n)
     assert drift(np.ones(n, bool), psi) is None
-    assert [drifts(drift(answers, psi), n) for answers in (better, steady, np.ones(n, bool))] == [True, False, False]
