@@ -25,6 +25,17 @@ GROUPS: Final = {
     "Devices": "devices outlets",
 }
 REMOVED: Final = {"emulate-falcon": "--device falcon-emulated runs the Falcon's driver on an emulated Falcon"}
+RENAMED_BY: Final = ("run", "resume")
+"""Commands whose option ``--operator`` was ``--by``."""
+EXAMPLES: Final = {
+    "run": "rek2024 --participant P007 --operator AK",
+    "exclude": 'rek2024 --participant P003 --by AK --reason "fell asleep"',
+    "include": 'rek2024 --participant P003 --by AK --reason "awake after all"',
+    "withdraw": 'rek2024 --participant P007 --by AK --reason "asked by letter"',
+    "unblind": 'rek2024 --by AK --reason "collection closed"',
+    "merge": "--site Delft=results/rek2024 --site Utrecht=utrecht/rek2024 --to pooled",
+}
+"""An example of each command with required options, which errors of its arguments show."""
 LONGEST: Final = 150
 """Characters of a command's first sentence in ``--help``, which wraps it."""
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -38,12 +49,17 @@ EXIT_CANCELLED: Final = 130
 
 
 class GroupedCommands(click.Group):
-    """Commands that ``--help`` lists under the headings of `GROUPS`."""
+    """Commands that ``--help`` lists under the headings of `GROUPS`; options of earlier versions are taken too."""
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         """Return a command by its name."""
         if args and args[0] in REMOVED:
             ctx.fail(f"'{args[0]}' is no longer a command: {REMOVED[args[0]]}")
+        if args and args[0] in RENAMED_BY:
+            for place, word in enumerate(args):
+                if word.partition("=")[0] == "--by":
+                    args[place] = word.replace("--by", "--operator", 1)
+                    click.echo("--by is --operator now", err=True)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -26,7 +26,7 @@ from study_app.number_text import counted
 SEED = click.IntRange(0, 2**31 - 1)
 WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
 SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
-OPERATOR = click.option("--by", "operator", default="", metavar="INITIALS", help="Name or initials of the operator.")
+OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Name or initials of the operator.")
 STARTED = 16  # letters of a time down to the minute
 
 

@@ -38,7 +38,7 @@ def test_a_signal_in_a_trial_leaves_a_session_that_can_be_resumed(
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     protocol = short.write(tmp_path)
     protocol.write_text(protocol.read_text(encoding="utf-8").replace("min_s = 0.2", "min_s = 20"), encoding="utf-8")
-    words = ["run", str(protocol), "--participant", "P001", "--by", "AK", "--device", "scripted", "--windowed"]
+    words = ["run", str(protocol), "--participant", "P001", "--operator", "AK", "--device", "scripted", "--windowed"]
     program = Program(display, tmp_path, *words)
     try:
         wait_for(lambda: program.windows("^Study$"), "the study's window", COMPILED_S)

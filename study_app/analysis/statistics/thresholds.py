@@ -21,7 +21,6 @@ from scipy.special import xlogy
 from scipy.stats import t as student
 
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked
-from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked, draws_for
 from study_app.psychophysics.families import success
 from study_app.psychophysics.grid import Grid, Posterior, Values, evenly, fit, geometric, tables
 
