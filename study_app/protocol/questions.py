@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import ConfigDict, Discriminator, Field, SerializeAsAny, Tag, WrapValidator, model_validator
 
 from study_app.haptics.model.ranges import later, within
-from study_app.protocol.table import UNPRINTABLE, Id, Localised, Printable, Table, invalid, text_in
+from study_app.protocol.table import DIRECTIONS, Id, Localised, Printable, Table, invalid, text_in, unprintable
 
 POINTS = 7
 """Of the scale of statements."""
@@ -531,7 +530,7 @@ class Text(Question):
             return "the text is empty: write one, or leave the question open"
         if len(answer) > self.longest:
             return f"the text has {len(answer)} characters: write at most {self.longest}"
-        if any(unicodedata.category(letter) in UNPRINTABLE and letter != "\n" for letter in answer):
+        if unprintable(answer, f"\n{DIRECTIONS}") is not None:
             return "the text holds a character that cannot be printed: take it out"
         return None
 

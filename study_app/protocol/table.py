@@ -60,11 +60,16 @@ def _tidied(text: str) -> str:
     return tidy(_printable(text))
 
 
+def unprintable(text: str, permitted: str = "") -> str | None:
+    """Return the first character that cannot be printed, or hides or reorders the others; ``permitted`` ones may."""
+    hidden = (one for one in text if unicodedata.category(one) in UNPRINTABLE or one in DIRECTIONS)
+    return next((one for one in hidden if one not in permitted), None)
+
+
 def _printable(text: str) -> str:
     """Return ``text`` if a person can read it: something visible, and nothing that hides or reorders what is there."""
-    for letter in text:
-        if (unicodedata.category(letter) in UNPRINTABLE and letter not in "\t\n\r") or letter in DIRECTIONS:
-            raise invalid(f"holds the character U+{ord(letter):04X}, which cannot be printed: take it out")
+    if (letter := unprintable(text, "\t\n\r")) is not None:
+        raise invalid(f"holds the character U+{ord(letter):04X}, which cannot be printed: take it out")
     if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
         raise invalid("the text is empty: write one that can be read")
     return text

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from study_app.errors import StoreError
 from study_app.store.atomic import append_line, parse_json, read_if_there, write_file
-from study_app.store.folders import StudyFolder
+from study_app.store.folders import StudyFolder, readable
 from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.store.sessions.folder_lock import open_alone
@@ -73,11 +73,11 @@ def exclude(
         There is no such session or trial, it is excluded already, ``by`` or ``reason`` is empty, or the list cannot be
         read or written.
     """
-    _refuse_empty(by, reason, "an exclusion needs a rule or name, and a reason")
+    by, reason = readable(by, reason, "an exclusion needs a rule or name, and a reason")
     study = StudyFolder(folder)
     _check_there(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
-    new = Exclusion(participant, session, trial, by.strip(), reason.strip(), at)
+    new = Exclusion(participant, session, trial, by, reason, at)
     with open_alone(folder):
         rows = exclusions(folder)
         for row in rows:
@@ -106,7 +106,7 @@ def include(
     StoreError
         It is not left out, ``by`` or ``reason`` is empty, or a file cannot be read or written.
     """
-    _refuse_empty(by, reason, "reversing an exclusion needs a name and a reason")
+    by, reason = readable(by, reason, "reversing an exclusion needs a name and a reason")
     study = StudyFolder(folder)
     with open_alone(folder):
         rows = exclusions(folder)
@@ -116,16 +116,10 @@ def include(
             listed = "; ".join(named(row) for row in rows) or "nothing"
             raise StoreError(f"{name} is not excluded; excluded: {listed}")
         at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
-        record = {"at": at, "by": by.strip(), "reason": reason.strip(), "exclusion": asdict(taken)}
+        record = {"at": at, "by": by, "reason": reason, "exclusion": asdict(taken)}
         append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
         write_file(study.exclusions, exclusion_bytes(tuple(row for row in rows if row is not taken)))
     return taken
-
-
-def _refuse_empty(by: str, reason: str, why: str) -> None:
-    for name, text in (("by", by), ("reason", reason)):
-        if not text.strip():
-            raise StoreError(f"--{name} is empty: {why}")
 
 
 def exclusions(folder: Path) -> tuple[Exclusion, ...]:

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study_app.errors import StoreError
+from study_app.protocol.table import unprintable
 
 REBUILT = "rebuilt.txt"
 FINGERPRINTS = "fingerprints.txt"
@@ -187,3 +188,19 @@ def _free(results: Path, name: str) -> Path:
     while (folder := results / f"{name}-{number}").exists():
         number += 1
     return folder
+
+
+def readable(by: str, reason: str, why: str) -> tuple[str, str]:
+    """Return a name and a reason as they are kept with the data: with single spaces.
+
+    Raises
+    ------
+    StoreError
+        One is empty (``why`` says what they are needed for), or holds what cannot be printed.
+    """
+    for name, text in (("by", by), ("reason", reason)):
+        if not text.strip():
+            raise StoreError(f"--{name} is empty: {why}")
+        if (letter := unprintable(text, "\t\n\r")) is not None:
+            raise StoreError(f"--{name} holds the character U+{ord(letter):04X}, which cannot be printed: take it out")
+    return " ".join(by.split()), " ".join(reason.split())

@@ -31,7 +31,7 @@ from study_app.store.atomic import (
 )
 from study_app.store.checksums import fingerprint, place_of, read_checksums, sha256
 from study_app.store.exclusions import exclusion_bytes, exclusions
-from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
+from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, readable
 from study_app.store.journals.journal_events import holds
 from study_app.store.output_files import Output, erase_outputs
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
@@ -119,14 +119,12 @@ def withdraw(
         There is no such participant, a session of theirs runs, ``by`` or ``reason`` is empty, or a file cannot be
         written or deleted; what was erased by then stays erased.
     """
-    for name, text in (("by", by), ("reason", reason)):
-        if not text.strip():
-            raise StoreError(f"--{name} is empty: a withdrawal needs initials and a reason")
+    by, reason = readable(by, reason, "a withdrawal needs initials and a reason")
     study = StudyFolder(folder)
     copies, shared = _found(study, also)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
     with open_alone(folder):
-        tombstone = _tombstone(study, participant, at, by.strip(), reason.strip())
+        tombstone = _tombstone(study, participant, at, by, reason)
         erased = [study.path] if _erase(study, tombstone) else []
         outputs, elsewhere = _outputs(study.path)
     left = [*_names(study, participant)]

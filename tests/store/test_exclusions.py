@@ -12,7 +12,7 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.verification.verify_study import verify
-from tests.store.conftest import AWKWARD, FullDisk, Start
+from tests.store.conftest import FullDisk, Start
 
 pytestmark = pytest.mark.slow
 
@@ -88,13 +88,13 @@ def test_a_full_disk_leaves_the_list_as_it_was(folder: Path, files_up_to: FullDi
     row = exclude(folder, "P008", 1, by="AB", reason="withdrew")
     before = (folder / "exclusions.csv").read_bytes()
     with files_up_to(2000), pytest.raises(StoreError, match=r"exclusions\.csv cannot be written \(File too large\)"):
-        exclude(folder, "P007", 1, by="AB", reason=AWKWARD)
+        exclude(folder, "P007", 1, by="AB", reason="long " * 500)
     with files_up_to(0), pytest.raises(StoreError):
         include(folder, "P008", 1, by="CD", reason="wrong")
     assert (folder / "exclusions.csv").read_bytes() == before
-    exclude(folder, "P007", 1, by="AB", reason=AWKWARD)
+    exclude(folder, "P007", 1, by="AB", reason="late, “very” late")
     assert exclusions(folder)[0] == row
-    assert exclusions(folder)[1].reason == AWKWARD.strip()
+    assert exclusions(folder)[1].reason == "late, “very” late"
 
 
 @pytest.mark.parametrize(
@@ -152,10 +152,13 @@ def test_an_exclusion_is_taken_back_and_stays_on_record(folder: Path) -> None:
     assert "exclusions_reversed" not in str(found)
 
 
-def test_any_reason_of_a_reversal_leaves_the_rule_catch_applicable(folder: Path) -> None:
-    """Some end a line in Python's eyes, but not in the file's."""
-    exclude(folder, "P007", 1, by="catch", reason="missed \u2028 many \x85 trials")
-    include(folder, "P007", 1, by="CD", reason="understood late \u2029 and \x0b well")
+def test_a_reason_is_kept_as_it_can_be_read(folder: Path) -> None:
+    for letter in "\0\x1b\x85\u202e":
+        with pytest.raises(StoreError, match=rf"--reason holds the character U\+{ord(letter):04X}, which cannot be"):
+            exclude(folder, "P007", 1, by="catch", reason=f"missed {letter} many")
+    kept = exclude(folder, "P007", 1, by="catch", reason="missed \u2028 many\n trials ")
+    assert kept.reason == "missed many trials"
+    include(folder, "P007", 1, by="CD", reason="understood late \u2029 and well")
     assert [(row.participant, row.rule_or_person) for row in reversals(folder)] == [("P007", "catch")]
     assert unblind(folder, "CD", "to analyse").left == ()
     assert verify(folder).sound

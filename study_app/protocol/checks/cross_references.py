@@ -177,19 +177,26 @@ def alike(document: Document) -> Iterator[Fault]:
 def _alike(found: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
     """Yield a fault for every text that reads as an earlier one does; an entry may hold a text per language.
 
-    People do not tell texts apart by case, width or white space.
+    People do not tell texts apart by case, width or white space, nor Latin letters from Cyrillic or Greek ones that
+    look the same.
     """
     seen: set[tuple[str, str]] = set()
     for path, entry in found:
         texts = entry if isinstance(entry, Mapping) else {"": entry}
-        read = {
-            (language, " ".join(unicodedata.normalize("NFKC", text).casefold().split()))
-            for language, text in texts.items()
-            if isinstance(text, str)
-        }
+        read = {(language, _as_read(text)) for language, text in texts.items() if isinstance(text, str)}
         if read & seen:
             yield Fault(path, f"{ALIKE} {kind} does", "people could not tell the two apart: change one")
         seen |= read
+
+
+LOOKALIKES = str.maketrans("аеіјорсухѕһοαρνικ", "aeijopcyxshoapvik")
+"""Small letters of the Cyrillic and the Greek alphabet, and the Latin ones that look the same."""
+
+
+def _as_read(text: str) -> str:
+    """Return what a reader sees of a text: without marks of format, case, width and alphabet."""
+    visible = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
+    return " ".join(unicodedata.normalize("NFKC", visible).casefold().translate(LOOKALIKES).split())
 
 
 def languages(document: Document) -> Iterator[Fault]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, pairwise
 
 from study_app.haptics.model.effects.drag import REFERENCE, resistance_n
 from study_app.haptics.model.gate import met_mps
@@ -23,6 +24,8 @@ TELLING = 0.39
 """Twice the difference of viscosity that people just tell, 19 % (Jones, Hunter & Lafontaine 1997): what two liquids
 need for reliable discrimination; the thesis' water and honey differ by 40 %."""
 
+FRAME_MS = 8.0
+"""About a frame of a screen of 120 Hz."""
 NARROW = 1.3
 """A log-normal prior with a smaller factor decides the width: 95 % of it lie within a factor of 1.7. [choice]"""
 
@@ -192,6 +195,7 @@ def _unanswerable(protocol: Protocol) -> Iterator[str]:
                 'their effect cannot be told from practice and fatigue: choose "shuffled", "latin" or "williams"'
             )
         yield from _choices(protocol, block)
+        yield from _of_conditions(protocol, block)
     half = (POINTS - 1) / 2
     if decided is not None and (decided.equivalence_bound or 0.0) > half:
         yield (
@@ -205,6 +209,25 @@ def _unanswerable(protocol: Protocol) -> Iterator[str]:
         )
     for number, one in enumerate(() if decided is None else decided.published):
         yield from _not_bracketed(protocol, number, one)
+
+
+def _of_conditions(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield conditions that cannot be told apart, or that the name of a trial gives away."""
+    conditions = [protocol.conditions[name] for name in block.conditions]
+    alone = block.design is None and block.questionnaire is not None and len(conditions) == 1
+    if alone and len(protocol.main_blocks) > 1:
+        yield f"blocks.{block.id}.conditions: one condition is compared with nothing: a main block needs two"
+    if protocol.compared_in(block.id) == "delays":
+        for one, other in pairwise(sorted({condition.delay_ms for condition in conditions})):
+            if other - one < FRAME_MS:
+                yield (
+                    f"blocks.{block.id}.conditions: delays of {one:g} and {other:g} ms differ by less than a frame of "
+                    f"{FRAME_MS:g} ms: the screen cannot show the difference"
+                )
+    texts = [block.setting_label] if isinstance(block.setting_label, str) else list(block.setting_label.values())
+    words = {word for text in texts for word in re.findall(r"\w+", text.casefold())}
+    for name in sorted({*block.conditions, *(liquid for one in conditions for liquid in one.liquid_ids)} & words):
+        yield f"blocks.{block.id}.setting_label: names the condition “{name}”, which participants then know"
 
 
 def _choices(protocol: Protocol, block: Block) -> Iterator[str]:

@@ -39,7 +39,7 @@ from study_app.protocol.orders.schedule import block_codes, draw_key
 from study_app.protocol.streams import draw_secret, group_of
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.folders import SessionFolder, StudyFolder, readable
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.tables.columns import SEALED
@@ -167,9 +167,7 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
     StoreError
         ``by`` or ``reason`` is empty, or the key is missing, unreadable or not the one the sessions ran under.
     """
-    for name, text in (("by", by), ("reason", reason)):
-        if not text.strip():
-            raise StoreError(f"--{name} is empty: opening the key is recorded with a name and a reason")
+    by, reason = readable(by, reason, "opening the key is recorded with a name and a reason")
     study = StudyFolder(folder)
     if not is_there(study.key) and not study.sessions():
         raise StoreError(
@@ -178,8 +176,8 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
     key = verified_key(study)
     record = {
         "at": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "by": by.strip(),
-        "reason": reason.strip(),
+        "by": by,
+        "reason": reason,
         "key_hash": key.hash,
     }
     line = json.dumps(record, ensure_ascii=False).encode("utf-8", "backslashreplace")
