@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 from scipy.stats import ttest_ind, ttest_rel
 
-from study_app.analysis.contrasts import answer, question
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.levels.thresholds import Thresholds
@@ -72,12 +71,11 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     ends = ttest_rel(late, prompt).confidence_interval(0.95)
     assert found.interval is not None
     assert (found.interval.low, found.interval.high) == pytest.approx((math.exp(ends.low), math.exp(ends.high)))
-    assert question(found) == "Threshold is higher in late than in prompt; equivalent within 1.25"
-    assert f"Threshold in late is {found.effect:.2f} times that in prompt" in answer(found)
     with quick_pdfs():
         page = report(delayed, tmp_path / "report", failed=pytest.fail)[0].read_text(encoding="utf-8")
     first = page[page.index('class="first"') :]
-    assert first.index("Threshold is higher in late than in prompt") < first.index("Prompt: ")
+    assert first.index("Threshold is higher in late than in prompt; equivalent within 1.25") < first.index("Prompt: ")
+    assert f"Threshold in late is {found.effect:.2f} times that in prompt" in first
 
 
 def statements(contrast: Contrast, shift: float = 0.0) -> Study:
@@ -124,7 +122,7 @@ def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> 
     assert first.p is not None
     assert first.p_adjusted == pytest.approx(2 * first.p)
     assert (second.verdict, second.p) == ("not tested", None)
-    assert answer(second).startswith("Not tested: fewer than two participants have both numbers")
+    assert second.note.startswith("fewer than two participants have both numbers")
     assert pd.isna(second.statistic) or second.statistic is None
 
 

@@ -237,7 +237,7 @@ def draw_effects(rows: Sequence[EffectRow], bound: float | None, foot: str, look
     if bound is not None:
         axes.axvspan(-bound, bound, color=style.GRID, alpha=0.6, linewidth=0, zorder=0, gid="bound")
     axes.axvline(0, color=style.TEXT_SOFT, linewidth=0.8, zorder=1)
-    y = 0.0
+    y, means, intervals = 0.0, list[tuple[float, float]](), list[tuple[float, float, float]]()
     for statement, settings in rows:
         words = sheet.wrap(statement, EFFECTS_LEFT_PT - 70, LABEL_SIZE, "bold")
         for number, line in enumerate(words):
@@ -246,10 +246,13 @@ def draw_effects(rows: Sequence[EffectRow], bound: float | None, foot: str, look
         for place, (setting, mean, low, high) in enumerate(settings):
             at = y + EFFECT_GAP_PT + (place + 0.5) * EFFECT_PT
             sheet.text(EFFECTS_LEFT_PT - 6, EFFECTS_TOP_PT + at + 2.3, setting, size=6.5, ha="right")
+            means.append((mean, at))
             if low is not None and high is not None:
-                axes.plot([low, high], [at, at], color=style.ACCENT, linewidth=1.2, zorder=2)
-            axes.plot([mean], [at], "o", color=style.ACCENT, markersize=3.2, zorder=3)
+                intervals.append((at, low, high))
         y += EFFECT_GAP_PT + len(settings) * EFFECT_PT
+    axes.plot(*zip(*means, strict=True), "o", color=style.ACCENT, markersize=3.2, zorder=3)
+    if intervals:
+        axes.hlines(*zip(*intervals, strict=True), color=style.ACCENT, linewidth=1.2, zorder=2)
     sheet.text(EFFECTS_LEFT_PT, sheet.height_pt - 6, foot, size=6.5, colour=style.TEXT_SOFT)
     return sheet
 
