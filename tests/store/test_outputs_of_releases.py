@@ -1,7 +1,8 @@
 """What the commands make of each released version's folder, compared column by column with what they made before.
 
-``releases/outputs.txt`` is of version 0.2.0, without what the changelog names as changed. A later version may add
-columns, results and sentences; it loses and changes none. With another version's source on PYTHONPATH,
+``releases/outputs.txt`` is of version 0.2.0, without what the changelog names as changed; tests over delays are those
+of this version. A later version may add columns, results and sentences; it loses and changes none. With another
+version's source on PYTHONPATH,
 ``python tests/store/test_outputs_of_releases.py > OUTPUTS`` prints its lines.
 """
 
