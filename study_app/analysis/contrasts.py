@@ -23,7 +23,7 @@ from study_app.analysis.results import ContrastResult, LevelsResult, Results, in
 from study_app.analysis.statistics.outcome import Interval, holm
 from study_app.protocol.model import Contrast
 
-OF_LEVELS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
+STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
     "threshold": (Thresholds, "threshold"),
     "exponent": (Exponents, "exponent"),
     "d_prime": (Sensitivities, "d_prime"),
@@ -32,7 +32,7 @@ OF_LEVELS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
 """Of each measure the statistic that has it, and its attribute."""
 
 RATIOS: Final = ("threshold", "pse")
-"""Measures that are compared as ratios where levels are spaced by ratios."""
+"""Measures that are compared as ratios where the levels of all blocks are spaced by ratios."""
 
 Values = Mapping[str, float]
 """Participant → number, on the scale of the test: its logarithm where a ratio is tested."""
@@ -46,7 +46,7 @@ def contrast_results(
     tests = [test for test, _ in found]
     adjusted = holm([None if test is None else float(test.pvalue) for test in tests])
     return tuple(
-        _result(study, one, test, values, p, len(found))
+        _result(study, one, levels, test, values, p, len(found))
         for one, (test, values), p in zip(study.contrasts, found, adjusted, strict=True)
     )
 
@@ -80,14 +80,14 @@ def _values(
     one: Contrast, block: str, condition: str | None, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
 ) -> Values:
     """Return each participant's number in a block: the mean over standards, or over the conditions of statements."""
-    if one.measure not in OF_LEVELS:
+    if one.measure not in STATISTICS:
         asked = next(found for found in answers if found.block.id == block)
         codes = [setting.code for setting in asked.block.settings if condition in (None, setting.condition)]
         rows = asked.values[one.measure][:, sorted({asked.block.columns[code] for code in codes})].mean(axis=1)
         return {person: float(row) for person, row in zip(asked.people, rows, strict=True) if not math.isnan(row)}
     found = next(level for level in levels if level.block == block)
-    statistic, attribute = OF_LEVELS[one.measure]
-    ratio = one.measure in RATIOS and found.spacing == "log"
+    statistic, attribute = STATISTICS[one.measure]
+    ratio = _is_ratio(one, levels)
     numbers: dict[str, list[float]] = {}
     for row in statistic.own(found):
         value = getattr(row, attribute)
@@ -96,12 +96,20 @@ def _values(
     return {person: float(np.mean(each)) for person, each in numbers.items()}
 
 
+def _is_ratio(one: Contrast, levels: Sequence[LevelsResult]) -> bool:
+    return one.measure in RATIOS and all(level.spacing == "log" for level in levels if level.block in one.blocks)
+
+
 def _result(
-    study: Study, one: Contrast, test: Any, values: tuple[Any, ...], p_adjusted: float | None, members: int
+    study: Study,
+    one: Contrast,
+    levels: Sequence[LevelsResult],
+    test: Any,
+    values: tuple[Any, ...],
+    p_adjusted: float | None,
+    members: int,
 ) -> ContrastResult:
-    stimulus = next((level.stimulus for level in study.levels if level.id == one.blocks[0]), None)
-    ratio = one.measure in RATIOS and stimulus is not None and stimulus.spacing == "log"
-    alpha = study.decided.alpha
+    ratio, alpha = _is_ratio(one, levels), study.decided.alpha
     effect = ends = equivalent = None
     said: Any = verdict(p_adjusted, None, alpha, primary=study.decided.binding)
     untested = "fewer than two participants have both numbers, or all differences are equal"
@@ -155,11 +163,12 @@ def answer(one: ContrastResult) -> str:
         return f"Not tested: {one.note}."
     first, second = one.contrast.compared
     what = one.contrast.measure.replace("_", " ").capitalize()
-    amount = f"{number(one.effect)} times that in" if one.ratio else f"{number(one.effect)} above that in"
+    side = "below" if (one.effect or 0.0) < 0 else "above"
+    amount = f"{number(one.effect)} times" if one.ratio else f"{number(abs(one.effect or 0.0))} {side}"
     near = {None: "", True: " It stays within the bound.", False: " It is not shown to stay within the bound."}
     return (
-        f"{what} in {first} is {amount} {second}, 95 % interval {interval(one.interval)}, {p_equals(one.p_adjusted)}, "
-        f"n = {one.n}.{near[one.equivalent]}"
+        f"{what} in {first} is {amount} that in {second}, 95 % interval {interval(one.interval)}, "
+        f"{p_equals(one.p_adjusted)}, n = {one.n}.{near[one.equivalent]}"
     )
 
 
@@ -197,7 +206,7 @@ def contrast_rows(results: Results) -> Iterator[dict[str, Any]]:
             **{name: getattr(one, name) for name in ("statistic", "p", "effect_name", "effect", "method")},
             "block": one.contrast.blocks[0],
             "question": question(one),
-            "item": None if one.contrast.measure in OF_LEVELS else one.contrast.measure,
+            "item": None if one.contrast.measure in STATISTICS else one.contrast.measure,
             "p_adjusted": one.p_adjusted,
             "low": None if ends is None else ends.low,
             "high": None if ends is None else ends.high,

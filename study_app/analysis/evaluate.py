@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from typing import Final
 
 import pandas as pd
@@ -68,16 +68,22 @@ def _ending(progress: Progress, what: str, share: float) -> None:
 
 
 def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
+    collected = [
+        failures.attempt("all tests", partial(block_answers, study, block, SEED, failures), block=block.id)
+        for block in study.blocks
+    ]
+    asked = gated([one for one in collected if not isinstance(one, Failure)])
+
     def tested(number: int, block: Block) -> BlockResult:
         def tell(what: str) -> None:
             progress(f"testing: {what}", 0.5 * number / len(study.blocks))
 
-        found = failures.attempt("all tests", lambda: evaluate_block(study, answers()[number], tell), block=block.id)
-        return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
+        def test(answers: BlockAnswers) -> BlockResult | Failure:
+            return failures.attempt("all tests", partial(evaluate_block, study, answers, tell), block=block.id)
 
-    @cache
-    def answers() -> tuple[BlockAnswers, ...]:
-        return gated([block_answers(study, block, SEED, failures) for block in study.blocks])
+        lost = collected[number]
+        found = lost if isinstance(lost, Failure) else test(next(one for one in asked if one.block is block))
+        return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
 
     def moved() -> Performance | None:
         """Measure motion and force; None while sealed, since a thick liquid is known by its force."""
@@ -89,7 +95,6 @@ def _evaluated(study: Study, failures: Failures, progress: Progress) -> Results:
 
     blocks = tuple(tested(number, block) for number, block in enumerate(study.blocks))
     levels = failures.value("the answers at each level", lambda: level_results(study), ())
-    asked = failures.value("the answers to statements", answers, ())
     return Results(
         decided=study.decided,
         people=study.people,

@@ -284,7 +284,8 @@ class Contrast(Table):
     """A hypothesis: two blocks, conditions or groups differ in a measure; it is tested, planned and reported first."""
 
     measure: Id = Field(
-        description='"threshold", "exponent", "d_prime" or "pse" of blocks of levels, or the id of a statement.'
+        default="threshold",
+        description='"threshold", "exponent", "d_prime" or "pse" of blocks of levels, or the id of a statement.',
     )
     blocks: tuple[Id, ...] = Field(
         min_length=1, max_length=2, description="The two blocks that are compared, or the one of conditions or groups."

@@ -18,7 +18,8 @@ from study_app.psychophysics.families import CLIP, Family, success
 
 Values = tuple[float, ...]
 
-Z_975: Final = 1.959964
+Z_95: Final = 1.959964
+"""Half the 95 % interval of a normal distribution [standard deviations]."""
 
 FREE_GUESSES: Final[Values] = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
 """Guess rates if the answers to noise trials determine it."""
@@ -42,7 +43,7 @@ class Grid:
         The lapse rates and their prior weights.
     guesses : tuple of float or None
         Guess rates, of equal prior weight; None: the guess rate equals the lapse rate.
-    wander : tuple of float
+    session_sd : tuple of float
         Standard deviation of a person's threshold from one session to the next: a constant part [u], and a part that
         is a share of the threshold.
     """
@@ -54,7 +55,7 @@ class Grid:
     lapses: Values
     lapse_prior: Values
     guesses: Values | None
-    wander: tuple[float, float] = (0.0, 0.0)
+    session_sd: tuple[float, float] = (0.0, 0.0)
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -114,22 +115,22 @@ class Posterior:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The ends of the 95 % interval of the person's threshold [u]: equal-tailed, widened by `wander`."""
-        middle, own = self.threshold, Z_975 * self.wander
+        """The ends of the 95 % interval of the person's threshold [u]: equal-tailed, widened by `session_sd`."""
+        middle, own = self.threshold, Z_95 * self.session_sd
         below, above = (math.hypot(self.quantile(share) - middle, own) for share in (0.025, 0.975))
         return middle - below, middle + above
 
     @cached_property
-    def wander(self) -> float:
+    def session_sd(self) -> float:
         """Standard deviation of the person's threshold about that of the answers [u]."""
-        constant, share = self.grid.wander
+        constant, share = self.grid.session_sd
         return math.hypot(constant, share * self.threshold)
 
     @property
     def variance(self) -> float:
         """The variance of the person's threshold [u²]."""
         thresholds = np.array(self.grid.thresholds)
-        return float(self.marginal @ (thresholds - float(self.marginal @ thresholds)) ** 2) + self.wander**2
+        return float(self.marginal @ (thresholds - float(self.marginal @ thresholds)) ** 2) + self.session_sd**2
 
     @property
     def others(self) -> tuple[float, float, float]:
@@ -147,9 +148,9 @@ class Posterior:
     def band(self, levels: ArrayLike) -> NDArray[np.float64]:
         """Return the ends of the pointwise 95 % band of ψ at ``levels`` [u], shape (2, levels)."""
         weights, ends = self.weights, []
-        if self.wander:
+        if self.session_sd:
             thresholds = np.array(self.grid.thresholds)
-            kernel = np.exp(-0.5 * ((thresholds[:, None] - thresholds) / self.wander) ** 2)
+            kernel = np.exp(-0.5 * ((thresholds[:, None] - thresholds) / self.session_sd) ** 2)
             weights = np.einsum("ax,xbcd->abcd", kernel / kernel.sum(axis=0), weights)
         weights = weights.ravel()
         for row in self.grid.success(levels).reshape(np.size(levels), -1):
@@ -171,7 +172,7 @@ def fit(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid
         The cells and their prior.
     """
     _, log_success, log_failure = tables(
-        replace(grid, width_prior=None, wander=(0.0, 0.0)), tuple(np.asarray(levels, float).tolist())
+        replace(grid, width_prior=None, session_sd=(0.0, 0.0)), tuple(np.asarray(levels, float).tolist())
     )
     log_likelihood = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
     log_likelihood += np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure)

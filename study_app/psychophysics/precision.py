@@ -11,13 +11,13 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from study_app.psychophysics.families import Floats
+from study_app.psychophysics.grid import Z_95
 
 BETWEEN_PEOPLE: Final = 1.2
 """Factor (one standard deviation of the logarithm) between the thresholds of people. [choice]"""
 ESTIMATE_NOISE: Final = 0.25
 """Standard deviation of the logarithm of a simulated magnitude estimate. [choice]"""
 _COVERED: Final = 0.95
-_Z: Final = 1.959964
 
 
 class Estimates(NamedTuple):
@@ -103,7 +103,7 @@ def student_975(freedom: int) -> float:
     With t = √ν tan θ the distribution function is the integral of cos^(ν−1) θ.
     """
     if freedom > 2000:
-        return _Z * (1.0 + (1.0 + _Z**2) / (4.0 * freedom))
+        return Z_95 * (1.0 + (1.0 + Z_95**2) / (4.0 * freedom))
     angles = np.linspace(0.0, math.pi / 2, 40001)
     heights = np.cos(angles) ** (freedom - 1)
     areas = np.concatenate(([0.0], np.cumsum(heights[1:] + heights[:-1])))

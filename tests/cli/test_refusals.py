@@ -154,3 +154,11 @@ def test_a_survey_of_liquids_is_written_into_a_folder(monkeypatch: pytest.Monkey
 def test_at_the_bench_enter_alone_answers_only_the_question_to_let_go() -> None:
     asked: Any = SimpleNamespace(ask=lambda kind, _words: kind)
     assert [_ask_operator(asked)(kind, "") for kind in ("let-go", "hang")] == ["let-go", "reading"]
+
+
+@pytest.mark.parametrize("command", ["run", "resume"])
+def test_the_former_name_of_the_operator_is_taken_with_a_notice(command: str) -> None:
+    told = CliRunner().invoke(commands, [command, "nowhere", "--by=AK"])
+    assert "--by is --operator now" in told.output
+    assert "No such option" not in told.output
+    assert "No such option" in CliRunner().invoke(commands, ["verify", "nowhere", "--by=AK"]).output

@@ -42,8 +42,7 @@ def _of_blocks(
         for finding in all_findings():
             if finding.figure_name:
                 several = len(finding.kinds) > 1 and len(study.blocks) > 1
-                own = f"{finding.figure_name}-{block.id}" if several else ""
-                name = own or block_name(study, block, finding.figure_name)
+                name = f"{finding.figure_name}-{block.id}" if several else block_name(study, block, finding.figure_name)
                 drawing = Drawing(study, block, found, results, name, forms)
                 yield block.id, name, partial(finding(found, results).figure, drawing)
 

@@ -15,7 +15,7 @@ from study_app.analysis.data.measures import Array, medians, presentations
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import Drawing, Picture
 from study_app.analysis.report.html_page import drawn
-from study_app.analysis.results import BlockResult, Failures, NotTested, Results, Tested, Verdict
+from study_app.analysis.results import BlockResult, Failure, Failures, NotTested, Results, Tested, Verdict
 from study_app.analysis.statistics.outcome import DRAWS, Outcome, draws_for, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import DRAWN_UP_TO
 from study_app.store.tables.csv_files import Column, optional
@@ -36,11 +36,11 @@ class BlockAnswers:
     """A block's answers as arrays, settings in their order; NaN where one is missing.
 
     ``values`` (participants, settings) are the medians of ``single`` answers (participants, settings, presentations);
-    ``sessions`` of the same shape are the sessions in which these were given. ``sites`` are those of
-    the participants of a merged study. ``verdicts_only``: leave out what decides no verdict, for thousands of simulated
-    studies. ``over_all`` is the one test over all statements, ``gate`` its p corrected by Holm over the blocks of the
-    study: no adjusted p of a statement is below it, so that in a study where nothing differs anything is found at most
-    as often as alpha says.
+    ``sessions`` of the same shape are the sessions in which these were given. ``sites`` are those of the
+    participants of a merged study. ``verdicts_only``: leave out what decides no verdict, for thousands of simulated
+    studies. ``over_all`` is the one test over all statements, or why it failed, ``gate`` its p corrected by Holm over
+    the blocks of the study: no adjusted p of a statement is below it, so that in a study where nothing differs anything
+    is found at most as often as alpha says.
     """
 
     block: Block
@@ -53,7 +53,7 @@ class BlockAnswers:
     sessions: Mapping[str, Array]
     verdicts_only: bool = False
     sites: tuple[str, ...] = ()
-    over_all: Outcome | None = None
+    over_all: Outcome | Failure | None = None
     gate: float = 0.0
 
     @property
@@ -81,8 +81,8 @@ class BlockAnswers:
 
     def verdict(self, p: float | None, least: float | None, *, primary: bool) -> Verdict:
         """Return what may be said of a test of one statement, see `verdict`; nothing is shown that the gate hides."""
-        smallest = 0.0 if self.over_all is None else self.over_all.smallest_p or 0.0
-        bounds = None if least is None else max(least, smallest)
+        smallest = self.over_all.smallest_p if isinstance(self.over_all, Outcome) else None
+        bounds = None if least is None else max(least, smallest or 0.0)
         return verdict(None if p is None else max(p, self.gate), bounds, self.decided.alpha, primary=primary)
 
     @property

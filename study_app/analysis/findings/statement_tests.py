@@ -30,6 +30,7 @@ from study_app.analysis.findings.finding import (
 from study_app.analysis.report.html_page import heading, paragraph, table_of
 from study_app.analysis.results import (
     BlockResult,
+    Failure,
     NotTested,
     Tested,
     all_of,
@@ -251,20 +252,20 @@ class SessionsDiffer(StatementTests):
 def gated(blocks: Sequence[BlockAnswers], draws: int | None = None) -> tuple[BlockAnswers, ...]:
     """Return the answers of a study's blocks, each with its test over all statements and the gate that it gives.
 
-    ``draws``: so many rearrangements, if not as usual.
+    ``draws``: so many rearrangements, if not as usual. Where the test fails, the gate is closed.
     """
-    tests = [
-        None
-        if answers.k < 2
-        else global_permutation(
-            np.array(list(answers.values.values())), draws=draws or answers.draws_over_all, seed=answers.seed
-        )
-        for answers in blocks
-    ]
-    adjusted = holm([None if test is None else test.p for test in tests])
+
+    def test(answers: BlockAnswers) -> Outcome | None:
+        if answers.k < 2:
+            return None
+        values = np.array(list(answers.values.values()))
+        return global_permutation(values, draws=draws or answers.draws_over_all, seed=answers.seed)
+
+    tests = [one.failures.attempt(OverAll.what, partial(test, one), block=one.block.id) for one in blocks]
+    adjusted = holm([one.p if isinstance(one, Outcome) else None for one in tests])
     return tuple(
-        replace(answers, over_all=test, gate=1.0 if p is None else p)
-        for answers, test, p in zip(blocks, tests, adjusted, strict=True)
+        replace(answers, over_all=one, gate=1.0 if p is None else p)
+        for answers, one, p in zip(blocks, tests, adjusted, strict=True)
     )
 
 
@@ -280,6 +281,8 @@ class OverAll(Finding[Outcome | None]):
 
     @classmethod
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[Outcome | None, Absent]:
+        if isinstance(answers.over_all, Failure):
+            return None, (NotTested(cls.what, answers.over_all.why),)
         return answers.over_all, ()
 
     def rows(self) -> Iterator[Row]:
@@ -338,16 +341,15 @@ class Effects(Finding[tuple[Effect, ...]]):
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Effect, ...], Absent]:
         if answers.verdicts_only or answers.k < 2:
             return (), ()
-        codes = dict.fromkeys(answers.block.columns.values())
-        firsts = {column: code for code, column in reversed(answers.block.columns.items())}
+        codes = {column: code for code, column in reversed(answers.block.columns.items())}
         effects = []
         for item, values in answers.values.items():
-            for column in list(codes)[1:]:
+            for column in range(1, answers.k):
                 away = values[:, column] - values[:, 0]
                 away = away[~np.isnan(away)]
                 ends = student_interval(away)
                 mean = float(away.mean()) if len(away) else None
-                effects.append(Effect(item, firsts[column], len(away), mean, *ends))
+                effects.append(Effect(item, codes[column], len(away), mean, *ends))
         return tuple(effects), ()
 
     def section(self) -> Iterator[str]:

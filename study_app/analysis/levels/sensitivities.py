@@ -26,8 +26,8 @@ from study_app.analysis.levels.thresholds import Exponents, Thresholds
 from study_app.analysis.results import LevelsResult, number
 from study_app.protocol.trials.presentation import arrangement_of
 from study_app.psychophysics.detection import Sensitivity, rating
+from study_app.psychophysics.grid import Z_95
 
-Z_95: Final = 1.959964
 MODELS: Final = {
     "differencing": " d′ is that of the differencing model, since standards vary from trial to trial.",
     "independent": " d′ is that of independent observations; the differencing model is in the table of thresholds.",

@@ -43,12 +43,12 @@ from study_app.analysis.statistics.thresholds import (
     FEWEST,
     SETS,
     WORST,
+    change_score,
     drift,
     group_mean,
     p_of_fit,
-    trend,
 )
-from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, WANDER_DECADES, Assumed, Stimulus, analysis_grid
+from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
 from study_app.psychophysics.grid import Posterior, fit
 
@@ -160,15 +160,15 @@ def _fitted(
     A threshold that changed is uncertain by the standard deviation of one that changes evenly, in addition to how far
     it is from one session to the next.
     """
-    counts, wander = counts_of(stimulus, rows), WANDER_DECADES / math.sqrt(rows["session"].nunique())
-    grid = analysis_grid(stimulus, block.design, assumed, wander)
+    counts, session_sd = (counts_of(stimulus, rows), SESSION_SD / math.sqrt(rows["session"].nunique()))
+    grid = analysis_grid(stimulus, block.design, assumed, session_sd)
     found = fit(counts.levels, counts.successes, counts.failures, grid)
-    score, information = trend(rows["success"].to_numpy(dtype=bool), counts.levels[counts.places], found)
+    score, information = change_score(rows["success"].to_numpy(dtype=bool), counts.levels[counts.places], found)
     if score**2 <= CHANGED**2 * information:
         return counts, found, 0.0
     decade = 1.0 if stimulus.spacing == "log" else abs(found.threshold) * math.log(10)
     change = score * decade / (information * decade**2 + math.log10(CHANGE_PRIOR) ** -2)
-    grid = analysis_grid(stimulus, block.design, assumed, math.hypot(wander, change / math.sqrt(12)))
+    grid = analysis_grid(stimulus, block.design, assumed, math.hypot(session_sd, change / math.sqrt(12)))
     return counts, replace(found, grid=grid), change
 
 
@@ -403,7 +403,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"at the levels delivered to the hand. The width, from 5 to 95 % of the rise, has a log-normal prior; "
             f"the next column is the threshold under a flat one. “Above” and “below” mark thresholds beyond the "
             "levels presented. Intervals include that a person’s threshold differs between sessions by a factor of "
-            f"{10**WANDER_DECADES:.2f} (one standard deviation), and a change over the trials. The group is the "
+            f"{10**SESSION_SD:.2f} (one standard deviation), and a change over the trials. The group is the "
             "random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from three participants on."
             f"{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of "
             f"trial number and deviance residual, with “!” where the threshold changes over the trials by more than "
@@ -509,7 +509,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "answers at the levels delivered to the hand. The deviance was compared with that of "
                 f"{SETS} simulated sets of answers, and drift is the correlation of trial number and deviance residual "
                 "(Wichmann & Hill 2001). Intervals include that a person’s threshold differs between sessions by a "
-                f"factor of {10**WANDER_DECADES:.2f} (one standard deviation; from data of Jäkel & Wichmann 2006), and "
+                f"factor of {10**SESSION_SD:.2f} (one standard deviation; from data of Jäkel & Wichmann 2006), and "
                 f"how far it changed over the trials where that exceeded {CHANGED:g} standard errors. Group means are "
                 "random-effects means with the between-person variance of Paule and Mandel (1982) and, from "
                 f"{FEWEST} participants on, the interval of Hartung and Knapp (2001)."

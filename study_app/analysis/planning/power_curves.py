@@ -22,6 +22,7 @@ from study_app.analysis.data.measures import Array
 from study_app.analysis.figures.page_layout import Style
 from study_app.analysis.planning.simulated_studies import EFFECTS, FULL, PLANNED_DRAWS, Counts, Plan, Planned
 from study_app.analysis.results import enough
+from study_app.psychophysics.grid import Z_95
 from study_app.store.output_files import write_files
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
@@ -31,7 +32,6 @@ WANTED: Final = 0.8
 """The power that "smallest detectable effect" and "participants needed" are about."""
 
 OVER_ALL: Final = "all statements at once"
-Z95: Final = 1.959964
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +93,8 @@ def powers(plan: Plan, sizes: Sequence[int], studies: int, asked: int, seed: int
 
 def interval(share: float, studies: int) -> tuple[float, float]:
     """Return Wilson's 95 % interval of a share of simulated studies (Wilson 1927)."""
-    middle = (share + Z95**2 / (2 * studies)) / (1 + Z95**2 / studies)
-    reach = Z95 / (1 + Z95**2 / studies) * math.sqrt(share * (1 - share) / studies + Z95**2 / (4 * studies**2))
+    middle = (share + Z_95**2 / (2 * studies)) / (1 + Z_95**2 / studies)
+    reach = Z_95 / (1 + Z_95**2 / studies) * math.sqrt(share * (1 - share) / studies + Z_95**2 / (4 * studies**2))
     return max(0.0, middle - reach), min(1.0, middle + reach)
 
 

@@ -19,7 +19,7 @@ from scipy.stats import t as student
 from study_app import __version__
 from study_app.analysis.data.blocks import spoken
 from study_app.analysis.data.measures import Array
-from study_app.analysis.planning.power_curves import interval
+from study_app.analysis.planning.power_curves import WANTED, interval
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.errors import AnalysisError
@@ -32,10 +32,10 @@ from study_app.protocol.checks.expected_precision import (
 )
 from study_app.protocol.model import Protocol
 from study_app.protocol.table import text_in
+from study_app.protocol.trials.tracks import standards_of
 from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
-POWER: Final = 0.8
 BATCH: Final = 10
 """Studies of one case; which studies these are does not depend on how many are asked for."""
 TRACKS_AT_ONCE: Final = 200
@@ -310,41 +310,46 @@ def threshold_markdown(precisions: Precisions) -> str:
 
 
 def _contrasts(precisions: Precisions) -> Iterator[str]:
-    """Yield for each contrast of two blocks a table of the smallest difference that 80 % of studies show."""
+    """Yield for each contrast of two thresholds a table of the smallest difference that 80 % of studies show."""
     if (decided := precisions.protocol.analysis) is None:
         return
     for one in decided.contrasts:
-        spreads = [
-            found.spread / math.sqrt(planned.standards if isinstance(planned, ThresholdPlan) else 1)
-            for block in one.blocks
-            for planned in plans(precisions.protocol, ()).get(block, {}).values()
-            if (found := precisions.found.get((block, planned.trials))) is not None
-        ]
-        if len(one.blocks) != 2 or len(spreads) != 2 or not all(map(math.isfinite, spreads)):
+        rows = [] if one.measure != "threshold" or len(one.blocks) < 2 else [*_spreads(precisions, *one.blocks)]
+        if not rows:
             continue
-        spread = math.hypot(*spreads, math.log(BETWEEN_PEOPLE))
+        tail = decided.alpha / (2 if one.expected is None else 1)
         yield from ("", f"## Contrast: {one.described()}", "")
         yield (
-            f"The difference of one participant has a standard deviation of {spread:.0%}: that of both estimates, and "
-            f"of people, whose differences vary by a factor of {BETWEEN_PEOPLE:g}. Half the 95 % interval of the mean, "
-            f"and the smallest difference that {POWER:.0%} of studies show at α = {decided.alpha:g}, "
-            f"{'two-sided' if one.expected is None else 'one-sided'}:"
+            "SD: of the difference of one participant, that of both estimates and of people, whose differences vary by "
+            f"a factor of {BETWEEN_PEOPLE:g}. Smallest difference: what {WANTED:.0%} of studies show at α = "
+            f"{decided.alpha:g}, {'two-sided' if one.expected is None else 'one-sided'}."
         )
-        yield from ("", "| participants | half the 95 % interval | smallest difference |", "|---:|---:|---:|")
-        for n in precisions.sizes:
-            half = float(student.ppf(0.975, n - 1)) * spread / math.sqrt(n)
-            tail = decided.alpha / (2 if one.expected is None else 1)
-            shown = detectable(n, tail) * spread
-            yield f"| {n} | ×/÷ {math.exp(half):.2f} | ×/÷ {math.exp(shown):.2f} |"
+        heads = ("trials per standard", "participants", "SD", "half the 95 % interval", "smallest difference")
+        yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
+        for trials, spread in rows:
+            for n in precisions.sizes:
+                half = float(student.ppf(0.975, n - 1)) * spread / math.sqrt(n)
+                ends = (f"×/÷ {math.exp(end):.2f}" for end in (half, detectable(n, tail) * spread))
+                yield f"| {trials} | {n} | {spread:.0%} | {' | '.join(ends)} |"
+
+
+def _spreads(precisions: Precisions, first: str, second: str) -> Iterator[tuple[int, float]]:
+    """Yield numbers of trials of two blocks, and the standard deviation of a participant's difference with them."""
+    standards = [len(standards_of(precisions.protocol, precisions.protocol.blocks[block])) for block in (first, second)]
+    for trials in (trials for block, trials in precisions.found if block == first):
+        both = [found for block in (first, second) if (found := precisions.found.get((block, trials))) is not None]
+        spreads = [found.spread / math.sqrt(count) for found, count in zip(both, standards, strict=False)]
+        if len(both) == 2 and all(map(math.isfinite, spreads)):
+            yield trials, math.hypot(math.log(BETWEEN_PEOPLE), *spreads)
 
 
 def detectable(n: int, tail: float) -> float:
-    """Return the smallest mean difference, in standard deviations, that a t test of ``n`` pairs shows with ``POWER``.
+    """Return the smallest mean difference, in standard deviations, that 80 % of t tests of ``n`` pairs show.
 
     ``tail`` is the probability of each tail that counts as significant.
     """
     critical = float(student.isf(tail, n - 1))
-    return float(brentq(lambda size: nct.sf(critical, n - 1, size * math.sqrt(n)) - POWER, 0.0, 30.0))
+    return float(brentq(lambda size: nct.sf(critical, n - 1, size * math.sqrt(n)) - WANTED, 0.0, 30.0))
 
 
 def _assumed(plans_of_block: Mapping[int, Plan]) -> str:

@@ -22,14 +22,12 @@ from scipy.stats import t as student
 
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked
 from study_app.psychophysics.families import success
-from study_app.psychophysics.grid import Grid, Posterior, Values, evenly, fit, geometric, tables
+from study_app.psychophysics.grid import Z_95, Grid, Posterior, Values, evenly, fit, geometric, tables
 
 NOTICED_FROM: Final = 5.0
 """Agreement from "somewhat agree" on counts as having noticed."""
 
 SURE: Final = 0.95
-Z: Final = 1.959964
-
 RATES: Final[Values] = (0.0, 0.02, 0.06, 0.12, 0.2, 0.3, 0.4, 0.5)
 """Rates of guesses and of lapses. People who never agree are lapses of the pooled answers, and may be many of them."""
 
@@ -156,7 +154,7 @@ def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, 
     if people < 2:
         return found, 1.0, _ends(found, 1.0)
     dispersion = _dispersion(found, levels, yes, asked)
-    return found, dispersion, _ends(found, dispersion * float(student.ppf((1 + SURE) / 2, people - 1) / Z) ** 2)
+    return found, dispersion, _ends(found, dispersion * float(student.ppf((1 + SURE) / 2, people - 1) / Z_95) ** 2)
 
 
 def _dispersion(found: Posterior, levels: Array, yes: Array, asked: Array) -> float:
@@ -176,7 +174,7 @@ def _dispersion(found: Posterior, levels: Array, yes: Array, asked: Array) -> fl
         at_ends.append(yes @ log_yes[best] + (asked - yes) @ log_no[best])
     scores = (at_ends[1] - at_ends[0]) / (thresholds[last] - thresholds[first])
     low, high = found.interval
-    return max(1.0, float(scores.var(ddof=1)) * len(scores) * ((high - low) / (2 * Z)) ** 2)
+    return max(1.0, float(scores.var(ddof=1)) * len(scores) * ((high - low) / (2 * Z_95)) ** 2)
 
 
 def _ends(found: Posterior, scale: float) -> tuple[float | None, float | None]:
@@ -187,7 +185,7 @@ def _ends(found: Posterior, scale: float) -> tuple[float | None, float | None]:
     """
     thresholds = np.array(found.grid.thresholds)
     heights = np.log(np.maximum(found.marginal, 1e-300)) - float(np.log(found.marginal.max()))
-    cut = -scale * Z**2 / 2
+    cut = -scale * Z_95**2 / 2
     inside = np.flatnonzero(heights >= cut)
     ends: list[float | None] = []
     for within, beyond in ((inside[0], inside[0] - 1), (inside[-1], inside[-1] + 1)):
@@ -274,7 +272,7 @@ STEP: Final = 0.01
 """By so many widths a threshold is moved to differentiate the function."""
 
 
-def trend(successes: ArrayLike, levels: ArrayLike, found: Posterior) -> tuple[float, float]:
+def change_score(successes: ArrayLike, levels: ArrayLike, found: Posterior) -> tuple[float, float]:
     """Return score and information, at none, of a change of the threshold from first to last trial [1/u, 1/u²].
 
     Parameters

@@ -15,6 +15,8 @@ from study_app.protocol.source.document import Path, entries, has, value_at
 
 TITLES: Final = ("title", "short", "text")
 """Keys of texts that an element is called by, the first that it has."""
+NAMED: Final = 3
+"""By so many of its texts an entry without a title is called."""
 FIRST: Final = ("study",)
 """What is selected where nothing else is."""
 
@@ -65,13 +67,21 @@ def element(study: Study, path: Path, depth: int = 0) -> Element:
 
 
 def title_of(document: Mapping[str, Any], path: Path) -> str:
-    """Return what an element is called: its title in the first language, else its id with blanks and a capital."""
+    """Return what an element is called: its title in the first language, else its id with blanks and a capital.
+
+    An entry of a list without either is called by its first texts.
+    """
     value: Any = document
     for step in path:
         value = value[step] if has(value, step) else None
     if not isinstance(value, Mapping) or len(path) == 1:
         return label_of(path[-1])
-    return _called(document, value) or label_of(str(value.get("id", path[-1])))
+    if called := _called(document, value):
+        return called
+    if isinstance(path[-1], int) and "id" not in value:
+        texts = [text for held in value.values() for text in (held if isinstance(held, tuple | list) else (held,))]
+        return ", ".join([text for text in texts if isinstance(text, str)][:NAMED]) or str(path[-1] + 1)
+    return label_of(str(value.get("id", path[-1])))
 
 
 def study_title(document: Mapping[str, Any]) -> str:

@@ -141,6 +141,9 @@ def _contrast(protocol: Protocol, one: Contrast, place: Path) -> Iterator[Fault]
     """Check that the blocks of a contrast have its measure, and its conditions."""
     for name in one.blocks:
         block, asked = protocol.blocks[name], protocol.questionnaire_of(name)
+        if block.phase != "main":
+            yield Fault((*place, "blocks"), f"{name} is no main block: it is not analysed", "choose another")
+            continue
         items = [item.id for item in asked.statements] if asked is not None else []
         known = OF_LEVELS if block.design is not None else items
         if one.measure not in known:

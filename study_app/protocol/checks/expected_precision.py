@@ -35,7 +35,7 @@ from study_app.protocol.trials.tracks import (
 from study_app.psychophysics.adaptive import Answers, Observers
 from study_app.psychophysics.detection import NORMAL, rating
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.grid import fit
+from study_app.psychophysics.grid import Z_95, fit
 from study_app.psychophysics.precision import ESTIMATE_NOISE, Estimates, Expected
 
 D_PRIME: Final = 1.0
@@ -44,7 +44,6 @@ EXPONENT: Final = 0.5
 """Of simulated participants, where no exponent was published; as the answers of rehearsals. [choice]"""
 MEAN_OBSERVERS: Final = 1000
 """Of a simulated d′, d_a or exponent."""
-Z_95: Final = 1.959964
 
 
 @dataclass(frozen=True)

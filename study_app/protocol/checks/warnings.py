@@ -204,8 +204,8 @@ def _unanswerable(protocol: Protocol) -> Iterator[str]:
         )
     if protocol.format > 1 and decided is not None and decided.participants is None:
         yield (
-            "analysis.participants: no number of participants is planned: who looks at results and goes on until "
-            "something shows finds chance"
+            "analysis.participants: is missing: a study that ends at the first significant result has more false "
+            "positives than alpha"
         )
     for number, one in enumerate(() if decided is None else decided.published):
         yield from _not_bracketed(protocol, number, one)

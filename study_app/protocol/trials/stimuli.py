@@ -217,8 +217,8 @@ LAPSES: Final = (0.0, 0.02, 0.04)
 LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
 ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.05)
 ANALYSIS_LAPSE_PRIOR: Final = (0.25, 0.3, 0.2, 0.15, 0.1)
-WANDER_DECADES: Final = 0.065
-"""Standard deviation of a person's threshold from one session to the next.
+SESSION_SD: Final = 0.065
+"""Standard deviation of a person's threshold from one session to the next [decades].
 
 Six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) show 0.049 [0.034, 0.077] between series of 400 trials
 (``tests/benchmarks/analysis/people.py --spread``); people differ in it, so that it is more than the best one.
@@ -286,10 +286,10 @@ def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: t
     )
 
 
-def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, wander: float = WANDER_DECADES) -> Grid:
+def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, session_sd: float = SESSION_SD) -> Grid:
     """Return the grid over which thresholds are estimated: finer, and beyond both ends of the levels.
 
-    ``wander`` is the standard deviation of a person's threshold about that of the answers [decades].
+    ``session_sd`` is the standard deviation of a person's threshold about that of the answers [decades].
     """
     low, high = stimulus.domain
     log = stimulus.spacing == "log"
@@ -303,7 +303,7 @@ def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, wander: 
         lapses=ANALYSIS_LAPSES,
         lapse_prior=ANALYSIS_LAPSE_PRIOR,
         guesses=guesses_of(stimulus, design),
-        wander=(wander, 0.0) if log else (0.0, wander * math.log(10)),
+        session_sd=(session_sd, 0.0) if log else (0.0, session_sd * math.log(10)),
     )
 
 

@@ -123,7 +123,8 @@ def test_a_finding_that_is_one_file_stands_in_every_output(tmp_path: Path) -> No
     assert page.count("<h3>&lt;Highest&gt; answers, counted</h3>") == len(made.blocks)
     assert page.count("Which statement got most highest answers?") == len(made.blocks)
     assert page.count("&lt;Highest&gt; answers, as shares.") == 2 * len(made.blocks)  # caption and text of the picture
-    assert (tmp_path / "highest.svg").read_text("utf-8").startswith("<?xml")
+    for block in made.blocks:  # each has a file of its own
+        assert (tmp_path / f"highest-{block.id}.svg").read_text("utf-8").startswith("<?xml")
     told_window: list[object] = []
     carry_out(ReadStudy(folder), told_window.append, lambda: False)
     drawn = {one.title for one in told_window if isinstance(one, FigureDrawn) and one.name.startswith("highest")}

@@ -143,7 +143,9 @@ def test_family_and_prior_on_the_width_are_those_that_questplus_states() -> None
 
 
 def test_the_band_holds_the_function_and_is_narrow_with_many_answers() -> None:
-    grid = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")), wander=0.0)
+    grid = analysis_grid(
+        STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")), session_sd=0.0
+    )
     u = [math.log10(level) for level in LEVELS]
     psi = success("weibull", u, -0.7, 1.4, 0.5, 0.02)
     for n, widest in ((20, 0.5), (2000, 0.05)):

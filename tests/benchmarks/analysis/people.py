@@ -71,7 +71,7 @@ def pairs(trials: pd.DataFrame, size: int, draw: np.random.Generator | None = No
             correct = draw.random(len(levels)) < fitted(levels, correct, grid).success(np.log10(levels))
         pieces = [slice(first, first + size) for first in range(0, len(levels) - size + 1, size)]
         fits = [fitted(levels[piece], correct[piece], grid) for piece in pieces]
-        alone = [replace(one, grid=replace(grid, wander=(0.0, 0.0))) for one in fits]
+        alone = [replace(one, grid=replace(grid, session_sd=(0.0, 0.0))) for one in fits]
         for place in range(len(fits) - 1):
             low, high = difference(*fits[place : place + 2])
             ends, (one, other) = difference(*alone[place : place + 2]), alone[place : place + 2]

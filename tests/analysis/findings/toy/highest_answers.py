@@ -46,7 +46,7 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
                 effect=count / n,
                 interval=clopper_pearson(count, n),
             )
-            tests.append(alone(outcome, item, answers.decided, f"{found.id}: highest answers"))
+            tests.append(alone(outcome, item, answers, f"{found.id}: highest answers"))
         return tuple(tests), (NotTested("count of lowest answers", "nobody asked for it"),)
 
     def rows(self) -> Iterator[dict[str, object]]:

@@ -48,7 +48,7 @@ def test_threshold_and_interval_are_those_of_psignifit(
     assert n.sum() >= 300
     right = np.random.default_rng(levels).binomial(n, success(family, u, threshold, width, guess, lapse))
     assumed = replace(assumed_for(stimulus, default_design(design)), family=family)
-    grid = analysis_grid(stimulus, default_design(design), assumed, wander=0.0)
+    grid = analysis_grid(stimulus, default_design(design), assumed, session_sd=0.0)
     ours = fit(u, right, n - right, grid)
     median, factor = assumed.width_prior
     theirs = psignifit.psignifit(
