@@ -13,6 +13,7 @@ from study_app.protocol.checks.expected_precision import (
     threshold_plan,
 )
 from study_app.protocol.load import examined, parse, read_document
+from study_app.protocol.trials.stimuli import SESSION_SD
 
 TEXT = """
 format = 2
@@ -54,7 +55,8 @@ def test_estimates_are_unbiased_and_as_precise_as_measured():
 def test_intervals_of_1000_observers_cover_their_thresholds(trials):
     plan, rng = plan_of(study(f'kind = "questplus", trials = {trials}')), np.random.default_rng(trials)
     truth = math.log10(0.2) + math.log10(1.2) * rng.standard_normal(1000)
-    found = plan.simulate(truth, rng)
+    in_the_session = truth + SESSION_SD * rng.standard_normal(1000)
+    found = plan.simulate(in_the_session, rng)
     assert 0.93 <= ((found.lows < truth) & (truth < found.highs)).mean() <= 0.99
     assert abs((found.medians - truth).mean() * math.log(10)) <= 0.05
 
