@@ -17,7 +17,7 @@ from numpydoc.validate import validate
 
 from tests.compiled import needs_servo
 
-PACKAGES = ("haptics", "protocol", "psychophysics", "session", "store", "designer.document", "analysis.statistics")
+PACKAGES = ("haptics", "protocol", "psychophysics", "session", "store", "analysis.statistics")
 NOT_ASKED = {
     "ES01": "an extended summary",
     "EX01": "an example everywhere",

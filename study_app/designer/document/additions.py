@@ -80,14 +80,12 @@ def is_unknown_name(fault: Fault) -> bool:
 
 
 def _missing(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield an initial value for a key that is missing."""
     if fault.message == "is missing" and fault.path:
         with suppress(Refused):
             yield Repair("Add it", (Set(fault.path, initial(study.document, fault.path)),))
 
 
 def _surplus(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the removal of what does not belong there."""
     message = fault.message
     if message == "unknown key" or message.endswith("is listed twice") or "belong" in message:
         yield Repair("Remove", (Unset(fault.path),))
@@ -104,7 +102,6 @@ def _quoted_numbers(study: Study, fault: Fault) -> Iterator[Repair]:
 
 
 def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield a copy of the text in the first language, for languages that lack it."""
     languages = value_at(study.document, ("study", "languages"))
     text = value_at(study.document, fault.path)
     if (lacking := fault.missing_language) and isinstance(text, Mapping) and text:
@@ -125,7 +122,6 @@ def _every_text(study: Study, fault: Fault) -> Iterator[Repair]:
 
 
 def _steps(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the place in the session that a page or block lacks."""
     sequence = value_at(study.document, ("sequence",))
     if fault.message == "comes nowhere in sequence" and isinstance(sequence, tuple):
         at = max(len(sequence) - 1, 0)
@@ -212,23 +208,8 @@ def added(
 ) -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that add an element to a section or list, as one step, and the path of the element.
 
-    Parameters
-    ----------
-    study : Study
-        The study; its existing faults stay.
-    section : tuple of str or int
-        A section of tables, as ``("liquids",)``, or a list of tables, as ``("questionnaires", "load", "items")``.
-    kind : mapping, optional
-        Initial keys of the element, such as its kind.
-    name : str
-        Preferred name of a table; "": by its section.
-    behind : str or int, optional
-        The table or entry of the section that it is written after; the last one without.
-
-    Raises
-    ------
-    Refused
-        Nothing can be added there.
+    ``kind`` are its initial keys, ``name`` is the preferred name of a table; it is written after the table or entry
+    ``behind``, else at the end.
     """
     row = row_at(study.document, section)
     if row is None or row.kind not in {"tables", "list"}:
@@ -291,11 +272,6 @@ def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, 
 
     The copy has the name ``wanted``, or the next free one, the next free code letter, and a place in the session if it
     needs one. Its texts are those of the original.
-
-    Raises
-    ------
-    Refused
-        There is no such element.
     """
     table = value_at(study.document, path)
     if not isinstance(table, Mapping):
@@ -316,15 +292,7 @@ def duplicated(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, 
 
 
 def fitted(before: Study, after: Study, path: Path) -> tuple[Edit, ...]:
-    """Return the additional edits for a copied element: a free code letter, and a place in the session.
-
-    Parameters
-    ----------
-    before, after : Study
-        The study without and with the copy.
-    path : tuple of str or int
-        The copy.
-    """
+    """Return the additional edits for a copied element: a free code letter, and a place in the session."""
     edits: list[Edit] = []
     for row in rows(after.document, path):
         if row.value is not None and rule_of(LETTER) in row.bounds:
@@ -381,13 +349,7 @@ def _numbers(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[
 
 
 def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
-    """Return the number of an element that differs in a series.
-
-    Raises
-    ------
-    Refused
-        It is not a number of the element.
-    """
+    """Return the number of an element that differs in a series."""
     found = next((row for row in number_rows(document, path) if row.path == field), None)
     if found is None:
         raise Refused("choose a number of this element")
@@ -395,13 +357,7 @@ def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
 
 
 def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float]) -> None:
-    """Refuse values that copies of an element cannot have.
-
-    Raises
-    ------
-    Refused
-        A value is not permitted, is there twice or is the element's own, or there are none or more than `MOST`.
-    """
+    """Refuse values that copies of an element cannot have."""
     known = [row.value]
     for value in values:
         if why := why_not(document, row, value):

@@ -18,22 +18,6 @@ def switched(study: Study, path: Path, kind: str | None, left: Mapping[str, Any]
 
     Keys of both kinds keep their values, the others are removed; keys that the new kind needs get the value that they
     had before, or an initial one.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    path : tuple of str or int
-        The table.
-    kind : str or None
-        Its new kind; None omits the key, if that is a kind.
-    left : mapping
-        Values of keys that were removed by earlier switches (`left_by`).
-
-    Raises
-    ------
-    Refused
-        There is no such kind.
     """
     key, node = _of_kind(study, path, kind)
     table = _table(study, path)
@@ -53,13 +37,7 @@ def switched(study: Study, path: Path, kind: str | None, left: Mapping[str, Any]
 
 
 def left_by(study: Study, path: Path, kind: str | None) -> dict[str, Any]:
-    """Return the values that `switched` removes, for a switch back.
-
-    Raises
-    ------
-    Refused
-        There is no such kind.
-    """
+    """Return the values that `switched` removes, for a switch back."""
     key, node = _of_kind(study, path, kind)
     return {
         name: value for name, value in _table(study, path).items() if name != key and name not in node["properties"]
@@ -90,13 +68,7 @@ def languages_of(study: Study) -> tuple[str, ...]:
 
 
 def with_language(study: Study, code: str) -> tuple[Edit, ...]:
-    """Return the edits that add a language: plain texts become tables, whose new texts are missing.
-
-    Raises
-    ------
-    Refused
-        The study has it, or the program has no words in it.
-    """
+    """Return the edits that add a language: plain texts become tables, whose new texts are missing."""
     there = languages_of(study)
     if code in there:
         raise Refused(f"the study is in {language_name(code)} already")
@@ -107,13 +79,7 @@ def with_language(study: Study, code: str) -> tuple[Edit, ...]:
 
 
 def without_language(study: Study, code: str) -> tuple[Edit, ...]:
-    """Return the edits that remove a language and its texts.
-
-    Raises
-    ------
-    Refused
-        It is the only one, or the study does not have it.
-    """
+    """Return the edits that remove a language and its texts."""
     there = languages_of(study)
     if code not in there or len(there) == 1:
         raise Refused("a study has at least one language")
@@ -151,21 +117,8 @@ def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:
 def moved(study: Study, entries: Sequence[Path], to: int) -> tuple[tuple[Edit, ...], tuple[Path, ...]]:
     """Return the edits that move entries of a list, in their order, before the entry ``to``, and their new paths.
 
-    Parts of the study are renumbered if they were numbered correctly before.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    entries : sequence of path
-        Entries of one list.
-    to : int
-        The index, before the move, of the entry that they come before; the length of the list for its end.
-
-    Raises
-    ------
-    Refused
-        They are not in one list.
+    ``to`` counts before the move; the length of the list stands for its end. Parts of the study are renumbered if they
+    were numbered correctly before.
     """
     places = sorted({entry[:-1] for entry in entries}, key=str)
     if len(places) != 1:
@@ -212,17 +165,7 @@ def short_of(text: str) -> str:
 
 
 def followed(study: Study, path: Path, language: str, text: str) -> tuple[Edit, ...]:
-    """Return the edit of the short text of a question whose text is typed; none if it was edited separately.
-
-    Parameters
-    ----------
-    study : Study
-        The study before the text is typed.
-    path : tuple of str or int
-        The text.
-    language, text : str
-        Its language, and the new text.
-    """
+    """Return the edit of the short text of a question whose text is typed; none if it was edited separately."""
     place = (*path[:-1], "short")
     before, short = value_at(study.document, path), value_at(study.document, place)
     if path[-1] != "text" or isinstance(before, Mapping) != isinstance(short, Mapping):

@@ -187,15 +187,7 @@ def place_words(path: Path, line: int | None) -> str:
 
 
 def brief(document: Mapping[str, Any], path: Path) -> str:
-    """Return how long a task takes, or how many questions a questionnaire has; "" of other elements.
-
-    Parameters
-    ----------
-    document : mapping
-        The study, sound or not.
-    path : tuple of str or int
-        The element.
-    """
+    """Return how long a task takes, or how many questions a questionnaire has; "" of other elements."""
     value = value_at(document, path)
     if not isinstance(value, Mapping) or len(path) != 2:
         return ""
@@ -277,7 +269,6 @@ def found_in_elements(study: Study, words: str) -> Mapping[Path, FoundField]:
 
 @lru_cache(maxsize=2)
 def _fields(study: Study) -> tuple[tuple[Path, Row, str], ...]:
-    """Return every field of every element, with its label."""
     shown = outline(study)
     parts = [one.path for one in (*shown.session, *shown.parts) if len(one.path) > 1]
     elements = dict.fromkeys((*parts, *(one.path for one in shown.study)))

@@ -304,7 +304,6 @@ def is_localised(nodes: tuple[Node, ...]) -> bool:
 
 
 def _numbers_in(node: Node) -> Node:
-    """Return the schema of the numbers in an array."""
     while node.get("type") == "array":
         node = node["prefixItems"][0] if "prefixItems" in node else next(alternatives(node["items"]))
     return node
@@ -374,13 +373,7 @@ def new_text(section: str | int) -> str:
 
 
 def initial(document: Mapping[str, Any], path: Path) -> Any:
-    """Return a valid value for a key that is not in the study.
-
-    Raises
-    ------
-    Refused
-        The key is not known.
-    """
+    """Return a valid value for a key that is not in the study."""
     row = row_at(document, path)
     if row is None or row.kind == "unknown":
         raise Refused(f"{label_of(path[-1])} is not a key of this table")

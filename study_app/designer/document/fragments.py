@@ -30,15 +30,7 @@ class Pasted:
 
 
 def copied(study: Study, paths: Sequence[Path]) -> str:
-    """Return elements as TOML, each with its own comments; "" where none of them is a table.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    paths : sequence of path
-        Tables, and entries of arrays of tables.
-    """
+    """Return elements as TOML, each with its own comments; "" where none of them is a table."""
     spans = spans_of(study.text)
     found: list[str] = []
     for path in paths:
@@ -59,11 +51,6 @@ def pasted(study: Study, selected: Path, text: str) -> Pasted:
 
     Names already in use get a number, also in references within the pasted text. Lines that are not TOML become
     questions of the selected questionnaire.
-
-    Raises
-    ------
-    Refused
-        The text contains no element of a study, or there is no element to paste it into.
     """
     text = text.replace("\r\n", "\n").strip("\n") + "\n"
     try:

@@ -69,21 +69,7 @@ def sections_at(place: Path) -> tuple[str, ...]:
 def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str] = frozenset()) -> tuple[Edit, ...]:
     """Return the edits that rename a table or item, and every text that names it.
 
-    Parameters
-    ----------
-    document : mapping
-        The study.
-    thing : tuple of str or int
-        The table or item.
-    name : str
-        Its new name.
-    recorded : sequence of str
-        Names with recorded answers: where the new one is refused, only its own one of them is proposed.
-
-    Raises
-    ------
-    Refused
-        The name is taken, or is not an id.
+    Where the name is refused, a free one is proposed that is not one of those with ``recorded`` answers.
     """
     item = _item_id(document, thing)
     taken = taken_beside(document, thing)
@@ -132,15 +118,7 @@ def replaced(document: Document, thing: Path, other: str) -> tuple[Edit, ...]:
 def with_references(document: Document, thing: Path, needs: Callable[[Path], bool]) -> tuple[Path, ...]:
     """Return the paths of all that must go with a thing, itself last: list entries, keys and whole tables.
 
-    Parameters
-    ----------
-    document : mapping
-        The study.
-    thing : tuple of str or int
-        What is deleted.
-    needs : callable
-        Returns whether the table around a key would be incomplete without it (`Study.needs`); then it goes, too. So
-        does one whose list would be empty.
+    A table whose key ``needs`` says that it cannot be without goes too, and so does one whose list would be empty.
     """
     named: dict[Path, list[Path]] = {}
     for place, target in _uses_in_turn(document):
@@ -178,13 +156,7 @@ def deletions(paths: Iterable[Path]) -> tuple[Edit, ...]:
 
 
 def check_id(name: str, free: str = "") -> None:
-    """Refuse what is not an id, and propose one that is.
-
-    Raises
-    ------
-    Refused
-        It is not small letters, digits and underscores with a letter first.
-    """
+    """Refuse what is not an id, and propose one that is."""
     plain = name.isascii() and name.replace("_", "a").isalnum() and name == name.lower()
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
         rule = f"at most {MAX_ID} small letters, digits and underscores, a letter first"

@@ -70,7 +70,6 @@ class Study:
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """The faults, by path."""
         return self._examined[1]
 
     @cached_property
@@ -98,13 +97,7 @@ class Study:
 
     @property
     def trial(self) -> Trial:
-        """The same study for trial edits.
-
-        Raises
-        ------
-        Refused
-            The text is not TOML.
-        """
+        """The same study for trial edits."""
         if (document := self._read[0]) is None:
             raise Refused(_NOT_TOML)
         found = Trial("", self.folder, source=document)
@@ -113,13 +106,7 @@ class Study:
         return found
 
     def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
-        """Return the study after some edits, one after the other, and their splices.
-
-        Raises
-        ------
-        Refused
-            The text is not TOML, or an edit makes no sense.
-        """
+        """Return the study after some edits, one after the other, and their splices."""
         if not self.is_toml:
             raise Refused(_NOT_TOML)
         text, steps = self.text, list[Splices]()
@@ -129,13 +116,7 @@ class Study:
         return self._with(text), tuple(steps)
 
     def typed(self, text: str) -> tuple[Study, tuple[Splices, ...]]:
-        """Return the study with another text, and the one splice that makes it.
-
-        Raises
-        ------
-        Refused
-            The text cannot be written as UTF-8.
-        """
+        """Return the study with another text, and the one splice that makes it."""
         check_encodable(text)
         old = self.text
         first, last = common_ends(old, text)
@@ -143,7 +124,6 @@ class Study:
         return (self, ()) if old == text else (self._with(text), ((splice,),))
 
     def spliced(self, steps: tuple[Splices, ...]) -> Study:
-        """Return the study with splices applied in sequence."""
         text = self.text
         for step in steps:
             text = applied(text, step)
@@ -168,17 +148,10 @@ class Trial(Study):
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
-        """The tables, arrays as tuples."""
         return {key: value for key, value in self.source.items() if key != TABLE}
 
     def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
-        """Return the study after some edits, one after the other, with no splices.
-
-        Raises
-        ------
-        Refused
-            An edit makes no sense.
-        """
+        """Return the study after some edits, one after the other, with no splices."""
         document = dict(self.source)
         for edit in edits:
             document = meaning(document, edit)
@@ -186,13 +159,7 @@ class Trial(Study):
 
 
 def read(source: bytes, folder: File = File()) -> Study:
-    """Return the study from a file's bytes.
-
-    Raises
-    ------
-    Refused
-        They are not UTF-8 text.
-    """
+    """Return the study from a file's bytes."""
     try:
         return Study(source.decode("utf-8"), folder)
     except UnicodeDecodeError as error:
@@ -223,24 +190,7 @@ class History:
     undone: tuple[Step, ...] = ()
 
     def edited(self, words: str, *edits: Edit, select: Path | None = None, joins: bool = False) -> History:
-        """Return the history after a step of some edits.
-
-        Parameters
-        ----------
-        words : str
-            What the step does.
-        *edits : Edit
-            Made one after the other.
-        select : tuple of str or int or None
-            What is selected after it; None leaves the selection.
-        joins : bool
-            Whether it continues the last step, as letters of one text do.
-
-        Raises
-        ------
-        Refused
-            An edit makes no sense; nothing is changed.
-        """
+        """Return the history after a step of some edits."""
         return self._after(*self.study.edited(*edits), words, select, joins=joins)
 
     def typed(self, words: str, text: str, *, joins: bool = False) -> History:
@@ -261,7 +211,6 @@ class History:
         return History(study, selected, (*done, step)[-MOST_STEPS:])
 
     def undo(self) -> History:
-        """Return the history before its last step; the same where there is none."""
         if not self.done:
             return self
         *done, step = self.done
@@ -269,7 +218,6 @@ class History:
         return History(study, step.before, tuple(done), (*self.undone, step))
 
     def redo(self) -> History:
-        """Return the history after the step that was undone last; the same where there is none."""
         if not self.undone:
             return self
         *undone, step = self.undone

@@ -140,7 +140,6 @@ def _add_line(spans: Spans, edit: Editor, owner: Node | None, path: Path, value:
 
 
 def _add_pair(spans: Spans, edit: Editor, owner: Node, path: Path, value: Any) -> None:
-    """Add a pair to an inline table, after its last one."""
     inner = [piece for piece in spans.pieces(path[:-1])[:1] if piece.node is owner]
     if not inner or spans.text[owner.value] != "{":
         raise Refused("a value that is not a table has no keys")
@@ -467,15 +466,7 @@ class WriterError(AssertionError):
 
 
 def apply(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
-    """Return the text after an edit, and the splices of its steps, each of the text before it.
-
-    Raises
-    ------
-    Refused
-        The edit makes no sense in this text.
-    WriterError
-        The edit was written wrongly; this is a bug.
-    """
+    """Return the text after an edit, and the splices of its steps, each of the text before it."""
     document = _read(text)
     meant = meaning(document, edit)
     steps: list[Splices] = []
@@ -506,13 +497,7 @@ def _read(text: str) -> Document:
 
 
 def meaning(document: Mapping[str, Any], edit: Edit) -> Document:
-    """Return the document that an edit means; what it does not change is shared with the document before.
-
-    Raises
-    ------
-    Refused
-        The edit makes no sense in this document.
-    """
+    """Return the document that an edit means; what it does not change is shared with the document before."""
     found: Document = dict(document)
     *parent, last = edit.path
     if isinstance(edit, Set):
@@ -602,13 +587,7 @@ def _check_value(value: Any) -> None:
 
 
 def check_encodable(text: str) -> None:
-    """Refuse a text that UTF-8 cannot write.
-
-    Raises
-    ------
-    Refused
-        It holds half of a character that needs two units of UTF-16.
-    """
+    """Refuse a text that UTF-8 cannot write."""
     if any("\ud800" <= letter <= "\udfff" for letter in text):
         raise Refused("the text holds half a character, which UTF-8 cannot write: type it again")
 

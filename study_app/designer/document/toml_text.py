@@ -57,7 +57,6 @@ class Editor:
             self._found.append(Splice(start, before, after))
 
     def insert(self, at: int, after: str) -> None:
-        """Insert a text."""
         self.replace(at, at, after)
 
     def delete(self, start: int, end: int) -> None:
@@ -90,13 +89,7 @@ def common_ends(
 
 
 def applied(text: str, splices: Iterable[Splice]) -> str:
-    """Return a text with splices applied.
-
-    Raises
-    ------
-    ValueError
-        The text does not hold what a splice replaces.
-    """
+    """Return a text with splices applied."""
     parts: list[str] = []
     end = 0
     for at, before, after in splices:
@@ -204,7 +197,6 @@ class Spans:
             yield node
 
     def headers(self) -> Iterator[Node]:
-        """Yield every header."""
         return (node for node in self._lines if node.kind != "key")
 
     def line_end(self, node: Node | None) -> int:
@@ -305,16 +297,8 @@ def header_text(path: Iterable[str | int]) -> str:
 def written(value: Any, like: str = "", newline: str = "\n", indent: str = "", column: int = 0) -> str:
     """Return a value, as ``tomllib`` reads it, as TOML.
 
-    Parameters
-    ----------
-    value : str or bool or int or float
-        Or a date, a table or an array.
-    like : str
-        The text of the value that it replaces, or of a neighbour: its quotes and its lines are kept where possible.
-    newline, indent : str
-        The text's line break, and what a line begins with on which the value begins.
-    column : int
-        Characters on the line before the value.
+    ``like`` is the text that it replaces, or of a neighbour: its quotes and its lines are kept where possible;
+    ``indent`` and ``column`` are what precedes the value on its line.
     """
     if isinstance(value, str):
         return _string(value, like, newline)

@@ -184,12 +184,10 @@ class FormHead(QWidget):
         self.unlock.setAccessibleDescription(why)
 
     def edit_id(self) -> None:
-        """Go to the id."""
         self.id.setFocus(Qt.FocusReason.ShortcutFocusReason)
         self.id.selectAll()
 
     def refuse(self, sentence: str, free: str = "") -> None:
-        """Say why the id cannot be changed, and offer one that is free."""
         self.refusal.show_refusal(sentence, free)
         self.id.show_refused(bool(sentence))
 
@@ -426,7 +424,6 @@ class FormCard(Card):
         whole.addStretch(1)
 
     def _adds(self, section: Section) -> QGridLayout:
-        """Return the buttons of the keys that can be added to a section."""
         grid = QGridLayout()
         grid.setSpacing(0)
         for at, absent in enumerate(section.absent):
@@ -454,7 +451,6 @@ class FormCard(Card):
 
     @property
     def rows(self) -> list[RowWidget]:
-        """Every row of the form."""
         self._finish()
         return self._made
 
@@ -519,7 +515,6 @@ class FormCard(Card):
         self._chosen = None
 
     def flush(self) -> None:
-        """Hand on what is being typed."""
         self.head.id.flush()
         for part in self.inside.findChildren(QWidget):
             if isinstance(part, TypedLine | TypedText):
@@ -545,7 +540,6 @@ class FormCard(Card):
         return True
 
     def focus_first(self) -> None:
-        """Give the keyboard to the first row."""
         if self.rows:
             self.focus(self.rows[0].row.row.path)
 
@@ -569,7 +563,6 @@ class FormCard(Card):
         self._reveal(row)
 
     def refuse(self, path: tuple[str | int, ...], sentence: str) -> None:
-        """Say at the field of a place why it was not changed."""
         inner = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
         found = max(inner, key=lambda row: len(row.row.row.path), default=None)
         if found is not None:
@@ -586,7 +579,6 @@ class FormCard(Card):
             row.show_repairs(self._known)
 
     def repairs_of(self, problem: ProblemRow) -> list[RepairButton]:
-        """Return the buttons that repair a problem."""
         return [button for row in self._made for button in row.repairs if button.problem == problem]
 
     def _come(self, row: RowWidget) -> None:

@@ -50,11 +50,9 @@ class Field(QWidget):
         raise NotImplementedError
 
     def take_keyboard(self) -> None:
-        """Give the keyboard to the editor."""
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def set_value(self, value: Any, *, typing: bool = False) -> None:
-        """Ask for a value."""
         self.asked.emit(SetValue(self.row.row.path, value, typing))
 
     def placeholder(self) -> str:

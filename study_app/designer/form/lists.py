@@ -186,7 +186,6 @@ class EntryList(Field):
         self.box.addWidget(self.list)
 
     def add_row(self, words: str, *parts: QWidget | tuple[QWidget, int], faulty: bool = False) -> EntryRow:
-        """Add an entry that shows some parts."""
         made, item = EntryRow(words, parts, faulty=faulty), QListWidgetItem(self.list)
         item.setData(Qt.ItemDataRole.AccessibleTextRole, words)
         item.setSizeHint(QSize(0, FIELD_PX + 2))
@@ -206,7 +205,6 @@ class EntryList(Field):
 
     @property
     def chosen(self) -> tuple[int, ...]:
-        """The entries that are selected."""
         return tuple(sorted(index.row() for index in self.list.selectedIndexes()))
 
     def choose(self, indexes: Iterable[int]) -> None:
@@ -220,11 +218,9 @@ class EntryList(Field):
         (self.list if self.chosen else self).setFocus(Qt.FocusReason.OtherFocusReason)
 
     def place(self, at: int) -> tuple[str | int, ...]:
-        """Return the place of an entry in the study."""
         return (*self.row.row.path, at)
 
     def open(self, at: int) -> None:
-        """Open what an entry names."""
         if at < len(self.row.entries) and (target := self.row.entries[at].target):
             self.asked.emit(Do("select", (target,)))
 
@@ -330,7 +326,6 @@ class EntriesField(EntryList):
             shown.line.addWidget(note)
 
     def place(self, at: int) -> tuple[str | int, ...]:
-        """Return the place of an entry in the study."""
         return self.row.entries[at].path
 
 

@@ -249,7 +249,6 @@ class RowWidget(Themed, QWidget):
         self.say()
 
     def say(self) -> None:
-        """Show what is wrong."""
         found = [sentence for sentence in (self.refusal, self.field.refusal, *self.row.faults) if sentence]
         times = Counter(found)
         if found or "wrong" in self.__dict__:

@@ -174,7 +174,6 @@ class Form:
 
     @property
     def rows(self) -> tuple[FormRow, ...]:
-        """Every row."""
         return tuple(row for section in self.sections for row in section.rows)
 
 

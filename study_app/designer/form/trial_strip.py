@@ -47,7 +47,6 @@ class Phase:
 
     @property
     def duration(self) -> str:
-        """The duration in words."""
         exact = not self.about and bool(self.field) and str(self.field[-1]).endswith("_s")
         found = exact_duration(self.duration_s, self.duration_s) if exact else duration(self.duration_s, tenths=True)
         return f"{'about ' if self.about else ''}{found}"
@@ -62,13 +61,11 @@ class TrialStrip:
 
     @property
     def sentence(self) -> str:
-        """The trial in a sentence."""
         listed = ", ".join(f"{phase.name} {phase.duration}" for phase in self.phases)
         return f"One trial of {self.duration}: {listed}."
 
     @property
     def duration(self) -> str:
-        """How long it takes, in words."""
         return duration(self.duration_s, tenths=True)
 
 

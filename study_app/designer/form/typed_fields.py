@@ -55,13 +55,11 @@ class _Typed(_Base):
         self._rest.timeout.connect(self._flush_after_click)
 
     def note(self) -> None:
-        """Note that something was typed."""
         self.pending = True
         if self.rests and not self._rest.isActive():
             self._rest.start(HAND_ON_MS)
 
     def flush(self) -> None:
-        """Hand on what was typed."""
         self._rest.stop()
         if self.pending:
             self.pending = False
@@ -191,7 +189,6 @@ class TypedLine(_Typed, QLineEdit):
         return (self.selectionStart(), self.selectionEnd(), length) if self.hasSelectedText() else (at, at, length)
 
     def show_text(self, text: str) -> None:
-        """Show a text, unless something else is being typed."""
         if not self.pending and text != self.text():
             at = self.cursorPosition()
             self.setText(text)
@@ -234,7 +231,6 @@ class TypedText(_Typed, QPlainTextEdit):
         return QSize(120, 118)
 
     def show_text(self, text: str) -> None:
-        """Show a text, unless something else is being typed."""
         if not self.pending and text != self.words():
             self._showing = True
             self.setPlainText(text)  # Qt makes a paragraph of each separator of lines: the words may be others

@@ -36,7 +36,6 @@ class LevelWords:
 
     @property
     def unit(self) -> str:
-        """The unit of a level."""
         return "%" if self.stimulus.level_kind == "weber" else self.value_unit
 
     @property
@@ -64,11 +63,9 @@ class LevelWords:
         return success_name(self.design, self.stimulus)
 
     def number(self, level: float, digits: int = 3) -> str:
-        """Return a level without its unit."""
         return rounded(level * self.factor, digits)
 
     def words(self, level: float, digits: int = 3) -> str:
-        """Return a level with its unit."""
         return f"{self.number(level, digits)} {self.unit}".rstrip()
 
     def at(self, level: float) -> float:

@@ -165,7 +165,6 @@ class MeasuresController(QObject):
 
     @property
     def waits(self) -> bool:
-        """Whether a simulation is still to come."""
         return self.rest.isActive() or self._look.isActive()
 
     def _want(self, wanted: Simulation | None) -> None:
@@ -245,7 +244,6 @@ class MeasuresController(QObject):
         return replace(self._of_block.get(wanted.block, Simulated()), warnings=self.warnings, waiting=ANEW)
 
     def _close(self) -> None:
-        """End the process."""
         self.rest.stop()
         self._look.stop()
         client, self._client = self._client, None

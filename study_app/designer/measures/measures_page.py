@@ -57,7 +57,6 @@ class Control(QWidget):
         self.field.stepped.connect(lambda steps: self.entered.emit(self._value + steps * self._step))
 
     def show_words(self, words: str, unit: str) -> None:
-        """Call the number otherwise."""
         self.words.setText(words.removeprefix("simulated "))
         self.unit.setText(unit)
         self.unit.setVisible(bool(unit))

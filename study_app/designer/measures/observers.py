@@ -89,7 +89,6 @@ class Planted:
 
     @property
     def measurable(self) -> bool:
-        """Whether the method measures it."""
         return abs(self.bias) <= BIAS and self.coverage >= COVERAGE
 
 
@@ -258,7 +257,6 @@ def _course(plan: ThresholdPlan, answered: ObserverAnswers, check: Check) -> tup
 
 
 def _one(plan: ThresholdPlan, answered: ObserverAnswers) -> list[Asked]:
-    """Return the trials of the first observer, in the order of presentation."""
     tracks = len(answered.tracks)
     each = answered.tracks[0].levels.shape[1]
     found = []

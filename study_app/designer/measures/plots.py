@@ -64,7 +64,6 @@ class MeasurePlot(Plot):
             self.show_ticks("bottom", [])
 
     def draw(self, *shown: Any) -> None:
-        """Draw values in the colours of the theme."""
         raise NotImplementedError
 
     def apply_theme(self, theme: Theme) -> None:
@@ -78,14 +77,12 @@ class MeasurePlot(Plot):
         self.drawn.append(item)
 
     def band(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, opacity: float) -> None:
-        """Fill the space between two curves."""
         colour = QColor(self.theme.ctl if self.grey else self.theme.accent)
         colour.setAlphaF(opacity)
         curves = (pg.PlotCurveItem(x, one) for one in (low, high))
         self.add(pg.FillBetweenItem(*curves, brush=QBrush(colour)), -5)
 
     def curve(self, x: object, y: object, colour: str, width: float = 2.0, *, dashed: bool = False) -> None:
-        """Draw a curve."""
         made = pg.PlotCurveItem(np.asarray(x, float), np.asarray(y, float), antialias=True)
         made.setPen(self.stroke(colour, width, DASHED if dashed else None))
         self.add(made, 2)

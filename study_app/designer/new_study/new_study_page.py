@@ -222,7 +222,6 @@ class NoStudyCard(Card):
         add_parts(self.column, (STRETCH, 2), *centred, (STRETCH, 3))
 
     def show_studies(self, studies: tuple[StudyChoice, ...]) -> None:
-        """Offer to continue the studies with a draft that is not saved."""
         for old in self.drafts:
             remove_widget(old)
         self.drafts = []
@@ -400,7 +399,6 @@ class NewStudyPage(Themed, QWidget):
             self.buttons[to].setFocus(Qt.FocusReason.OtherFocusReason)
 
     def refuse(self, sentence: str, free: str = "") -> None:
-        """Show why the study cannot be created, and offer a short name that is free."""
         self.card.refusal.show_refusal(sentence, free)
 
     def _take_name(self, name: str) -> None:

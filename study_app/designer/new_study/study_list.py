@@ -67,7 +67,6 @@ class StudyList(Choice):
         self.setItemDelegate(StudyLine(self))
 
     def add_study(self, study: StudyChoice, *, opened: bool) -> None:
-        """Add a study, by title, file and where it is from."""
         self.addItem(study.words, study.source)
         self.setItemData(self.count() - 1, len(study.title), TITLE_ROLE)
         if opened:

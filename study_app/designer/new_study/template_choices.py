@@ -51,7 +51,6 @@ class KnownAnswer:
 
     @property
     def sentence(self) -> str:
-        """All of it in words."""
         return (
             f"Simulated: {self.planted:g} {self.unit} at 75 % correct (after {self.source}). Estimated: "
             f"{self.found:.3g} {self.unit}; in 9 of 10 simulated studies of {self.people} people {self.low:.3g} to "
@@ -176,7 +175,6 @@ def copy_choice(source: str, document: Document, note: str, name: str) -> Templa
 
 
 def _described(document: Document) -> tuple[str, str]:
-    """Return title and description of a study."""
     head = document.get("study", {})
     description = head.get("description", "") if isinstance(head, Mapping) else ""
     return study_title(document), " ".join(str(description).split())

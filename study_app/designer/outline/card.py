@@ -391,7 +391,6 @@ class OutlineCard(Card):
 
     @property
     def selected(self) -> tuple[ElementPath, ...]:
-        """The selected elements, in the order of the outline."""
         order = {row.path: at for at, row in reversed([*enumerate(self.rows)])}
         found = {row.path for row in self.tree.selected_rows()}
         return tuple(sorted(found, key=lambda path: order.get(path, 0)))

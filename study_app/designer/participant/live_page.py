@@ -144,7 +144,6 @@ class LivePage(Themed, QGraphicsView):
             self._go_to(self._view.focused)
 
     def show_tank(self, view: TankView) -> None:
-        """Draw the ball."""
         if self.page_window is not None:
             self.page_window.show_view(view)
 
@@ -179,7 +178,6 @@ class LivePage(Themed, QGraphicsView):
         return made
 
     def close_page(self) -> None:
-        """Close the participant's window."""
         if self.page_window is not None and self._proxy is not None:
             window, proxy = self.page_window, self._proxy
             self.page_window = self._proxy = None
@@ -200,7 +198,6 @@ class LivePage(Themed, QGraphicsView):
         )
 
     def _go_to(self, question: str | None) -> None:
-        """Put the page's focus on a question."""
         if self._proxy is not None and self._scene.focusItem() is not self._proxy:
             self._scene.setFocusItem(self._proxy)
         page = None if self.page_window is None else self.page_window.widget
@@ -315,7 +312,6 @@ def _close_pages() -> None:
 
 
 def _bare(page: Page | None) -> Page | None:
-    """Return a page without answers."""
     return replace(page, chosen=()) if isinstance(page, QuestionnairePage) else page
 
 

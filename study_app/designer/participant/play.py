@@ -42,7 +42,6 @@ class PlayDevices:
 
     @property
     def title(self) -> str:
-        """The words of the chosen one."""
         return dict(self.choices).get(self.chosen, "")
 
 
@@ -100,7 +99,6 @@ class PlayControls(QWidget):
         self.device.clicked.connect(lambda: self.menu.popup(self.device.mapToGlobal(self.device.rect().bottomLeft())))
 
     def show_devices(self, devices: PlayDevices) -> None:
-        """Offer devices, of which one is chosen."""
         self.devices = devices
         self.menu.clear()
         group = QActionGroup(self.menu)
@@ -114,12 +112,10 @@ class PlayControls(QWidget):
         self.device.setAccessibleName(f"Device to play with: {devices.title}")
 
     def show_playing(self, playing: bool) -> None:
-        """Offer to play unless a pilot is played."""
         self.play.setEnabled(not playing)
         self.device.setEnabled(not playing)
 
     def show_wide(self, wide: bool) -> None:
-        """Show the full text of the button, or the short one."""
         self.play.show_action("play", PLAY if wide else PLAY_NARROW)
 
 

@@ -157,7 +157,6 @@ class ParticipantPreview(Card):
     # what is asked for
 
     def enter_page(self) -> None:
-        """Give the keyboard to the page."""
         self._come_forward()
         self.page.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
@@ -184,7 +183,6 @@ class ParticipantPreview(Card):
         self._show()
 
     def go(self, by: int) -> None:
-        """Show the page of another step, so many steps on."""
         if (found := self._found) is None:
             return
         index = found.index + by
@@ -359,7 +357,6 @@ class ParticipantPreview(Card):
         return step_name(step), step.index if isinstance(step, Trial) else 0
 
     def _question(self, study: Study) -> str | None:
-        """Return the id of the question that is selected."""
         if "items" not in self._selected:
             return None
         item = value_at(study.document, self._selected[: self._selected.index("items") + 2])
@@ -460,7 +457,6 @@ class ParticipantPreview(Card):
         self.language_key.setVisible(len(self.view.languages) > 1 and self.aside.sizeHint().width() <= room_px)
 
     def offer_screens(self, sizes: tuple[ScreenSize, ...]) -> None:
-        """Offer screens to show the page for."""
         if sizes == self._screens_shown:
             return
         chosen = self.screens.currentData()

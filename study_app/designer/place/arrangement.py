@@ -268,7 +268,6 @@ class Arrangement(QWidget):
         self.outline.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def toggle_drawer(self) -> None:
-        """Open the drawer, or close it."""
         if self.outline.isVisible():
             self.close_drawer()
         else:

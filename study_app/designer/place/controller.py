@@ -45,13 +45,7 @@ REST_MS: Final = 200
 
 
 class DesignerController(QObject):
-    """Gives the designer's place what it shows, and opens studies.
-
-    Parameters
-    ----------
-    results
-        Folder that holds the studies' results folders: versions that were run are not overwritten.
-    """
+    """Gives the designer's place what it shows, and opens studies."""
 
     def __init__(self, results: Path) -> None:
         place = DesignerPlace()
@@ -203,7 +197,6 @@ class DesignerController(QObject):
                 self.place.show_step((), "Copied", fresh=False)
 
     def paste(self) -> None:
-        """Paste what is on the clipboard after the selected element."""
         if (text := QGuiApplication.clipboard().text()).strip():
             self.editing.ask(Paste(self.editing.selected, text))
 
@@ -223,7 +216,6 @@ class DesignerController(QObject):
             self.editing.ask(DeleteElement(path, also=also))
 
     def ask_for_series(self, path: Place) -> None:
-        """Ask for the values of a series, or say why there can be none."""
         if (opened := self.editing.opened) is None:
             return
         prompt = series_prompt(opened.study, path)
@@ -238,7 +230,6 @@ class DesignerController(QObject):
         self.place.show_prompt(card, card.first)
 
     def repair(self, row: ProblemRow, words: str) -> None:
-        """Make a repair, as one step."""
         offered = self._repairs.repair(row, words)
         if offered is None:
             return
@@ -258,7 +249,6 @@ class DesignerController(QObject):
             self.place.show_addable(addable(opened.study, opened.history.selected))
 
     def _offer_fields(self, words: str) -> None:
-        """Offer the fields that have the words typed in the list of what can be added."""
         if (opened := self.editing.opened) is not None:
             self.place.adding.offer_fields(fields_to_go_to(opened.study, words, opened.history.selected))
 
@@ -301,7 +291,6 @@ class DesignerController(QObject):
         self._repairs.begin(study, () if opened.read_only else problems)
 
     def find(self, words: str) -> None:
-        """Show only the elements that hold these words."""
         self._find = words
         self.show_outline()
 
@@ -318,7 +307,6 @@ class DesignerController(QObject):
         self._show_warnings()
 
     def _show_warnings(self) -> None:
-        """List the warnings after the problems."""
         if (opened := self.editing.opened) is not None:
             warned = (*self._warnings, *self.measures.warnings)
             self.place.problem_steps.show_warnings(warning_rows(opened.study, warned))

@@ -56,7 +56,6 @@ class OpenStudy:
 
     @property
     def study(self) -> Study:
-        """The study as it is now."""
         return self.history.study
 
     @property
@@ -66,7 +65,6 @@ class OpenStudy:
 
     @property
     def edited(self) -> bool:
-        """Whether it differs from the file."""
         return self.study.text != self.saved
 
     def note_edit(self, now_s: float) -> None:
@@ -78,13 +76,7 @@ class OpenStudy:
             self.kept = None
 
     def write_draft(self, now_s: float | None = None) -> bool:
-        """Write the draft if it is due, without a time at once; return whether it was written.
-
-        Raises
-        ------
-        StoreError
-            It cannot be written, or one that is obsolete cannot be deleted.
-        """
+        """Write the draft if it is due, without a time at once; return whether it was written."""
         written = self.keeper.write() if now_s is None else self.keeper.write_if_due(now_s)
         if written:
             self.kept = datetime.now().astimezone()
@@ -97,13 +89,6 @@ class OpenStudy:
         self.draft = self.kept = None
 
     def give_up(self) -> None:
-        """Delete the draft of a study that was never saved; nothing of it is left.
-
-        Raises
-        ------
-        StoreError
-            It cannot be deleted.
-        """
         self.keeper.saved("")
         self.keeper.write()
 
@@ -112,13 +97,6 @@ class OpenStudy:
         return content_hash(_content(self.file)) != self.base if self.file.exists() else bool(self.base)
 
     def take_outside(self) -> None:
-        """Take the file's content as one step.
-
-        Raises
-        ------
-        Refused
-            It is not UTF-8 text.
-        """
         content = _content(self.file)
         self.saved = read(content, self.file.parent).text
         self.rebase(content_hash(content))
@@ -127,7 +105,6 @@ class OpenStudy:
         self.kept = None
 
     def keep_mine(self, now_s: float) -> None:
-        """Let the next saving replace what another program wrote."""
         content = _content(self.file) if self.file.exists() else b""
         self.saved = content.decode("utf-8", "replace")
         self.rebase(content_hash(content) if self.file.exists() else "")
@@ -157,15 +134,7 @@ class OpenStudy:
         return standing(content_hash(self.source()), base, self.version, known)
 
     def save(self, known: tuple[Run, ...]) -> None:
-        """Write the file, and keep what sessions will be run with.
-
-        Raises
-        ------
-        Refused
-            Sessions were run with this version and another content.
-        StoreError
-            It cannot be written, or was changed outside.
-        """
+        """Write the file, and keep what sessions will be run with."""
         source = self.source()
         check_saving(content_hash(source), self.version, known)
         self._bring_files(source)
@@ -193,15 +162,7 @@ class OpenStudy:
         self.history = replace(self.history, study=replace(self.study, folder=folder))
 
     def saved_as(self, name: str) -> OpenStudy:
-        """Return the study with its edits under another name, as one step; this one goes back to its file.
-
-        Raises
-        ------
-        Refused
-            The name is not permitted, or taken.
-        StoreError
-            The draft of the other cannot be written.
-        """
+        """Return the study with its edits under another name, as one step; this one goes back to its file."""
         file = check_free(name)
         made = OpenStudy(file, self.history.typed(f"Save as {name}", copy_of(self.study, name).text))
         made.note_edit(0.0)
@@ -214,20 +175,11 @@ class OpenStudy:
         self.history = self.history.edited(f"Set version {version}", Set(("study", "version"), version))
 
     def rebase(self, base: str) -> None:
-        """Take edits as made from the content of another hash."""
         self.base = self.keeper.base = base
 
 
 def open_file(file: Path, results: Path) -> OpenStudy:
-    """Open a study's file, with the draft of it that was not saved.
-
-    Raises
-    ------
-    Refused
-        It is not UTF-8 text.
-    StoreError
-        It cannot be read.
-    """
+    """Open a study's file, with the draft of it that was not saved."""
     content = _content(file)
     study = read(content, file.parent)
     opened = OpenStudy(file, History(study, first_element(study.document)), content_hash(content), study.text)
@@ -236,13 +188,7 @@ def open_file(file: Path, results: Path) -> OpenStudy:
 
 
 def open_new(study: Study, name: str) -> OpenStudy:
-    """Open a copy of a study under another name; nothing is written before it is saved.
-
-    Raises
-    ------
-    Refused
-        The name is not permitted, or taken.
-    """
+    """Open a copy of a study under another name; nothing is written before it is saved."""
     file = check_free(name)
     made = copy_of(study, name)
     return OpenStudy(file, History(made, first_element(made.document)))
@@ -302,11 +248,6 @@ JOIN_S: Final = 1.0  # typing in one field is one step until the keyboard rests 
 class Editing(QObject):
     """The open study: every change of it and of its selection is made here.
 
-    Parameters
-    ----------
-    results
-        Folder that holds the studies' results folders.
-
     ``opened_other`` is emitted when another study is open, or none, ``changed`` after each step of the study or of its
     selection, ``edited`` after each step of the study alone; ``refused`` carries the path that a refused request
     concerns, the sentence that says why, and the request; ``made`` the `Step` of a request, after ``edited``.
@@ -349,7 +290,6 @@ class Editing(QObject):
     # selection
 
     def select(self, path: Place, *, back: bool = False) -> None:
-        """Select an element."""
         opened = self.opened
         if opened is None or opened.history.selected == path:
             return
@@ -365,7 +305,6 @@ class Editing(QObject):
         self.changed.emit()
 
     def go_back(self) -> None:
-        """Select what was selected before."""
         if self._back:
             self.select(self._back.pop(), back=True)
 
@@ -445,29 +384,19 @@ class Editing(QObject):
         opened.history = history
 
     def make(self, words: str, *edits: Edit, select: Place | None = None) -> None:
-        """Make a step of edits.
-
-        Raises
-        ------
-        Refused
-            The step cannot be made; nothing is changed.
-        """
         if (opened := self.writable) is not None:
             self._take(opened, opened.history.edited(words, *edits, select=select))
             self._note()
 
     def type_text(self, words: str, text: str) -> None:
-        """Give the file another text, as a step of its own."""
         if (opened := self.writable) is not None:
             self._type(opened, words, text)
             self._note()
 
     def undo(self) -> None:
-        """Undo the last step."""
         self._travel(History.undo)
 
     def redo(self) -> None:
-        """Redo the step that was undone last."""
         self._travel(History.redo)
 
     def _travel(self, to: Callable[[History], History]) -> None:

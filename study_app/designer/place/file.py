@@ -82,15 +82,7 @@ def shown(text: str) -> str:
 
 
 def retyped(text: str, typed: str) -> str:
-    """Return a text with its own ends of lines after what was typed in the pane.
-
-    Parameters
-    ----------
-    text : str
-        The file's text.
-    typed : str
-        The text of the pane after typing.
-    """
+    """Return a text with its own ends of lines after what was typed in the pane."""
     old, newline = shown(text), "\r\n" if "\r\n" in text else "\n"
     first, last = common_ends(old, typed)
     begin, end = _original(text, first), _original(text, len(old) - last)
@@ -225,7 +217,6 @@ class FileEditor(Themed, QPlainTextEdit):
             self.verticalScrollBar().setValue(max(0, line - 3))
 
     def flush(self) -> None:
-        """Hand on what was typed."""
         self._rest.stop()
         if self.pending:
             self.pending = False
@@ -275,7 +266,6 @@ class FileEditor(Themed, QPlainTextEdit):
         return any(first <= line <= last for first, last in self.shown.selected)
 
     def gutter_px(self) -> int:
-        """Return the width of the gutter."""
         return 34 + self.fontMetrics().horizontalAdvance("9") * max(3, len(str(self.blockCount())))
 
     def paint_gutter(self, painter: QPainter, _place: QRect) -> None:

@@ -65,7 +65,6 @@ class BannerCard(Card):
         painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
 
     def show_banner(self, banner: Banner | None) -> None:
-        """Show another banner; None hides it."""
         self._banner = banner
         self.make_room(other=self._other)
         self.close_button.setVisible(banner is not None and banner.closes)
@@ -254,6 +253,5 @@ class DesignerHeader(QWidget):
             self.study_asked.emit(source)
 
     def open_file(self) -> None:
-        """Ask for a file and open it."""
         if chosen := choose_protocol(self, "Open study"):
             self.study_asked.emit(chosen)

@@ -237,7 +237,6 @@ class KeysCard(Card):
         return hbox((words, 1), *(Cap(key) for key in one.shown), spacing=5)
 
     def switch(self) -> None:
-        """Show the list, or put it away."""
         if self.isVisible():
             self.put_away()
             return

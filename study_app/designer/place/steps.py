@@ -331,13 +331,7 @@ def no_answers(_element: Path) -> frozenset[str]:
 
 
 class Steps:
-    """Makes steps; keeps the values that a switch of kind removed.
-
-    Parameters
-    ----------
-    recorded : callable
-        Returns the ids beside an element under which answers are recorded: its own then stays.
-    """
+    """Makes steps; keeps the values that a switch of kind removed."""
 
     def __init__(self, recorded: Recorded = no_answers) -> None:
         self._left: dict[Path, dict[str, Any]] = {}
@@ -348,13 +342,7 @@ class Steps:
         self._left.clear()
 
     def step(self, study: Study, asked: requests.Request, selected: Path = ()) -> Step:
-        """Return the step that is asked for while an element is selected.
-
-        Raises
-        ------
-        Refused
-            It makes no sense in this study.
-        """
+        """Return the step that is asked for while an element is selected."""
         if isinstance(asked, requests.SetText):
             edits = (*_text(study, asked), *followed(study, asked.path, asked.language, asked.text))
             return Step(f"Type {label_of(asked.path[-1])}", edits, None, (asked.path, asked.language))

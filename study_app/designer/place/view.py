@@ -54,11 +54,9 @@ class FocusAreas:
         header.keyboard_left.connect(self.return_keyboard)
 
     def focus_header(self) -> None:
-        """Go to the list of studies."""
         self._header.study.setFocus(SHORTCUT)
 
     def focus_form(self) -> None:
-        """Go to the first row of the form."""
         self._parts.show_side("form")
         self._parts.form.focus_first()
 
@@ -118,7 +116,6 @@ class FocusAreas:
         self._focus_page()
 
     def focus_problems(self) -> None:
-        """Go to the list of problems."""
         self._problems.show()
         self._problems.next.setFocus(SHORTCUT)
 
@@ -192,14 +189,12 @@ class ProblemSteps(QObject):
             self._card.hide()
 
     def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
-        """Offer the repairs of a problem."""
         self._repairs[row] = words
         self._form.show_repairs(self._repairs)
         self._card.show_repairs(row, words)
         self._lead_to_repairs()
 
     def open_next(self) -> None:
-        """Go to the next problem."""
         if coming := self._card.coming:
             self._open_repair(coming[0])
 
@@ -371,26 +366,22 @@ class DesignerPlace(Place):
             self.outline.select_several((path,), selects=path not in self.outline.selected)
 
     def duplicate(self) -> None:
-        """Ask for a copy of each."""
         path, also = self._several()
         if self.form.head.copy.isEnabled():
             self.flush()
             self.asked.emit(DuplicateElement(path, also))
 
     def make_series(self) -> None:
-        """Ask for copies of the form's element that differ in one number."""
         if self.view.form is not None:
             self._ask("series", self.view.form.path)
 
     def delete(self) -> None:
-        """Ask to delete them."""
         path, also = self._several()
         if self.form.head.delete.isEnabled():
             self.flush()
             self.ask("delete", path, also)
 
     def move_by(self, by: int) -> None:
-        """Ask to move them up (-1) or down (1)."""
         path, also = self._several()
         if path and not self.view.header.read_only:
             self.flush()
@@ -435,7 +426,6 @@ class DesignerPlace(Place):
         self.new_page.card.questions.title.setFocus()
 
     def close_new(self) -> None:
-        """Go back to the study."""
         if self.stack.currentIndex():
             self.stack.setCurrentIndex(0)
             self.areas.focus_element()
@@ -462,7 +452,6 @@ class DesignerPlace(Place):
                 self.areas.focus_element() if elsewhere else self.areas.return_keyboard()
 
     def flush(self) -> None:
-        """Hand on what is being typed."""
         self.form.flush()
         self.file.editor.flush()
 
@@ -482,7 +471,6 @@ class DesignerPlace(Place):
         return asked if before == after else with_path(asked, before, after)
 
     def ask_to_add(self) -> None:
-        """Ask what can be added."""
         if self.view.form is not None and self.outline.add.isEnabled() and not self.stack.currentIndex():
             self._ask("add")
 
@@ -530,7 +518,6 @@ class DesignerPlace(Place):
         self.areas.show_tab(name)
 
     def enter(self) -> None:
-        """Look again at what there is."""
         self.entered.emit()
 
     def leave(self) -> None:

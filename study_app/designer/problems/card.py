@@ -32,7 +32,6 @@ class RepairButton(ActionButton):
         self.offer(problem, words)
 
     def offer(self, problem: ProblemRow, words: str) -> None:
-        """Offer a repair of a problem from now on."""
         self.problem = problem
         self.show_action("", words)
         self.setAccessibleName(f"{words}: {problem.name}")
@@ -47,13 +46,7 @@ class RepairButton(ActionButton):
 
 
 class NameRefusal(QWidget):
-    """Why a name is not taken, and a button with one that is free, which ``chosen`` carries.
-
-    Parameters
-    ----------
-    does
-        What is done at once with the name that is free, such as "Rename to".
-    """
+    """Why a name is not taken, and a button with one that is free, which ``chosen`` carries."""
 
     chosen = Signal(str)
 
@@ -135,7 +128,6 @@ class ProblemLine(Themed, QWidget):
         self.mark.show_icon("check" if row is None else "warning", ink)
 
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
-        """Offer repairs, two at most."""
         for button, words in zip(self.repairs, repairs, strict=False):
             button.offer(self.row, words)
         for words in repairs[len(self.repairs) : 2]:
@@ -212,7 +204,6 @@ class ProblemsCard(Card):
     def show_problems(
         self, rows: tuple[ProblemRow, ...], element: object, repairs: Mapping[ProblemRow, tuple[str, ...]]
     ) -> None:
-        """Show problems; ``element`` is the selected one."""
         self._problems, self._element, self._repairs = rows, element, dict(repairs)
         self._show()
 
@@ -297,7 +288,6 @@ class ProblemsCard(Card):
             self._show()
 
     def show_repairs(self, row: ProblemRow, repairs: tuple[str, ...]) -> None:
-        """Offer the repairs of a problem."""
         self._repairs[row] = repairs
         for line in self.lines:
             if line.row == row:
@@ -311,7 +301,6 @@ class ProblemsCard(Card):
         return (*self.rows[at:], *self.rows[:at])
 
     def repairs_of(self, problem: ProblemRow) -> list[RepairButton]:
-        """Return the buttons that repair a problem."""
         return [button for line in self.lines for button in line.repairs if line.row == problem]
 
     def set_current(self, row: ProblemRow) -> None:
@@ -320,7 +309,6 @@ class ProblemsCard(Card):
             self.at, self._number = row, self.rows.index(row)
 
     def open(self, row: ProblemRow) -> None:
-        """Mark a problem as the one that one is at, and have it opened."""
         self.set_current(row)
         for line in self.lines:
             line.here = line.row == row

@@ -137,7 +137,6 @@ class SaveCard(Prompt):
         self.changes.clicked.connect(self.changes_asked)
 
     def refuse(self, sentence: str, free: str = "") -> None:
-        """Say why it cannot be saved so, and offer a short name that is free."""
         self.refusal.show_refusal(sentence, free)
 
     def _take_name(self, name: str) -> None:
