@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
-from pathlib import Path
+from pathlib import Path as File
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
 from study_app.haptics.model.ranges import later, within
 from study_app.protocol.questions import KINDS, STATEMENT, AnyQuestion, Context, Question, Scale, Statement
-from study_app.protocol.source.document import entries
+from study_app.protocol.source.document import Path, entries, frozen
 from study_app.protocol.source.problems import Fault, unknown
 from study_app.protocol.table import Id, Localised, Table, invalid
+from study_app.protocol.wording.languages import language_name, missing_text
 
 Weight = Annotated[float, within(-1e6, 1e6, "no instrument has larger weights")]
 
@@ -104,8 +105,8 @@ class Questionnaire(Table):
         return Context(scales, self.scale, language)
 
 
-FOLDER: Final = Path(__file__).parent / "instruments"
-_TEXTS: Final = ("text", "short", "low", "high")
+FOLDER: Final = File(__file__).parent / "instruments"
+_TEXTS: Final = ("text", "short", "low", "high", "title", "intro", "labels")
 
 
 def instruments() -> tuple[str, ...]:
@@ -116,11 +117,15 @@ def instruments() -> tuple[str, ...]:
 @cache
 def instrument(name: str) -> Mapping[str, Any]:
     """Return a standard questionnaire as its file holds it (OSError if there is none)."""
-    return tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    found: Mapping[str, Any] = frozen(tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8")))
+    return found
 
 
 def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
-    """Return a study's document with the items of its standard questionnaires, and what is missing of them."""
+    """Return a study's document with what is known of its standard questionnaires, and what is missing of them.
+
+    What the study writes replaces what is known, key by key, and texts language by language.
+    """
     found, faults = dict(document), list[Fault]()
     tables = document.get("questionnaires")
     if not isinstance(tables, Mapping):
@@ -131,19 +136,25 @@ def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[
     for name, table in tables.items():
         if not isinstance(table, Mapping) or "instrument" not in table:
             continue
-        path = ("questionnaires", name, "instrument")
-        if table["instrument"] not in instruments():
-            wrong = str(table["instrument"])
+        if table["instrument"] in instruments():
+            filled[name], lacking = _filled(("questionnaires", name), table, languages, scales)
+            faults += lacking
+        else:
+            path, wrong = ("questionnaires", name, "instrument"), str(table["instrument"])
             faults.append(unknown(path, f'there is no instrument "{wrong}"', wrong, instruments()))
-            continue
-        missing = _missing_scales(table["instrument"], languages, scales)
-        filled[name], lacking = _filled(name, table, languages)
-        faults += lacking
-        for scale, points in missing.items():
-            message = f"the labels of its scale may not be shipped, or not in {', '.join(languages)}"
-            faults.append(Fault(path, message, f"write [scales.{scale}] with {points} labels"))
-    kept = {"scales": scales} if scales else {}
-    return {**found, "questionnaires": filled, **kept}, faults
+    return {**found, "questionnaires": filled, **({"scales": scales} if scales else {})}, faults
+
+
+def written_out(of: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the table that a study writes of an instrument, and its scales: all that is known, where texts lack."""
+    table: dict[str, Any] = {"instrument": of}
+    filled, lacking = _filled((), table, languages, {})
+    if not lacking:
+        return table, {}
+    known = instrument(of).get("scales", {}).items()
+    scales = {scale_name(of, name): _merged({"labels": one.get("labels", {})}, {}, languages) for name, one in known}
+    table |= {key: filled[key] for key in ("intro", "items") if key in filled}
+    return table, {name: one for name, one in scales.items() if one}
 
 
 def scale_name(of: str, scale: str) -> str:
@@ -151,74 +162,107 @@ def scale_name(of: str, scale: str) -> str:
     return f"{of.replace('-', '_')}_{scale}"
 
 
-def _missing_scales(of: str, languages: tuple[str, ...], scales: dict[str, Any]) -> dict[str, int]:
-    """Add the scales of a standard questionnaire; return those whose labels are not shipped, with their points."""
-    missing = {}
-    for name, table in instrument(of).get("scales", {}).items():
-        own = scale_name(of, name)
-        labels = table.get("labels", {})
-        if own in scales:
-            continue
-        if all(language in labels for language in languages):
-            scales[own] = {"labels": {language: tuple(labels[language]) for language in languages}}
-        else:
-            missing[own] = table["points"]
-    return missing
-
-
-def _filled(name: str, table: Mapping[str, Any], languages: tuple[str, ...]) -> tuple[dict[str, Any], list[Fault]]:
-    """Return a questionnaire with the items of its instrument, in which those that the study writes come first."""
+def _filled(
+    place: Path, table: Mapping[str, Any], languages: tuple[str, ...], scales: dict[str, Any]
+) -> tuple[dict[str, Any], list[Fault]]:
+    """Return a questionnaire with what its instrument knows, and what is missing; adds its scales to ``scales``."""
     of = str(table["instrument"])
     source = instrument(of)
-    own = {item["id"]: item for item in _own_items(table)}
-    known = [item["id"] for item in source["items"]]
-    place = ("questionnaires", name)
+    known = {item["id"]: item for item in source["items"]}
+    own = _by_id(table, "items")
     faults = [
-        unknown((*place, "items", index, "id"), f'"{item["id"]}" is not an item of {of}', item["id"], known)
-        for index, item in enumerate(_own_items(table))
-        if item["id"] not in known
+        unknown((*place, *path, "id"), f'"{name}" is not an item of {of}', name, known)
+        for name, (path, _) in own.items()
+        if name not in known
     ]
-    items, missing = [], []
-    for item in source["items"]:
-        made = {**_in_languages(item, languages), **own.get(item["id"], {})}
-        made.setdefault("short", dict.fromkeys(languages, item["id"].replace("_", " ").capitalize()))
-        if "scale" in item:
-            made["scale"] = scale_name(of, item["scale"])
-        if "options" in item and "options" not in own.get(item["id"], {}):
-            made["options"] = tuple(_in_languages(option, languages) for option in item["options"])
-        fields = KINDS[item.get("kind", STATEMENT)].model_fields
-        if any(key in fields and fields[key].is_required() and key not in made for key in _TEXTS):
-            missing.append(item["id"])
-        items.append(made)
-    if missing:
-        shipped = ", ".join(source["languages"])
-        why = f'the texts of "{of}" exist in {shipped}' if shipped else f'the texts of "{of}" may not be shipped'
-        message = f"{why}: {len(missing)} item{'s need' if len(missing) > 1 else ' needs'} a text"
-        faults.append(Fault((*place, "instrument"), message, f"items with these ids: {', '.join(missing)}"))
-    texts = {
-        key: {language: source[key][language] for language in languages}
-        for key in ("title", "intro")
-        if all(language in source.get(key, {}) for language in languages)
+    unwritten = {language: list[tuple[str, str]]() for language in languages}  # which text lacks, and of what
+
+    def ask(path: Path | None, thing: str, made: Mapping[str, Any], *keys: str) -> None:
+        """Note the languages that texts of a table lack: at its place in the study, if it is written there."""
+        for key in keys:
+            text = made.get(key, {})
+            lacking = [one for one in languages if one not in text] if isinstance(text, Mapping) else []
+            if path is None:
+                for language in lacking:
+                    unwritten[language].append((key, thing))
+            elif len(lacking) == len(languages):
+                faults.append(Fault((*place, *path, key), "is missing"))
+            else:
+                faults.extend(missing_text((*place, *path, key), language) for language in lacking)
+
+    made = _merged({key: source[key] for key in ("title", "intro") if key in source}, table, languages)
+    if "title" not in table and set(made.get("title", ())) != set(languages):
+        made.pop("title", None)
+    ask(() if "intro" in table else None, of, made, "intro")
+    items = []
+    for name, item in known.items():
+        path, written = own.get(name, (None, {}))
+        whole = _merged(item, written, languages)
+        if isinstance(short := whole.get("short", {}), Mapping):
+            whole["short"] = {**dict.fromkeys(languages, name.replace("_", " ").capitalize()), **short}
+        if "scale" in item and "scale" not in written:
+            whole["scale"] = scale_name(of, item["scale"])
+        fields = KINDS.get(whole.get("kind", STATEMENT), Statement).model_fields
+        ask(path, name, whole, *(key for key in ("text", "low", "high") if key in fields))
+        if "options" in item:
+            choices = _by_id(written, "options")
+            whole["options"] = tuple(
+                _merged(one, choices.get(one["id"], ((), {}))[1], languages) for one in item["options"]
+            )
+            for one in whole["options"]:
+                if path is not None and one["id"] in choices:
+                    ask((*path, *choices[one["id"]][0]), name, one, "text")
+                else:
+                    ask(None, name, {"options": one.get("text", {})}, "options")
+        items.append(whole)
+    for scale, labelled in source.get("scales", {}).items():
+        own_name = scale_name(of, scale)
+        known_labels = _merged({key: labelled[key] for key in ("labels",) if key in labelled}, {}, languages)
+        if own_name in scales and isinstance(scales[own_name], Mapping):
+            scales[own_name] = {**scales[own_name], **_merged(known_labels, scales[own_name], languages)}
+        elif set(known_labels.get("labels", ())) == set(languages):
+            scales[own_name] = known_labels
+        else:
+            ask(None, f"[scales.{own_name}], {labelled['points']} of them", known_labels, "labels")
+    faults += [_unpublished((*place, "instrument"), of, one, lacks) for one, lacks in unwritten.items() if lacks]
+    scores = {name: dict(score) for name, score in source["scores"].items()}
+    return {"scores": scores, **made, "items": tuple(items)}, faults
+
+
+def _merged(known: Mapping[str, Any], own: Mapping[str, Any], languages: tuple[str, ...]) -> dict[str, Any]:
+    """Return what is known of a table in these languages, replaced by what the study writes of it."""
+    made = dict(known)
+    for key in made.keys() & set(_TEXTS):
+        made[key] = {one: known[key][one] for one in languages if one in known[key]}
+    for key, value in own.items():
+        made[key] = {**made.get(key, {}), **value} if key in _TEXTS and isinstance(value, Mapping) else value
+    return {key: value for key, value in made.items() if value or key not in _TEXTS}
+
+
+def _by_id(table: Mapping[str, Any], key: str) -> dict[str, tuple[Path, Mapping[str, Any]]]:
+    """Return the tables of a list that have an id, with their places."""
+    return {
+        one["id"]: (path, one)
+        for path, one in entries(table, f"{key}.*")
+        if isinstance(one, Mapping) and isinstance(one.get("id"), str)
     }
-    scores = {
-        name: {key: tuple(value) if isinstance(value, list) else value for key, value in score.items()}
-        for name, score in source["scores"].items()
-    }
-    return {**texts, "scores": scores, **table, "items": tuple(items)}, faults
 
 
-def _own_items(table: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    for _, item in entries(table, "items.*"):
-        if isinstance(item, Mapping) and isinstance(item.get("id"), str):
-            yield item
-
-
-def _in_languages(item: Mapping[str, Any], languages: tuple[str, ...]) -> dict[str, Any]:
-    """Return an item or option with its texts in these languages, without those that lack one of them."""
-    found = {}
-    for key, value in item.items():
-        if key not in _TEXTS:
-            found[key] = value
-        elif all(language in value for language in languages):
-            found[key] = {language: value[language] for language in languages}
-    return found
+def _unpublished(path: Path, of: str, language: str, lacks: Sequence[tuple[str, str]]) -> Fault:
+    """Return the fault of texts that neither the program nor the study has in a language: it names each of them."""
+    keys: dict[str, list[str]] = {}
+    for key, thing in dict.fromkeys(lacks):
+        keys.setdefault(thing, []).append(key)
+    same = {tuple(found): [thing for thing, other in keys.items() if other == found] for found in keys.values()}
+    listed = "; ".join(
+        f"{', '.join(found)} of {', '.join(one)}".removesuffix(f" of {of}") for found, one in same.items()
+    )
+    published = instrument(of)["languages"]
+    why = (
+        f"{of} has no published text in {language_name(language)}"
+        if published
+        else f"the texts of {of} may not be passed on"
+    )
+    message = f"{why}: write {listed}"
+    hint = f'items = [{{ id = "{instrument(of)["items"][0]["id"]}", text = {{ {language} = "…" }} }}, …]'
+    return Fault(path, message, hint, missing_language=language)

@@ -44,7 +44,7 @@ from study_app.designer.place import requests
 from study_app.designer.problems.problems import element_of
 from study_app.ids import free_id
 from study_app.number_text import exact_text
-from study_app.protocol.questionnaires import instrument
+from study_app.protocol.questionnaires import written_out
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.protocol.wording.languages import language_name
 
@@ -134,13 +134,12 @@ def add_named(study: Study, asked: requests.AddNamed) -> Step:
 
 
 def add_instrument(study: Study, asked: requests.AddInstrument) -> Step:
-    """Return the step that adds a standard questionnaire; its questions are listed where the study writes texts."""
-    source, languages = instrument(asked.name), languages_of(study)
-    table: dict[str, Any] = {"instrument": asked.name}
-    if not set(languages) <= set(source["languages"]):
-        table["items"] = [{"id": item["id"]} for item in source["items"]]
+    """Return the step that adds a standard questionnaire; where texts are missing, the study writes what is known."""
+    table, scales = written_out(asked.name, languages_of(study))
     path = ("questionnaires", free_id(names(study.document, "questionnaires"), asked.name.replace("-", "_")))
-    return Step(f"Add {asked.name}", (Set(path, table),), path)
+    there = names(study.document, "scales")
+    edits = (Set(("scales", name), scale) for name, scale in scales.items() if name not in there)
+    return Step(f"Add {asked.name}", (*edits, Set(path, table)), path)
 
 
 def change_language(study: Study, asked: requests.ChangeLanguage) -> Step:

@@ -15,7 +15,7 @@ from study_app.protocol.groups import SEQUENCES, sequences_in
 from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.protocol.source.problems import ALIKE, ONE_LANGUAGE, Fault, did_you_mean, unknown
-from study_app.protocol.wording.languages import LANGUAGES, language_name
+from study_app.protocol.wording.languages import LANGUAGES, missing_text
 
 REFERENCES = {
     "conditions.*.liquid": "liquids",
@@ -214,8 +214,7 @@ def languages(document: Document) -> Iterator[Fault]:
         elif isinstance(text, Mapping):
             for language in wanted:
                 if language not in text:
-                    hint = f"add {language}: every text exists in every language of the study"
-                    yield Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language)
+                    yield missing_text(path, language)
             for language in text:
                 if language not in wanted:
                     yield Fault((*path, language), "is not a language of the study", f"these are: {', '.join(wanted)}")

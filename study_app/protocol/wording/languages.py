@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, Final
 
 from study_app.errors import StudyError
-from study_app.protocol.source.problems import did_you_mean
+from study_app.protocol.source.document import Path
+from study_app.protocol.source.problems import Fault, did_you_mean
 
 RIGHT_TO_LEFT = frozenset({"ar", "dv", "fa", "he", "ks", "ps", "sd", "ug", "ur", "yi"})
 
@@ -63,7 +64,7 @@ class Words:
         return many.format(n=named, list=listed)
 
 
-_FOLDER: Final = Path(__file__).parent
+_FOLDER: Final = File(__file__).parent
 LANGUAGES: Final = {
     code: Words(tomllib.loads((_FOLDER / f"{code}.toml").read_text(encoding="utf-8")))
     for code in ("en", "nl", "de", "fr", "ar")
@@ -73,6 +74,12 @@ LANGUAGES: Final = {
 def language_name(code: str) -> str:
     """Return the English name of a language, its code where the program has no words in it."""
     return LANGUAGES[code].english_name if code in LANGUAGES else code
+
+
+def missing_text(path: Path, language: str) -> Fault:
+    """Return the fault of a text that lacks a language of the study."""
+    hint = f"add {language}: every text exists in every language of the study"
+    return Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language)
 
 
 def words(language: str) -> Words:

@@ -1,11 +1,22 @@
 """Format 2: what it may leave out, what a file of format 1 may not hold, and what questions need of each other."""
 
+from typing import Any
+
 import pytest
 
 from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.protocol.load import parse
-from study_app.protocol.questionnaires import instrument, instruments
-from study_app.protocol.questions import NumberView, ShowIf, shown
+from study_app.protocol.questionnaires import (
+    Questionnaire,
+    instrument,
+    instruments,
+    scale_name,
+    with_instruments,
+    written_out,
+)
+from study_app.protocol.questions import Context, NumberView, Scale, ShowIf, shown
+from study_app.protocol.source.document import frozen
+from study_app.protocol.source.problems import Fault
 from tests.protocol.forms.mixed import MIXED
 from tests.protocol.sound import SOUND
 
@@ -37,33 +48,66 @@ def test_file_of_format_1_means_the_same_in_format_2_but_for_an_estimator_that_i
     assert one.model_copy(update={"format": 2, "scene": scene}) == two
 
 
-def test_every_instrument_with_texts_is_a_questionnaire_of_a_study() -> None:
-    for name in instruments():
-        if instrument(name)["languages"]:
-            study = parse(MIXED.replace('instrument = "sus"', f'instrument = "{name}"').encode(), name)
-            form = study.forms["usability"]
-            assert [item.id for item in form.items] == [item["id"] for item in instrument(name)["items"]]
-            assert set(form.scores) == set(instrument(name)["scores"])
-
-
-@pytest.mark.parametrize("name", ["ipq", "panas", "ssq", "ueq"])
-def test_instrument_without_texts_takes_those_of_the_study(name: str) -> None:
-    texts = "".join(
-        f"[[questionnaires.usability.items]]\nid = '{item['id']}'\ntext = 'About {item['id']}'\n"
-        + (f"low = 'a {number}'\nhigh = 'b {number}'\n" if item["kind"] == "slider" else "")
-        for number, item in enumerate(instrument(name)["items"])
-    )
-    scales = "".join(
-        f"[scales.{name}_{scale}]\nlabels.en = {[f'point {n}' for n in range(table['points'])]}\n"
-        for scale, table in instrument(name).get("scales", {}).items()
-    )
-    filled = f"instrument = '{name}'\nintro = 'How was it?'\n{texts}{scales}"
-    study = parse(MIXED.replace('instrument = "sus"\n', filled).encode(), name)
-    form = study.forms["usability"]
-    assert [study.text(item.text, "en") for item in form.items] == [
-        f"About {item['id']}" for item in instrument(name)["items"]
+def bare(name: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
+    items = [
+        {"id": item["id"], **({"options": [{"id": one["id"]} for one in item["options"]]} if "options" in item else {})}
+        for item in instrument(name)["items"]
     ]
-    assert set(form.scores) == set(instrument(name)["scores"])
+    return {"instrument": name, "items": items}, {}
+
+
+@pytest.mark.parametrize("begin", [bare, written_out])
+@pytest.mark.parametrize("other", ["en", "nl", "de", "fr", "ar"])
+@pytest.mark.parametrize("name", instruments())
+def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_rest(
+    name: str, other: str, begin: Any
+) -> None:
+    languages, source = tuple(dict.fromkeys(("en", other))), instrument(name)
+    lacking = [one for one in languages if one not in source["languages"]]
+
+    def filled(table: dict[str, Any], scales: dict[str, Any]) -> tuple[Any, list[Fault]]:
+        head = {"languages": languages}
+        return with_instruments({"study": head, "questionnaires": {"form": table}, "scales": scales})
+
+    _, faults = filled({"instrument": name}, {})
+    assert [fault.missing_language for fault in faults] == lacking
+    for fault in faults:
+        assert all(item["id"] in fault.message for item in source["items"])
+        words = (
+            f"{name} has no published text in" if source["languages"] else f"the texts of {name} may not be passed on"
+        )
+        assert fault.message.startswith(words)
+
+    table, scales = begin(name, languages)
+    for _ in range(3):
+        found, faults = filled(frozen(table), frozen(scales))
+        for fault in faults:
+            words = [fault.missing_language] if fault.missing_language else lacking
+            if fault.path[-1] != "instrument":
+                place: Any = table
+                for step in fault.path[2:-1]:
+                    place = place[step]
+                place.setdefault(fault.path[-1], {}).update((one, f"own {one}") for one in words)
+                continue
+            table["intro"] = {**table.get("intro", {}), **dict.fromkeys(words, "own")}
+            for scale, one in source.get("scales", {}).items():
+                labels = scales.setdefault(scale_name(name, scale), {"labels": {}})["labels"]
+                labels.update((language, [f"{language} {n}" for n in range(one["points"])]) for language in words)
+        for scale in scales.values():
+            known = next(iter(scale["labels"].values()))
+            scale["labels"].update((one, known) for one in languages if one not in scale["labels"])
+    assert faults == []
+    form = Questionnaire.model_validate(found["questionnaires"]["form"])
+    assert set(form.scores) == set(source["scores"])
+    assert set(found["scales"]) == {scale_name(name, one) for one in source.get("scales", {})}
+    for item, known in zip(form.items, source["items"], strict=True):
+        assert (item.id, item.kind_id) == (known["id"], known["kind"])
+        context = Context({one: Scale.model_validate(scale) for one, scale in found["scales"].items()}, None, "en")
+        if "from" in known:
+            assert item.bounds(context) == (known["from"], known["to"])
+        for language in languages:
+            own = known.get("text", {}).get(language, f"own {language}")
+            assert item.text == own if isinstance(item.text, str) else item.text[language] == own
 
 
 def view(name: str, condition: ShowIf | None = None) -> NumberView:
