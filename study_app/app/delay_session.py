@@ -222,7 +222,7 @@ class _Showing:
 
         def follow(_state: object) -> None:
             if bridge.runner.finished:
-                QTimer.singleShot(0, bridge.operator, bridge.operator.close_asked.emit)
+                QTimer.singleShot(0, bridge.operator, lambda: bridge.operator.ask("close"))
 
         bridge.runner.on_change(follow)
         with ended_from_outside(end):

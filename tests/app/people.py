@@ -66,7 +66,7 @@ class Person(QObject):
         elif isinstance(page, PausePage):  # the machine stood still
             QTest.keyClick(participant.widget, Qt.Key.Key_Return)
         elif isinstance(page, TroublePage):
-            operator.end_asked.emit("aborted", "cable")
+            operator.ask("end", "aborted", "cable")
         elif isinstance(page, EndPage):
             QTest.mouseClick(operator.buttons.close_session, Qt.MouseButton.LeftButton)
 

@@ -88,8 +88,8 @@ class Opened:
     def decide(self, button: Any, by: str, reason: str) -> None:
         self.click(button)
         dialog: Any = self.place.dialog
-        dialog.by.setText(by)
-        dialog.reason.setText(reason)
+        dialog.editors["by"].show_value(by)
+        dialog.editors["reason"].show_value(reason)
         self.click(dialog.go_on)
         self.wait()
 

@@ -11,8 +11,8 @@ from study_app.app.main_controller import MainController, WorkstationController
 from study_app.app.session.live_session import LiveSession
 from study_app.devices.descriptor import READY, Backend
 from study_app.gui.kit.devices import described, settings_here, text_scale_on
+from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.gui.widgets.dialogs import Notice
 from study_app.session.start import NewSession
 from study_app.store import workstation
 from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, save
@@ -79,7 +79,7 @@ def test_a_damaged_file_is_told_when_the_window_opens(qtbot, tmp_path, monkeypat
     with qtbot.waitSignal(made.devices.looked):
         made.open()
     assert made.window.notice.isVisible()
-    made.window.notice.close_button.click()
+    made.window.notice.go_on.click()
     assert made.window.place("home").device.state.word == "Ready"
 
 
@@ -100,6 +100,6 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qt
     live.bridge = SimpleNamespace(operator=operator)
     live.diagnose()
     assert asked == ([] if held is None else [(device, held)])
-    assert [notice.windowTitle() for notice in operator.findChildren(Notice)] == (
+    assert [notice.windowTitle() for notice in operator.findChildren(Question)] == (
         ["There is nothing to diagnose"] if held is None else []
     )

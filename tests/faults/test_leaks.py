@@ -88,7 +88,7 @@ def held(protocol: Path, results: Path, monkeypatch: pytest.MonkeyPatch, caplog:
         found.words.add(repr(participant.page))
         if isinstance(participant.page, TaskPage):
             found.tasks.add(participant.page.trial)
-            operator.mark_set.emit()
+            operator.ask("mark")
         found.forces.add(type(operator.force))
         return False
 

@@ -67,14 +67,14 @@ def test_an_unplugged_device_is_reconnected_and_its_trial_presented_again(sessio
     assert again[0]["notes"].startswith("presented again: the device failed and was connected again")
 
 
-def test_panels_that_fail_are_lines_and_the_session_goes_on(session: tuple[dict[str, Any], Path]) -> None:
+def test_panels_that_fail_are_told_and_the_session_goes_on(session: tuple[dict[str, Any], Path]) -> None:
     told, results = session
-    assert told["panels"] == [f"{name}: this panel failed. The session continues." for name in ("Position", "Steps")]
+    assert told["panels"] == [f"{name}: this panel failed. The session continues." for name in ("Position", "Session")]
     assert told["force with failed panels"]
     assert not told["trouble with failed panels"]
     last = [row for row in rows(results) if row["trial"] == "1"][-1]
     assert "the cockpit's panel 'Position' failed: ValueError: no such curve" in last["notes"]
-    assert "the cockpit's panel 'Steps' failed: ValueError: no such colour" in last["notes"]
+    assert "the cockpit's panel 'Session' failed: ValueError: no such colour" in last["notes"]
 
 
 def test_a_recorder_that_dies_is_told_at_once_and_records_the_next_trial(session: tuple[dict[str, Any], Path]) -> None:

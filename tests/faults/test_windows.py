@@ -69,7 +69,7 @@ def test_the_participants_window_that_is_closed_is_a_pause(tmp_path: Path, machi
             return True
         if done == ["closed"] and isinstance(participant.page, PausePage):
             done.append(journal_events.Paused())
-            operator.resume_asked.emit()
+            operator.ask("resume")
             return True
         return False
 
@@ -87,10 +87,10 @@ def test_escape_again_and_again_loses_nothing(tmp_path: Path) -> None:
             pressed.append(1)
             QTest.keyClick(participant, Qt.Key.Key_Escape)
             if isinstance(participant.page, PausePage):
-                operator.resume_asked.emit()
+                operator.ask("resume")
             return True
         if isinstance(participant.page, PausePage):
-            operator.resume_asked.emit()
+            operator.ask("resume")
             return True
         return False
 
@@ -147,7 +147,7 @@ def test_a_device_that_vanishes_is_a_calm_page_a_reason_and_a_broken_session(
         page = participant.page
         if type(page).__name__ == "TroublePage" and not seen:
             seen.append((page.paragraph, operator.banner.what.text()))
-            operator.end_asked.emit("aborted", "cable")
+            operator.ask("end", "aborted", "cable")
             return True
         return False
 

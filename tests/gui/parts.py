@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from study_app.designer.outline.card import OutlineCard
 from study_app.designer.outline.outline_rows import OutlineRow
 from study_app.gui.help.view import PageReader
+from study_app.gui.kit.dialogs import Question
 from study_app.gui.lab.cards import EstimateCard
 from study_app.gui.settings.view import ScreenNumber
 from study_app.gui.theme.theme import DARK, LIGHT
@@ -19,7 +20,6 @@ from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import hbox, vbox
 from study_app.gui.widgets.cards import Bar, Chip, Icon, Logo, Rule
 from study_app.gui.widgets.controls import Cap
-from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.labels import Clamped, Elided, set_ink
 from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot
 from tests.gui.lab.sample import blind, still_view, workbench
@@ -131,9 +131,9 @@ class Plots(QWidget):
         hbox(self.traces, self.lateness, parent=self)
 
 
-def notice() -> Notice:
+def notice() -> Question:
     parent: Any = None
-    return Notice(parent, LIGHT, "Not saved", "The disk is full.")
+    return Question(parent, LIGHT, "Not saved", "The disk is full.")
 
 
 def traces(reach: float) -> Callable[[Any], None]:
@@ -162,7 +162,7 @@ PARTS: Final[dict[str, tuple[Callable[[], QWidget], tuple[int, int], Actions]]] 
         "clicked": closed_by(press), "key": closed_by(enter),
     }),
     "notice": (notice, (500, 220), {
-        "Enter": enter, "closed": closed_by(lambda window: press(window.close_button)),
+        "Enter": enter, "closed": closed_by(lambda window: press(window.go_on)),
     }),
     "indicators": (Indicators, (700, 360), {
         "little": lambda part: part.show_all(0.004, 0.25, "A few words"),

@@ -86,9 +86,9 @@ class PicturedSession:
         self._camera.wait(TRACED_MS)
         self.take_cockpit("cockpit")
         self._take("participant-exploring", FULL)
-        self._bridge.operator.pause_asked.emit()
+        self._bridge.operator.ask("pause")
         self._take("participant-pause", SMALL)
-        self._bridge.operator.resume_asked.emit()
+        self._bridge.operator.ask("resume")
         self._go_until(QuestionnairePage)
         self._take("participant-questionnaire-empty", SMALL)
         self._answer_in_part()
@@ -128,7 +128,7 @@ class PicturedSession:
         over: list[bool] = []
         self._live.over.connect(lambda: over.append(True))
         operator = self._bridge.operator
-        operator.end_asked.emit("withdrawn", "")
+        operator.ask("end", "withdrawn", "")
         self._take("participant-end", SMALL)
         operator.close()
         self._camera.until(lambda: over, "the session's end")

@@ -24,7 +24,6 @@ from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError, DisplayError, ServoFault, StudyError, VideoError
 from study_app.gui.display.screens import Frames, has_card, place
 from study_app.gui.operator.operator_view import OperatorView, Session, stages
-from study_app.gui.operator.plots import ForceCard
 from study_app.gui.operator.session_panels import Strip
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
@@ -136,22 +135,7 @@ class SessionBridge(QObject):
 
     def _connect(self) -> None:
         operator, participant = self.operator, self.participant
-        for asked, slot in (
-            (operator.stop_asked, self._stop_force),
-            (operator.fade_in_asked, self._resume),
-            (operator.resume_asked, self._resume),
-            (operator.pause_asked, self._pause),
-            (operator.repeat_asked, self._repeat),
-            (operator.end_asked, self._end),
-            (operator.note_written, self._note),
-            (operator.mark_set, self._mark),
-            (operator.exclude_asked, self._exclude),
-            (operator.close_asked, self._close),
-            (operator.diagnose_asked, self._diagnose),
-            (operator.reconnect_asked, self._reconnect),
-            (operator.panels.failed, self._panel_failed),
-        ):
-            asked.connect(slot)
+        operator.asked.connect(self._asked)
         if self.reconnection is not None:
             self.reconnection.connected.connect(self._reconnected)
             self.reconnection.failed.connect(self._not_reconnected)
@@ -159,10 +143,9 @@ class SessionBridge(QObject):
         participant.event.connect(self._event)
         participant.left.connect(operator.come_forward)
         if self.strip is not None:
-            self.strip.stop.pressed.connect(self._stop_force)
+            self.strip.stop.pressed.connect(lambda: operator.ask("stop"))
             self.strip.operator.clicked.connect(operator.come_forward)
             operator.header.page.show()
-            operator.page_asked.connect(participant.come_forward)
         participant.painted.connect(self._painted)
         participant.swapped.connect(self.frames.swapped)
         if self.parts.point_to is not None:
@@ -229,7 +212,8 @@ class SessionBridge(QObject):
 
         Where no more failed than one of the cockpit's panels, that is switched off, and the session goes on.
         """
-        if self.operator.panels.take(error):
+        if name := self.operator.panel_of(error):
+            self.operator.tell_of_failure(name, error)
             return
         self.parts.servo.stop_force()
         first = not self.trouble
@@ -248,15 +232,9 @@ class SessionBridge(QObject):
 
     def _handle_uncaught(self, error: BaseException) -> bool:
         """Handle an exception that no slot caught; return whether it was only a panel's, which is switched off."""
-        if self.operator.panels.take(error):
-            return True
+        panel = self.operator.panel_of(error)
         self.fail(error)
-        return False
-
-    @guarded_session_slot
-    def _panel_failed(self, name: str, error: Exception) -> None:
-        log.error("the panel %r failed and was disabled: %s", name, error, exc_info=error)
-        self.record_note(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
+        return bool(panel)
 
     @guarded_session_slot
     def _tell_of_thread(self, what: str) -> None:
@@ -296,38 +274,18 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def show_traces(self) -> None:
-        operator = self.operator
-
-        def draw() -> None:
-            operator.show_traces(self.monitor.health, self._now())
-            operator.position.plot.paint_now()
-
-        operator.panels.draw(operator.position, draw)
+        self.operator.show_traces(self.monitor.health, self._now())
 
     @guarded_session_slot
     def show_forces(self) -> None:
         """Draw the newest forces, where the operator may see them."""
-        forces, card = self.monitor.forces, self.operator.force
-        if forces is None or not isinstance(card, ForceCard):
-            return
-
-        def draw() -> None:
-            self.operator.show_forces(forces, self.parts.servo.now_ns())
-            for plot in (card.plot, card.wake):
-                plot.paint_now()
-
-        self.operator.panels.draw(card, draw)
+        if self.monitor.forces is not None:
+            self.operator.show_forces(self.monitor.forces, self.parts.servo.now_ns())
 
     @guarded_session_slot
     def show_tiles(self) -> None:
-        operator, health = self.operator, self.monitor.health
-        health.overruns = self.parts.servo.overruns
-
-        def draw() -> None:
-            operator.show_lateness(health)
-            operator.lateness.plot.paint_now()
-
-        operator.panels.draw(operator.lateness, draw)
+        self.monitor.health.overruns = self.parts.servo.overruns
+        self.operator.show_lateness(self.monitor.health)
         self._show()
 
     def _changed(self) -> None:
@@ -368,8 +326,45 @@ class SessionBridge(QObject):
         self._post(event)
 
     @guarded_session_slot
+    def _asked(self, what: str, details: tuple[Any, ...]) -> None:
+        """Do what the operator asks for; zero force comes before anything that could fail or wait for the disk."""
+        now_s, post = self._now(), self._post
+        match what:
+            case "stop":
+                self._stop_force()
+            case "resume":
+                post(ResumeRequested(now_s, "operator"))
+                if self.strip is not None:
+                    self.participant.come_forward()
+            case "pause":
+                post(PauseRequested(now_s, "operator"))
+            case "repeat":
+                post(RepeatRequested(now_s, *details))
+            case "note" | "mark":
+                post(Note(now_s, what, *details or ("",)))
+            case "exclude":
+                self._exclude(*details)
+            case "end":
+                post(EndRequested(now_s, *details))
+            case "diagnose":  # a device that is looked at must not push
+                self._diagnose()
+            case "reconnect":
+                self._reconnect()
+            case "failed":
+                name, error = details
+                log.error("the panel %r failed and was disabled: %s", name, error, exc_info=error)
+                self.record_note(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
+            case "page":
+                self.participant.come_forward()
+            case "close":
+                self._close()
+
+    def _stop_force(self) -> None:
+        self.parts.servo.stop_force()
+        self._post(ForceStopped(self._now(), "operator"))
+
     def _diagnose(self) -> None:
-        """Zero force and a pause first: a device that is looked at must not push."""
+        """Zero force and a pause first."""
         self.parts.servo.stop_force()
         try:
             if not self.runner.finished:
@@ -377,61 +372,28 @@ class SessionBridge(QObject):
         finally:
             self.diagnose_asked.emit()
 
-    @guarded_session_slot
     def _reconnect(self) -> None:
         """Connect the device again, in the background; the force stays off until the operator resumes."""
         if self.reconnection is not None and self.runner.state.lost_device:
             self.reconnection.begin()
             self._show()
 
-    def record_note(self, text: str) -> None:
-        """Write a note to the journal while the session runs; after its end do nothing."""
-        if not self.runner.finished:
-            self._post(Note(self._now(), "note", text))
-
-    @guarded_session_slot
-    def _stop_force(self) -> None:
-        self.parts.servo.stop_force()  # before anything that could fail or wait for the disk
-        self._post(ForceStopped(self._now(), "operator"))
-
-    @guarded_session_slot
-    def _resume(self) -> None:
-        self._post(ResumeRequested(self._now(), "operator"))
-        if self.strip is not None:
-            self.participant.come_forward()
-
-    @guarded_session_slot
-    def _pause(self) -> None:
-        self._post(PauseRequested(self._now(), "operator"))
-
-    @guarded_session_slot
-    def _repeat(self, reason: str) -> None:
-        self._post(RepeatRequested(self._now(), reason))
-
-    @guarded_session_slot
-    def _note(self, text: str) -> None:
-        self._post(Note(self._now(), "note", text))
-
-    @guarded_session_slot
-    def _mark(self) -> None:
-        self._post(Note(self._now(), "mark", ""))
-
-    @guarded_session_slot
-    def _exclude(self, trial: object, reason: str) -> None:
+    def _exclude(self, trial: int | None, reason: str) -> None:
         """Exclude a trial or the session; if that fails, the session continues, and a message appears."""
         if self.parts.exclude is None:
             return
         try:
-            self.parts.exclude(trial if isinstance(trial, int) else None, reason)
+            self.parts.exclude(trial, reason)
         except StudyError as error:
             self.operator.show_message("It was not excluded", f"{error}.")
         else:
-            what = f"trial {trial}" if isinstance(trial, int) else "the session"
+            what = "the session" if trial is None else f"trial {trial}"
             self.record_note(f"excluded from the analysis: {what}: {reason}")
 
-    @guarded_session_slot
-    def _end(self, status: str, reason: str) -> None:
-        self._post(EndRequested(self._now(), "withdrawn" if status == "withdrawn" else "aborted", reason))
+    def record_note(self, text: str) -> None:
+        """Write a note to the journal while the session runs; after its end do nothing."""
+        if not self.runner.finished:
+            self._post(Note(self._now(), "note", text))
 
     def tell_of_device(self, line: str) -> None:
         if self.reconnection is not None and self.reconnection.under_way:
@@ -460,7 +422,6 @@ class SessionBridge(QObject):
         if self.parts.press is not None:
             self.parts.press(buttons)
 
-    @guarded_session_slot
     def _close(self) -> None:
         """Close the operator's window when all is over; else zero force and a question; asked again, leave."""
         if self.runner.finished:

@@ -27,9 +27,9 @@ from study_app.errors import SessionError, StoreError, StudyError
 from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.kit.devices import described, screen_number, settings_here, text_scale_on
+from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.theme import Theme
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.start import NewSession, Ready, check, measured, open_outlets, open_store, videos_of
@@ -281,7 +281,7 @@ class LiveSession(QObject):
         name = self.chosen.device
         device = descriptor_of(name)
         if device.doctor is None:
-            notice = Notice(self.bridge.operator, self.bridge.operator.theme, *NOT_EXAMINED)
+            notice = Question(self.bridge.operator, self.bridge.operator.theme, *NOT_EXAMINED)
             notice.finished.connect(notice.deleteLater)
             notice.show()
             return

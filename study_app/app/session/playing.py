@@ -62,7 +62,7 @@ class PlayedSession(LiveSession):
         participant, runner = self.bridge.participant, self.bridge.runner
         participant.installEventFilter(self)
         participant.event.connect(self._hear)
-        self.bridge.operator.stop_asked.connect(self._stop_later)
+        self.bridge.operator.asked.connect(lambda what, _details: self._stop_later() if what == "stop" else None)
         if self.bridge.strip is not None:
             self.bridge.strip.stop.pressed.connect(self._stop_later)
         runner.on_change(self._follow)

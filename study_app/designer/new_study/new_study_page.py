@@ -15,12 +15,12 @@ from study_app.designer.place.designer_view import StudyChoice
 from study_app.designer.place.tab_order import lead_by_tab
 from study_app.designer.problems.card import NameRefusal
 from study_app.gui.kit.commands import key_cap, tip
+from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Check, IconButton
-from study_app.gui.widgets.dialogs import choose_protocol
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.gui.widgets.main_view import last_focused
 from study_app.ids import short_name_of

@@ -8,13 +8,13 @@ from study_app.designer.new_study.study_list import StudyList
 from study_app.designer.participant.play import PlayControls, PlayStrip
 from study_app.designer.place.designer_view import Banner, HeaderState
 from study_app.gui.kit.commands import tip, with_key
+from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.theme.theme import RADIUS_CARD, Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, chip_size, paint_chip
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
-from study_app.gui.widgets.dialogs import choose_protocol
 from study_app.gui.widgets.labels import label
 
 

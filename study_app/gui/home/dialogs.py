@@ -14,6 +14,7 @@ from study_app.errors import StoreError, StudyError
 from study_app.gui.display.screens import screens_shown
 from study_app.gui.home.study_facts import StudyFacts
 from study_app.gui.kit.devices import device_label, device_or_default, window_options
+from study_app.gui.kit.dialogs import Question
 from study_app.gui.kit.fields import Editor, Field, choice, seed
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
@@ -21,7 +22,6 @@ from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.protocol.groups import refuse_beyond_last
 from study_app.protocol.model import Protocol
@@ -176,6 +176,7 @@ class RehearsalDialog(QDialog):
 
 FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
+HOLDS = "It will contain the folders protocols and results."
 ROW_HINT = "the session takes that participant's row of the square; empty: its own row"
 
 
@@ -457,15 +458,15 @@ class WorkspaceDialog(Question):
             "Choose your workspace",
             "Protocols and results of this computer are kept in one folder. Windows and commands use it wherever they "
             "are started. You can change it later under This machine.",
+            ActionButton("check", "Use this folder", role="primary"),
+            back="Not now",
+            fields=(Field("workspace", "Workspace folder", "folder", hint=HOLDS),),
+            needs={"workspace": "Please choose a folder."},
+            width=620,
         )
         self.setModal(True)
-        self.setMinimumWidth(620)
-        holds = "It will contain the folders protocols and results."
-        self.path = Editor(Field("workspace", "Workspace folder", "folder", hint=holds))
+        self.path = self.editors["workspace"]
         self.path.show_value(str(offered))
-        self.column.addWidget(self.path)
-        self.add_buttons("Not now", ActionButton("check", "Use this folder", role="primary"))
-        self.path.edited.connect(lambda _name: self.go_on.setEnabled(bool(self.path.value)))
         self.go_on.setFocus()
 
     @property

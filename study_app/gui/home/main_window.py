@@ -19,13 +19,13 @@ from PySide6.QtWidgets import QDialog, QMainWindow, QSizePolicy, QStackedWidget,
 from shiboken6 import isValid
 
 from study_app.errors import StudyError
+from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import DARK, LIGHT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Logo, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
-from study_app.gui.widgets.dialogs import Notice, Question
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place, last_focused
 
@@ -278,8 +278,8 @@ class MainWindow(QMainWindow):
         self.not_opened = error
         word = next(place.word for place in DESTINATIONS if place.name == name)
         what = f"{error}." if isinstance(error, StudyError) else bug_words(error)
-        notice = Question(self, self.theme, f"“{word}” could not be opened", what)
-        notice.add_buttons("Close", ActionButton("", "Try again", role="primary"))
+        again = ActionButton("", "Try again", role="primary")
+        notice = Question(self, self.theme, f"“{word}” could not be opened", what, again, back="Close")
         notice.accepted.connect(lambda: self.go(name))
         self._show_notice(notice)
 
@@ -306,7 +306,7 @@ class MainWindow(QMainWindow):
 
     def show_message(self, title: str, sentence: str, *, of: str = "") -> None:
         """Say what went wrong, with one button; what the place ``of`` has said is closed when one leaves it."""
-        self._show_notice(Notice(self, self.theme, title, sentence), of)
+        self._show_notice(Question(self, self.theme, title, sentence), of)
 
     def _show_notice(self, notice: Question, of: str = "") -> None:
         notice.finished.connect(notice.deleteLater)

@@ -39,6 +39,7 @@ from study_app.gui.home.study_facts import (
 )
 from study_app.gui.kit.commands import add_commands, key_cap, with_key
 from study_app.gui.kit.devices import DeviceShown, looking
+from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.sessions.session_facts import SessionFacts, extent_of, sessions
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import apply_theme_within
@@ -46,7 +47,6 @@ from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, scrolled
 from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.dialogs import choose_protocol
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place
 from study_app.session.start import resumed

@@ -1,17 +1,17 @@
 """Forms made from descriptions: a `Field` describes one value, an `Editor` is its label, control and line below."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QAbstractButton, QComboBox, QFileDialog, QLineEdit, QSpinBox, QWidget
+from PySide6.QtWidgets import QAbstractButton, QButtonGroup, QComboBox, QFileDialog, QLineEdit, QSpinBox, QWidget
 
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
-from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number, Toggle
+from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number, Radio, Toggle
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.numbers import read_number, write_number
 from study_app.session.start import MAX_SEED
@@ -34,7 +34,7 @@ class Field:
 
     name: str
     label: str
-    kind: Literal["line", "count", "choice", "switch", "check", "file", "folder"] = "line"
+    kind: Literal["line", "count", "choice", "radio", "switch", "check", "file", "folder"] = "line"
     options: tuple[tuple[Any, str], ...] = ()
     limits: tuple[int, int] = (0, 0)
     unit: str = ""
@@ -77,6 +77,25 @@ def seed(aside: str = "") -> Field:
     return Field("seed", "Seed", aside=aside, parse=parse)
 
 
+class Radios(QWidget):
+    """Values of which one is chosen, at first the first, below each other."""
+
+    def __init__(self, options: Iterable[tuple[Any, str]]) -> None:
+        super().__init__()
+        self._values, words = zip(*options, strict=True)
+        self.group, buttons = QButtonGroup(self), [Radio(each) for each in words]
+        for at, button in enumerate(buttons):
+            button.setFont(font("body"))
+            self.group.addButton(button, at)
+        buttons[0].setChecked(True)
+        vbox(*buttons, spacing=4, margins=0, parent=self)
+        self.setFocusProxy(buttons[0])
+
+    @property
+    def value(self) -> Any:
+        return self._values[self.group.checkedId()]
+
+
 class Line(QLineEdit):
     """A line that is shown as it was at Esc; ``restored`` asks for it."""
 
@@ -102,6 +121,7 @@ class Editor(QWidget):
     def __init__(self, field: Field, button: QWidget | None = None, *, judges: bool = False) -> None:
         super().__init__()
         self.field, self._text, self._hint, self._judges = field, "", field.hint, judges
+        self._values = [value for value, _ in field.options]
         self.aside = label(field.aside, "small", "text3")
         self.below = label("", "small", "text2", wraps=True)
         self.below.setMinimumWidth(LEAST_WORDS)
@@ -129,6 +149,8 @@ class Editor(QWidget):
 
     def _made(self) -> QWidget:
         match self.field.kind:
+            case "radio":
+                return Radios(self.field.options)
             case "count":
                 count = Number(*self.field.limits, self.field.limits[0])
                 count.valueChanged.connect(lambda _value: self.edited.emit(self.field.name))
@@ -138,7 +160,7 @@ class Editor(QWidget):
                 for value, words in self.field.options:
                     choice.addItem(words, value)
                 choice.currentIndexChanged.connect(lambda _at: self.edited.emit(self.field.name))
-                choice.activated.connect(lambda _at: self.changed.emit(self.field.name, choice.currentData()))
+                choice.activated.connect(lambda _at: self.changed.emit(self.field.name, self.value))
                 return choice
             case "switch" | "check":
                 mark = (Toggle if self.field.kind == "switch" else Check)(self.field.label)
@@ -161,14 +183,25 @@ class Editor(QWidget):
     def value(self) -> Any:
         """What stands in the control; a ValueError says why it is not permitted."""
         match self.control:
+            case Radios():
+                return self.control.value
             case QAbstractButton():
                 return self.control.isChecked()
             case QComboBox():
-                return self.control.currentData()
+                at = self.control.currentIndex()
+                return self._values[at] if at >= 0 else None
             case QSpinBox():
                 return self.control.value()
             case QLineEdit():
                 return self.field.parse(self.control.text().strip())
+
+    def offer(self, options: Mapping[Any, str]) -> None:
+        """Offer other values to choose from, the first of them chosen."""
+        assert isinstance(self.control, QComboBox)  # noqa: S101 - only of a choice
+        self._values = [*options]
+        self.control.clear()
+        for value, words in options.items():
+            self.control.addItem(words, value)
 
     def show_value(self, value: Any, hint: str | None = None) -> None:
         """Show a value, and a hint below; what is being typed stays."""
@@ -177,7 +210,7 @@ class Editor(QWidget):
             case QAbstractButton():
                 self.control.setChecked(value)
             case QComboBox():
-                self.control.setCurrentIndex(self.control.findData(value))
+                self.control.setCurrentIndex(self._values.index(value) if value in self._values else -1)
             case QSpinBox():
                 self.control.setValue(value)
             case QLineEdit():

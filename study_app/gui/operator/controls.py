@@ -1,14 +1,9 @@
 """What the operator can do: stop the force, pause, repeat, exclude, end, write a note, have the device examined."""
 
-from collections.abc import Sequence
-from typing import Any
-
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
-    QButtonGroup,
     QLabel,
-    QLineEdit,
     QPlainTextEdit,
     QPushButton,
     QSizePolicy,
@@ -18,23 +13,19 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.gui.operator.operator_view import NOTES_SHOWN, DeviceView, OperatorView
+from study_app.gui.operator.operator_view import NOTES_SHOWN, OperatorView
 from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon
-from study_app.gui.widgets.controls import ActionButton, Radio
-from study_app.gui.widgets.dialogs import Question
+from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label
 from study_app.number_text import minutes
 
 
 class Actions(Card):
     """The bar of buttons at the bottom."""
-
-    pause_asked = Signal()
-    resume_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__(padding=14)
@@ -51,7 +42,6 @@ class Actions(Card):
             button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # its padding gives way
         self.close_session.hide()
         add_parts(self.column, row, self.hint)
-        self.pause.clicked.connect(self._pause_or_resume)
 
     def narrow(self, yes: bool) -> None:
         """Do without the buttons' signs where there is no room for them."""
@@ -76,8 +66,10 @@ class Actions(Card):
             self.close_session.setFocus()
         self.hint.setText(_hint(view))
 
-    def _pause_or_resume(self) -> None:
-        (self.resume_asked if self._resumes else self.pause_asked).emit()
+    @property
+    def paused(self) -> str:
+        """What the first button asks for now."""
+        return "resume" if self._resumes else "pause"
 
 
 def _hint(view: OperatorView) -> str:
@@ -94,53 +86,6 @@ def _hint(view: OperatorView) -> str:
     if view.state == "paused":
         return "An interrupted trial starts again."
     return "You will be asked for a reason; both recordings are kept." if view.may_repeat else ""
-
-
-class ReasonQuestion(Question):
-    """A question that wants a reason, and before it a choice if there are any.
-
-    Parameters
-    ----------
-    choices : each value that can be chosen and its words; the last is chosen at first, unless ``first`` is
-    about : what it is about: the answer to a question about something else would hit the wrong thing
-    """
-
-    def __init__(
-        self,
-        parent: QWidget,
-        theme: Theme,
-        title: str,
-        explanation: str,
-        *,
-        go_on: ActionButton,
-        placeholder: str,
-        choices: Sequence[tuple[Any, str]] = (),
-        first: bool = False,
-        back: str = "Cancel",
-        required: bool = True,
-        about: str = "",
-    ) -> None:
-        super().__init__(parent, theme, title, explanation)
-        self.about, self._values = about, [value for value, _ in choices]
-        self.choices = QButtonGroup(self)
-        for index, (_, words) in enumerate(choices):
-            choice = Radio(words)
-            choice.setFont(font("body"))
-            choice.setChecked(index == (0 if first else len(choices) - 1))
-            self.choices.addButton(choice, index)
-            self.column.addWidget(choice)
-        self.reason = QLineEdit(placeholderText=placeholder)
-        self.reason.setFont(font("body"))
-        self.reason.setAccessibleName("Reason")
-        self.column.addWidget(self.reason)
-        self.add_buttons(back, go_on)
-        if required:
-            self.go_on.setEnabled(False)
-            self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
-
-    @property
-    def choice(self) -> Any:
-        return self._values[self.choices.checkedId()]
 
 
 class NoteField(QPlainTextEdit):
@@ -330,7 +275,7 @@ class DeviceCard(Card):
         self.diagnose = ActionButton("pulse", "Diagnose …", key="D", height=36)
         self.diagnose.setToolTip("Turns the force off and pauses first")
         self._most = ALL_ROWS
-        self._view: DeviceView | None = None
+        self._view: OperatorView | None = None
         row = hbox(self.icon, self.name, STRETCH, self.chip, spacing=10)
         add_layout(self.column, row)
         self._grid = grid(12, 8)
@@ -342,10 +287,10 @@ class DeviceCard(Card):
         """Show so many rows at most; the rest is in the card's tip."""
         self._most = most
         if self._view is not None:
-            self.show_device(self._view)
+            self.show_view(self._view)
 
-    def show_device(self, device: DeviceView) -> None:
-        self._view = device
+    def show_view(self, view: OperatorView) -> None:
+        device, self._view = view.device, view
         self.icon.show_icon(device.icon, "text2")
         self.name.setText(device.name)
         self.chip.show_state(*(("ok", "check", "Ready") if device.ready else ("bad", "warning", "Fault")))

@@ -166,6 +166,8 @@ class ForceCard(Card):
         self.plot.show_forces(times_s, forces_n)
         self.wake.keep_right(float(self.plot.box.viewRange()[0][1]))
         self.wake.show_wake(times_s, wakes_mps)
+        for plot in (self.plot, self.wake):
+            plot.paint_now()
 
     def sizeHint(self) -> QSize:
         return FIELD
@@ -189,6 +191,7 @@ class LatenessCard(Card):
         edges, counts = health.lateness_histogram()
         p99 = health.vitals().lateness_p99_s
         self.plot.show_histogram(edges, counts, None if p99 is None else p99 * 1e6)
+        self.plot.paint_now()
 
 
 class PositionCard(Card):
@@ -205,6 +208,7 @@ class PositionCard(Card):
     def show_health(self, health: ServoHealth, now_s: float) -> None:
         times, positions = health.trace(now_s)
         self.plot.show_traces(times, positions * 1000)
+        self.plot.paint_now()
 
 
 class HiddenForceCard(Card):

@@ -5,13 +5,16 @@ It draws an ``OperatorView`` and two plots, and says what the operator asks for;
 
 from collections.abc import Callable
 from functools import partial
-from typing import Literal
+from traceback import clear_frames
+from typing import Any, Final, Literal
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QResizeEvent
-from PySide6.QtWidgets import QMainWindow, QWidget
+from PySide6.QtWidgets import QGraphicsItem, QMainWindow, QWidget
 
-from study_app.gui.operator.controls import ALL_ROWS, Actions, DeviceCard, NotesCard, ReasonQuestion, StopPanel
+from study_app.gui.kit.dialogs import REASON, Question
+from study_app.gui.kit.fields import Field
+from study_app.gui.operator.controls import ALL_ROWS, Actions, DeviceCard, NotesCard, StopPanel
 from study_app.gui.operator.operator_view import NOTES_SHOWN, OperatorView
 from study_app.gui.operator.plots import ForceCard, HiddenForceCard, LatenessCard, PositionCard, Tiles
 from study_app.gui.operator.servo_health import Forces, ServoHealth
@@ -21,8 +24,6 @@ from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import add_layout, grid, vbox
 from study_app.gui.widgets.cards import Card, scrolled
 from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.dialogs import Notice
-from study_app.gui.widgets.failed_panel import Panels
 from study_app.gui.widgets.main_view import EscapeKey
 
 Width = Literal["wide", "narrow", "slim"]
@@ -40,6 +41,7 @@ DEVICE_ROWS: dict[Height, int] = {"high": ALL_ROWS, "low": 3, "lower": 2, "least
 ACROSS_FROM = 640  # so wide a middle has four tiles, and two plots, side by side
 SIGNS_FROM = 690  # so wide a row of buttons has room for their signs
 GAP = 10
+ENDS: Final = (("aborted", "Another reason"), ("withdrawn", "The participant withdrew"))
 
 
 class Arrangement(QWidget):
@@ -141,20 +143,7 @@ class OperatorWindow(QMainWindow):
     force_limit_n : largest force on the hand [N] in a single-blind study; None where the force is hidden
     """
 
-    stop_asked = Signal()
-    fade_in_asked = Signal()
-    pause_asked = Signal()
-    resume_asked = Signal()
-    repeat_asked = Signal(str)
-    exclude_asked = Signal(object, str)
-    end_asked = Signal(str, str)
-    note_written = Signal(str)
-    mark_set = Signal()
-    diagnose_asked = Signal()
-    reconnect_asked = Signal()
-    close_asked = Signal()
-    page_asked = Signal()
-    theme_changed = Signal(object)
+    asked = Signal(str, tuple)
 
     def __init__(
         self,
@@ -184,21 +173,18 @@ class OperatorWindow(QMainWindow):
         self.notes = NotesCard()
         self.stop = StopPanel(felt=felt)
         self.buttons = Actions()
-        self.panels = Panels(
-            {
-                self.rail.now: "Now",
-                self.rail.tally: "Counts",
-                self.rail.steps_area: "Steps",
-                self.rail: "Session",
-                self.tiles: "Servo",
-                self.lateness: "Tick lateness",
-                self.force: "Force",
-                self.position: "Position",
-                self.device: "Device",
-                self.notes: "Notes",
-            }
-        )
-        self.question: ReasonQuestion | None = None
+        self.question: Question | None = None
+        self._asks_about = ""  # the setting that the question is about
+        self._failed: set[str] = set()
+        self._panels: dict[QWidget, str] = {
+            self.rail: "Session",
+            self.tiles: "Servo",
+            self.lateness: "Tick lateness",
+            self.force: "Force",
+            self.position: "Position",
+            self.device: "Device",
+            self.notes: "Notes",
+        }
         self.escape = EscapeKey(self, anywhere=True)
         self.arrangement = Arrangement(self)
         self.setCentralWidget(self.arrangement)
@@ -208,22 +194,61 @@ class OperatorWindow(QMainWindow):
         apply_theme(self, theme)
 
     def _connect(self) -> None:
-        self.header.theme_button.clicked.connect(self._change_theme)
-        self.header.page.clicked.connect(self.page_asked)
+        ask, buttons = self.ask, self.buttons
         # Pressed, not clicked: the force goes with the finger's first touch.
-        self.stop.stop.pressed.connect(self.stop_asked)
-        self.stop.fade_in.clicked.connect(self.fade_in_asked)
-        self.escape.held.connect(self.stop_asked)
-        self.buttons.pause_asked.connect(self.pause_asked)
-        self.buttons.resume_asked.connect(self.resume_asked)
-        self.buttons.repeat.clicked.connect(self.ask_to_repeat)
-        self.buttons.exclude.clicked.connect(self.ask_to_exclude)
-        self.buttons.end.clicked.connect(self.ask_to_end)
-        self.buttons.close_session.clicked.connect(self.close)
-        self.notes.note_written.connect(self.note_written)
-        self.notes.mark.clicked.connect(self.mark_set)
-        self.device.diagnose.clicked.connect(self.diagnose_asked)
-        self.banner.reconnect.clicked.connect(self.reconnect_asked)
+        for signal, what in (
+            (self.stop.stop.pressed, "stop"),
+            (self.escape.held, "stop"),
+            (self.stop.fade_in.clicked, "resume"),
+            (self.notes.mark.clicked, "mark"),
+            (self.device.diagnose.clicked, "diagnose"),
+            (self.banner.reconnect.clicked, "reconnect"),
+            (self.header.page.clicked, "page"),
+        ):
+            signal.connect(partial(self._press, what))
+        buttons.pause.clicked.connect(lambda: ask(buttons.paused))
+        buttons.repeat.clicked.connect(self.ask_to_repeat)
+        buttons.exclude.clicked.connect(self.ask_to_exclude)
+        buttons.end.clicked.connect(self.ask_to_end)
+        buttons.close_session.clicked.connect(self.close)
+        self.notes.note_written.connect(partial(ask, "note"))
+        self.header.theme_button.clicked.connect(self._change_theme)
+
+    def ask(self, what: str, *details: Any) -> None:
+        """Ask for what a button does, by its name."""
+        self.asked.emit(what, details)
+
+    def _press(self, what: str, _checked: bool = False) -> None:
+        self.ask(what)
+
+    def draw(self, name: str, how: Callable[[], object]) -> None:
+        """Draw what the session does not depend on; where that fails, say so once, and go on."""
+        try:
+            how()
+        except Exception as error:  # noqa: BLE001 - told, and passed on to the log and the journal
+            self.tell_of_failure(name, error)
+
+    def panel_of(self, error: BaseException) -> str:
+        """Return the name of the panel in which an error was raised; "" where the session depends on what failed."""
+        trace, inside = error.__traceback__, None
+        while trace is not None:
+            frame, trace = trace.tb_frame, trace.tb_next
+            local = frame.f_locals if frame.f_code.co_argcount else {}
+            owner = local.get("self")
+            if isinstance(owner, QGraphicsItem) and owner.scene() is not None:
+                owner = next(iter(owner.scene().views()), None)
+            inside = owner if isinstance(owner, QWidget) else inside
+            if isinstance(local, dict):  # before Python 3.13 a copy that the frame keeps, and with it a painter at work
+                local.clear()
+        here = (panel for panel in self._panels if inside is panel or (inside and panel.isAncestorOf(inside)))
+        return next((self._panels[panel] for panel in here if isinstance(error, Exception)), "")
+
+    def tell_of_failure(self, name: str, error: BaseException) -> None:
+        clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
+        if name not in self._failed:
+            self._failed.add(name)
+            self.show_message("A part of this window failed", f"{name}: this panel failed. The session continues.")
+            self.ask("failed", name, error)
 
     def show_view(self, view: OperatorView) -> None:
         """Show everything but the plots; trouble first, for it may be that one of the parts cannot be shown."""
@@ -231,112 +256,104 @@ class OperatorWindow(QMainWindow):
             return
         self.banner.show_view(view)
         self.may_close = view.over
-        asked = self.question
-        if asked is not None and asked.about and not (view.may_repeat and asked.about == _setting(view)):
-            asked.reject()  # the trial it was about is over: its answer would hit the next one
+        if self.question is not None and self._asks_about not in {"", _setting(view) if view.may_repeat else None}:
+            self.question.reject()  # the trial it was about is over: its answer would hit the next one
         for part in (self.stop, self.header, self.buttons):
             part.show_view(view)
-        for panel in (self.rail.now, self.rail.tally, self.tiles, self.notes):
-            self.panels.draw(panel, partial(panel.show_view, view))
-        self.panels.draw(self.rail.steps_area, lambda: self.rail.show_view(view))
-        self.panels.draw(self.device, lambda: self.device.show_device(view.device))
+        for name, show in (
+            ("Now", self.rail.now.show_view),
+            ("Counts", self.rail.tally.show_view),
+            ("Servo", self.tiles.show_view),
+            ("Notes", self.notes.show_view),
+            ("Steps", self.rail.show_view),
+            ("Device", self.device.show_view),
+        ):
+            self.draw(name, partial(show, view))
         self._view = view
 
     def show_traces(self, health: ServoHealth, now_s: float) -> None:
-        self.position.show_health(health, now_s)
+        self.draw("Position", lambda: self.position.show_health(health, now_s))
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
         """Draw force and wake (30 times a second), where they are not hidden."""
-        if isinstance(self.force, ForceCard):
-            self.force.show_forces(forces, now_ns)
+        if isinstance(card := self.force, ForceCard):
+            self.draw("Force", lambda: card.show_forces(forces, now_ns))
 
     def show_lateness(self, health: ServoHealth) -> None:
-        self.lateness.show_health(health)
+        self.draw("Tick lateness", lambda: self.lateness.show_health(health))
 
     def ask_to_repeat(self) -> None:
         """Ask for the reason of a repetition; nothing happens without one."""
-        if self._already_asked() or self._view is None or not self._view.may_repeat:
-            return
-        setting = _setting(self._view)
-        self._ask(
-            ReasonQuestion(
-                self,
-                self.theme,
+        if self._view is not None and self._view.may_repeat:
+            setting = _setting(self._view)
+            self._ask(
+                "repeat",
                 "Repeat this trial?",
                 f"{setting} starts again from the beginning. The first recording is kept, together with your reason.",
-                go_on=ActionButton("repeat", "Repeat trial", role="primary"),
-                placeholder="Reason, for example: phone rang",
-                about=setting,
-            ),
-            lambda question: self.repeat_asked.emit(question.reason.text().strip()),
-        )
+                ActionButton("repeat", "Repeat trial", role="primary"),
+                fields=(Field("reason", "Reason", placeholder="For example: phone rang"),),
+                needs={"reason": REASON},
+            )
+            self._asks_about = setting
 
     def ask_to_exclude(self) -> None:
         """Ask what does not count, and why."""
-        if self._already_asked() or self._view is None:
-            return
-        trial = self._view.trial
-        self._ask(
-            ReasonQuestion(
-                self,
-                self.theme,
+        if self._view is not None:
+            trial = () if self._view.trial is None else ((self._view.trial, _setting(self._view)),)
+            self._ask(
+                "exclude",
                 "Exclude this from the analysis?",
                 "Nothing is deleted. The list of exclusions records what was excluded, by whom and why.",
-                go_on=ActionButton("flag", "Exclude", role="primary"),
-                placeholder="Reason, for example: talked during the trial",
-                choices=(*([] if trial is None else [(trial, _setting(self._view))]), (None, "Whole session")),
-                first=True,
-            ),
-            lambda question: self.exclude_asked.emit(question.choice, question.reason.text().strip()),
-        )
+                ActionButton("flag", "Exclude", role="primary"),
+                fields=(
+                    Field("what", "Scope", "radio", (*trial, (None, "Whole session"))),
+                    Field("reason", "Reason", placeholder="For example: talked during the trial"),
+                ),
+                needs={"reason": REASON},
+            )
+
+    def ask_to_end(self) -> None:
+        if self._view is not None and not self._view.over:
+            self._ask(
+                "end",
+                "End this session now?",
+                f"{dict(self._view.counts)['Answers on disk']} answers are on disk and are kept. The force is turned "
+                "off when the session ends.",
+                ActionButton("cross", "End session", role="danger"),
+                back="Continue the session",
+                fields=(
+                    Field("status", "What happened", "radio", ENDS),
+                    Field("reason", "Reason", placeholder="Optional"),
+                ),
+            )
+            assert self.question is not None  # noqa: S101 - just made
+            self.question.back.setDefault(True)
+
+    def _ask(self, what: str, *words: Any, **more: Any) -> None:
+        """Open a question, unless one is open; what it asks for is asked for with its values."""
+        if self.question is not None:
+            self.question.raise_()
+            self.question.activateWindow()
+            return
+        question = self.question = Question(self, self.theme, *words, **more)
+        question.accepted.connect(lambda: self.ask(what, *map(question.value, question.editors)))
+        question.finished.connect(self._question_answered)
+        question.show()
 
     def show_message(self, title: str, sentence: str) -> None:
-        notice = Notice(self, self.theme, title, sentence)
+        notice = Question(self, self.theme, title, sentence)
         notice.finished.connect(notice.deleteLater)
         notice.finished.connect(self._take_keyboard)
         notice.show()
-
-    def ask_to_end(self) -> None:
-        if self._already_asked() or self._view is None or self._view.over:
-            return
-        question = ReasonQuestion(
-            self,
-            self.theme,
-            "End this session now?",
-            f"{dict(self._view.counts)['Answers on disk']} answers are on disk and are kept. The force is turned off "
-            "when the session ends.",
-            go_on=ActionButton("cross", "End session", role="danger"),
-            placeholder="Reason (optional)",
-            choices=(("withdrawn", "The participant withdrew"), ("aborted", "Another reason")),
-            back="Continue the session",
-            required=False,
-        )
-        question.go_on.setDefault(False)
-        question.back.setDefault(True)
-        question.choices.button(1).setFocus()
-        self._ask(question, lambda asked: self.end_asked.emit(asked.choice, asked.reason.text().strip()))
-
-    def _ask(self, question: ReasonQuestion, answered: Callable[[ReasonQuestion], None]) -> None:
-        self.question = question
-        question.accepted.connect(lambda: answered(question))
-        question.finished.connect(self._question_answered)
-        question.show()
 
     def come_forward(self) -> None:
         self.raise_()
         self.activateWindow()
 
-    def _already_asked(self) -> bool:
-        if self.question is None:
-            return False
-        self.question.raise_()
-        self.question.activateWindow()
-        return True
-
     def _question_answered(self) -> None:
         if self.question is not None:
             self.question.deleteLater()
-        self.question = None
+        self.question, self._asks_about = None, ""
         self._take_keyboard()
 
     def _take_keyboard(self) -> None:
@@ -347,7 +364,6 @@ class OperatorWindow(QMainWindow):
     def _change_theme(self) -> None:
         self.theme = LIGHT if self.theme.dark else DARK
         apply_theme(self, self.theme)
-        self.theme_changed.emit(self.theme)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Close at once when the session is over; else leave it to who listens, with the window open."""
@@ -355,7 +371,7 @@ class OperatorWindow(QMainWindow):
             event.accept()
         else:
             event.ignore()
-        self.close_asked.emit()
+        self.ask("close")
 
 
 def _setting(view: OperatorView) -> str:

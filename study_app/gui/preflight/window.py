@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QAccessible, QCloseEvent, QColor, QKeyEvent, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractSlider, QLabel, QProgressBar, QScrollArea, QWidget
+from PySide6.QtWidgets import QAbstractSlider, QLabel, QProgressBar, QWidget
 
 from study_app.devices.descriptor import NOT_AVAILABLE, Backend
+from study_app.gui.kit.dialogs import Question
 from study_app.gui.sessions.session_facts import extent_of, operator_language, step_title
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import LIGHT, Theme, font
@@ -21,7 +22,6 @@ from study_app.gui.widgets.accessible import describe_plot, give_role
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Chip, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, Number
-from study_app.gui.widgets.dialogs import Question
 from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.gui.widgets.live_plots import LatenessPlot
 from study_app.protocol.describe import spread
@@ -441,19 +441,19 @@ class ComputerWindow(Question):
     asked = Signal()
 
     def __init__(self, parent: QWidget, theme: Theme) -> None:
-        super().__init__(parent, theme, "Check of this computer", ABOUT)
+        inside, close = QWidget(), ActionButton("", "Close", role="primary")
+        super().__init__(parent, theme, "Check of this computer", ABOUT, close, back="Check again", inside=inside)
         self.setModal(True)
         self.rows: list[CheckRow] = []
         self.state = label(MEASURING, "body", "text2", wraps=True)
         self.bar = QProgressBar(textVisible=False)
         self.bar.setFixedHeight(8)
-        inside = QWidget()
-        self._rows = vbox(STRETCH, spacing=0, margins=0, parent=inside)
-        area = QScrollArea(widgetResizable=True)
-        area.setWidget(inside)
-        add_parts(self.column, self.state, self.bar, (area, 1))
-        again = ActionButton("", "Close", role="primary")
-        self.add_buttons("Check again", again)
+        self._rows = vbox(STRETCH, spacing=0, margins=0)
+        area = scrolled(self._rows)
+        area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        vbox(self.state, self.bar, (area, 1), spacing=12, margins=0, parent=inside)
+        self._theme = theme
+        apply_theme(self, theme)
         self.back.clicked.disconnect(self.reject)
         self.back.clicked.connect(self.asked)
         self.resize(*SIZE)

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QBoxLayout, QDialog, QLineEdit, QScrollArea, QSize
 from study_app.gui.kit.fields import Editor, Field
 from study_app.gui.results.figures import FiguresPanel, LeftOut, ResultsView, in_figures
 from study_app.gui.sessions.session_facts import Column, SessionFacts, matching, started_words, states_of
-from study_app.gui.sessions.session_page import LeaveOutDialog, SessionPage, TakeBackDialog, UnblindDialog
+from study_app.gui.sessions.session_page import LeaveOutDialog, SessionPage, take_back_question, unblind_question
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
@@ -454,8 +454,8 @@ class ResultsPlace(Place):
 
     def _ask_unblind(self) -> None:
         open_ones = sum(one.needs_care for one in self.view.sessions)
-        dialog = UnblindDialog(self, self.theme, self._name(), running=open_ones)
-        dialog.accepted.connect(lambda: self.unblind_asked.emit(dialog.by.text(), dialog.reason.text()))
+        dialog = unblind_question(self, self.theme, self._name(), running=open_ones)
+        dialog.accepted.connect(lambda: self.unblind_asked.emit(dialog.value("by"), dialog.value("reason")))
         self._open(dialog)
 
     def _open_session(self, session: SessionFacts) -> None:
@@ -467,13 +467,15 @@ class ResultsPlace(Place):
         there = [one for one in self.view.sessions if one.excluded is None]
         dialog = LeaveOutDialog(self, self.theme, there, self.view.trials, self.sessions.rows.chosen)
         dialog.accepted.connect(
-            lambda: self.leave_out_asked.emit((*dialog.chosen, dialog.by.text(), dialog.reason.text()))
+            lambda: self.leave_out_asked.emit((*dialog.chosen, dialog.value("by"), dialog.value("reason")))
         )
         self._open(dialog)
 
     def _ask_take_back(self, one: LeftOut) -> None:
-        dialog = TakeBackDialog(self, self.theme, one.what, one.reason)
-        dialog.accepted.connect(lambda: self.take_back_asked.emit((*one.which, dialog.by.text(), dialog.reason.text())))
+        dialog = take_back_question(self, self.theme, one.what, one.reason)
+        dialog.accepted.connect(
+            lambda: self.take_back_asked.emit((*one.which, dialog.value("by"), dialog.value("reason")))
+        )
         self._open(dialog)
 
     def _ask_tables(self) -> None:

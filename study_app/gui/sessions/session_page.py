@@ -5,16 +5,18 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QDialog, QLineEdit, QScrollArea, QSizePolicy, QWidget
+from PySide6.QtWidgets import QDialog, QScrollArea, QSizePolicy, QWidget
 
 from study_app.devices.registry import discover
 from study_app.errors import StoreError
+from study_app.gui.kit.dialogs import REASON, Question
+from study_app.gui.kit.fields import Field, choice
 from study_app.gui.sessions.session_facts import (
     VALIDITY,
     SessionFacts,
@@ -27,10 +29,9 @@ from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.background import Background
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, insert_layout, vbox
-from study_app.gui.widgets.cards import Card, Chip, Icon, smooth_painter
-from study_app.gui.widgets.controls import ActionButton, Choice
-from study_app.gui.widgets.dialogs import Question
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import Card, Chip, smooth_painter
+from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.row_table import CHIP_ROLE, Index, Table
 from study_app.number_text import counted
@@ -252,75 +253,33 @@ def _files(session: SessionFolder) -> list[str]:
 WIDTH = 560
 
 
-class Decision(Question):
-    """A question that wants a name and a reason before it goes on."""
-
-    def __init__(self, parent: QWidget, theme: Theme, title: str, explanation: str) -> None:
-        super().__init__(parent, theme, title, explanation)
-        self.setModal(True)
-        self.setMinimumWidth(WIDTH)
-        self.form = grid(16, 10)
-        self.form.setColumnStretch(1, 1)
-        add_layout(self.column, self.form)
-        self.by = _line("Your name or initials, such as AK")
-        self.reason = _line("")
-        self.missing = label("", "label", "bad", wraps=True)
-        self.missing.hide()
-
-    def add_field(self, name: str, field: QWidget) -> None:
-        """Put a field under those before, with its name at its left."""
-        said = label(name, "label", "text2")
-        field.setAccessibleName(name)
-        field.setFont(font("body"))
-        row = self.form.rowCount()
-        self.form.addWidget(said, row, 0, Qt.AlignmentFlag.AlignVCenter)
-        self.form.addWidget(field, row, 1)
-
-    def finish(self, by: str, reason: str, go_on: ActionButton) -> None:
-        """Put name, reason and the buttons below everything else."""
-        self.add_field(by, self.by)
-        self.add_field(reason, self.reason)
-        self.column.addWidget(self.missing)
-        self.add_buttons("Cancel", go_on)
-
-    def accept(self) -> None:
-        for field, what in ((self.by, "a name"), (self.reason, "a reason")):
-            if not field.text().strip():
-                self.missing.setText(f"Please enter {what}; it is recorded.")
-                self.missing.show()
-                field.setFocus()
-                return
-        super().accept()
+NEEDS: Final = {"by": "Please enter a name; it is recorded.", "reason": REASON}
 
 
-class UnblindDialog(Decision):
-    """Asks who opens the key and why, and says what it means."""
-
-    def __init__(self, parent: QWidget, theme: Theme, study: str, *, running: int) -> None:
-        super().__init__(
-            parent,
-            theme,
-            f"Unblind {study}?",
-            "Everyone who opens this study will see which setting was which, here and in every table, figure and "
-            "report. This cannot be undone. Your name, the reason and the time are stored with the data.",
-        )
-        if running:
-            many = "1 session is" if running == 1 else f"{running} sessions are"
-            row = hbox((Icon("warning", "warn", 20), 0, Qt.AlignmentFlag.AlignTop), spacing=10)
-            warns = label(
-                f"{many} not complete. Operators of the remaining sessions will no longer be blind.",
-                "label",
-                "warn",
-                wraps=True,
-            )
-            row.addWidget(warns, 1)
-            insert_layout(self.column, 2, row)
-        self.reason.setPlaceholderText("For example: collection closed")
-        self.finish("Name", "Reason", ActionButton("eye", "Unblind", role="danger"))
-        self.by.setFocus()
+def by_and_reason(by: str, who: str, example: str) -> tuple[Field, Field]:
+    """Return the fields that say who decides, and why."""
+    return Field("by", by, placeholder=who), Field("reason", "Reason", placeholder=f"For example: {example}")
 
 
-class LeaveOutDialog(Decision):
+def unblind_question(parent: QWidget, theme: Theme, study: str, *, running: int) -> Question:
+    """Return the question who opens the key and why, which says what it means."""
+    many = "1 session is" if running == 1 else f"{running} sessions are"
+    later = f"{many} not complete. Operators of the remaining sessions will no longer be blind." if running else ""
+    return Question(
+        parent,
+        theme,
+        f"Unblind {study}?",
+        "Everyone who opens this study will see which setting was which, here and in every table, figure and report. "
+        "This cannot be undone. Your name, the reason and the time are stored with the data.",
+        ActionButton("eye", "Unblind", role="danger"),
+        fields=by_and_reason("Name", "Your name or initials, such as AK", "collection closed"),
+        needs=NEEDS,
+        warning=later,
+        width=WIDTH,
+    )
+
+
+class LeaveOutDialog(Question):
     """Asks which session, or which trial of it, by whom and why.
 
     Parameters
@@ -342,58 +301,46 @@ class LeaveOutDialog(Decision):
             parent,
             theme,
             "Exclude from the analysis",
-            "It no longer counts in measures, figures and tests. Nothing is deleted: exclusions.csv and every "
-            "report state what was excluded, by whom and why.",
+            "It no longer counts in measures, figures and tests. Nothing is deleted: exclusions.csv and every report "
+            "state what was excluded, by whom and why.",
+            ActionButton("minus", "Exclude", role="primary"),
+            fields=(
+                choice("session", "Session", {(facts.participant, facts.session): facts.name for facts in sessions}),
+                choice("trial", "Scope", {}),
+                *by_and_reason("By", "Your initials, or the rule's name", "fell asleep"),
+            ),
+            needs=NEEDS,
+            width=WIDTH,
         )
         self._trials = trials
-        self.session = Choice()
-        self.trial = Choice()
-        for facts in sessions:
-            self.session.addItem(facts.name, (facts.participant, facts.session))
-            if chosen is not None and facts.folder == chosen.folder:
-                self.session.setCurrentIndex(self.session.count() - 1)
-        self.session.currentIndexChanged.connect(self._show_trials)
-        self.add_field("Session", self.session)
-        self.add_field("Scope", self.trial)
-        self.by.setPlaceholderText("Your initials, or the rule's name")
-        self.reason.setPlaceholderText("For example: fell asleep")
+        if chosen is not None:
+            self.editors["session"].show_value((chosen.participant, chosen.session))
+        self.editors["session"].edited.connect(self._show_trials)
         self._show_trials()
-        self.finish("By", "Reason", ActionButton("minus", "Exclude", role="primary"))
-        set_ink(self.missing, "bad")
-        self.session.setFocus()
+
+    def _show_trials(self) -> None:
+        trials = self._trials.get(self.value("session"), ())
+        self.editors["trial"].offer({None: "Whole session", **{at: f"Trial {at}: {words}" for at, words in trials}})
 
     @property
     def chosen(self) -> tuple[str, int, int | None]:
         """Participant, session and trial; None for the whole session."""
-        participant, session = self.session.currentData()
-        return participant, session, self.trial.currentData()
-
-    def _show_trials(self) -> None:
-        self.trial.clear()
-        self.trial.addItem("Whole session", None)
-        for number, words in self._trials.get(tuple(self.session.currentData() or ("", 0)), ()):
-            self.trial.addItem(f"Trial {number}: {words}", number)
+        return *self.value("session"), self.value("trial")
 
 
-class TakeBackDialog(Decision):
-    """Asks who takes an exclusion back and why."""
-
-    def __init__(self, parent: QWidget, theme: Theme, what: str, reason: str) -> None:
-        super().__init__(
-            parent,
-            theme,
-            f"Include again: {what}",
-            f"It was excluded for this reason: “{reason}”. It will count again in measures, figures and tests. Your "
-            "name, the reason and the time are stored in exclusions_reversed.jsonl.",
-        )
-        self.reason.setPlaceholderText("For example: wrong participant")
-        self.finish("By", "Reason", ActionButton("undo", "Include again", role="primary"))
-        self.by.setFocus()
-
-
-def _line(placeholder: str) -> QLineEdit:
-    made = QLineEdit(placeholderText=placeholder)
-    return made
+def take_back_question(parent: QWidget, theme: Theme, what: str, reason: str) -> Question:
+    """Return the question who takes an exclusion back and why."""
+    return Question(
+        parent,
+        theme,
+        f"Include again: {what}",
+        f"It was excluded for this reason: “{reason}”. It will count again in measures, figures and tests. Your name, "
+        "the reason and the time are stored in exclusions_reversed.jsonl.",
+        ActionButton("undo", "Include again", role="primary"),
+        fields=by_and_reason("By", "Your name or initials, such as AK", "wrong participant"),
+        needs=NEEDS,
+        width=WIDTH,
+    )
 
 
 HEIGHT = 150
@@ -550,7 +497,7 @@ class SessionPage(QDialog):
         super().__init__(parent)
         self.facts = facts
         self.record: SessionRecord | None = None
-        self.decision: LeaveOutDialog | TakeBackDialog | None = None
+        self.decision: Question | None = None
         self._theme = theme
         self._reader, self._mover = Background(self), Background(self)
         self._reader.done.connect(self._show)
@@ -680,26 +627,25 @@ class SessionPage(QDialog):
         who = (self.facts.participant, self.facts.session)
         trials = {trial.number: trial.words for trial in self.record.trials if trial.excluded is None}
         dialog = LeaveOutDialog(self, self._theme, [self.facts], {who: tuple(trials.items())}, self.facts)
-        dialog.accepted.connect(lambda: self._leave_out(dialog.chosen[2], dialog.by.text(), dialog.reason.text()))
-        dialog.finished.connect(dialog.deleteLater)
-        self.decision = dialog
-        dialog.open()
-
-    def _leave_out(self, trial: int | None, by: str, reason: str) -> None:
-        facts = self.facts
-        leave_out = partial(exclude, facts.folder.parents[2], facts.participant, facts.session, trial=trial)
-        self._decide(partial(leave_out, by=by, reason=reason))
+        leave_out = partial(exclude, self._study, *who)
+        self._ask(dialog, lambda: partial(leave_out, trial=dialog.value("trial")))
 
     def _ask_take_back(self, one: Exclusion, what: str) -> None:
-        dialog = TakeBackDialog(self, self._theme, what, one.reason)
-        dialog.accepted.connect(lambda: self._take_back(one, dialog.by.text(), dialog.reason.text()))
-        dialog.finished.connect(dialog.deleteLater)
-        self.decision = dialog
-        dialog.open()
+        dialog = take_back_question(self, self._theme, what, one.reason)
+        take_back = partial(include, self._study, one.participant, one.session, trial=one.trial)
+        self._ask(dialog, lambda: take_back)
 
-    def _take_back(self, one: Exclusion, by: str, reason: str) -> None:
-        take_back = partial(include, self.facts.folder.parents[2], one.participant, one.session, trial=one.trial)
-        self._decide(partial(take_back, by=by, reason=reason))
+    @property
+    def _study(self) -> Path:
+        return self.facts.folder.parents[2]
+
+    def _ask(self, dialog: Question, decision: Callable[[], Callable[..., object]]) -> None:
+        self.decision = dialog
+        dialog.accepted.connect(
+            lambda: self._decide(partial(decision(), by=dialog.value("by"), reason=dialog.value("reason")))
+        )
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.open()
 
     def _decide(self, decide: Callable[[], object]) -> None:
         """Carry out a decision in the thread that reads, read the session again, and tell of it."""

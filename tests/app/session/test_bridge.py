@@ -8,8 +8,8 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
+from study_app.gui.kit.dialogs import Question
 from study_app.gui.operator.session_panels import Strip
-from study_app.gui.widgets.dialogs import Notice
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
 from study_app.session.pages import EndPage, PausePage, TaskPage, TroublePage
 from study_app.session.transitions.events import Continue
@@ -45,9 +45,9 @@ def test_force_and_task_begin_when_the_tank_is_painted_and_not_while_a_page_asks
 def test_with_a_full_disk_the_force_stops_and_the_session_waits_and_loses_nothing(bridge, world, caplog):
     begin_trial(bridge, world)
     world.full = True
-    bridge.operator.mark_set.emit()
-    bridge.operator.note_written.emit("dropped while the disk is full")
-    bridge.operator.stop_asked.emit()
+    bridge.operator.ask("mark")
+    bridge.operator.ask("note", "dropped while the disk is full")
+    bridge.operator.ask("stop")
     assert not world.force_is_on
     assert isinstance(bridge.participant.page, TroublePage)
     banner = bridge.operator.banner
@@ -62,7 +62,7 @@ def test_with_a_full_disk_the_force_stops_and_the_session_waits_and_loses_nothin
     assert isinstance(bridge.participant.page, PausePage)
     assert not banner.isVisible()
     assert ("note", {"kind": "mark", "text": ""}) in world.done
-    bridge.operator.fade_in_asked.emit()
+    bridge.operator.ask("resume")
     assert isinstance(bridge.participant.page, TaskPage)
     assert world.force_is_on
     assert "accepts data again" in caplog.text
@@ -105,10 +105,10 @@ def test_windows_answer_while_recordings_are_written_and_close_after_it(make, wo
     recorder = SlowRecorder()
     bridge = make(recorder=recorder)
     begin_trial(bridge, world)
-    bridge.operator.end_asked.emit("withdrawn", "tired")
+    bridge.operator.ask("end", "withdrawn", "tired")
     bridge.runner.poll()
     assert isinstance(bridge.participant.page, EndPage)
-    bridge.operator.close_asked.emit()
+    bridge.operator.ask("close")
     assert not bridge.participant.may_close, "the end is still to be written"
     recorder.on_disk = True
     with qtbot.waitSignal(bridge.done):
@@ -130,7 +130,7 @@ def test_a_participants_window_that_comes_to_cover_the_operators_pauses_the_sess
     QApplication.processEvents()
     assert (("paused", {"by": "program"}) in world.done) == full_screen
     assert isinstance(bridge.participant.page, PausePage if full_screen else TaskPage)
-    told = [one for one in bridge.operator.findChildren(Notice) if one.isVisible()]
+    told = [one for one in bridge.operator.findChildren(Question) if one.isVisible()]
     assert len(told) == full_screen
     if full_screen:
         qtbot.waitUntil(lambda: QApplication.activeWindow() in (bridge.operator, *told))

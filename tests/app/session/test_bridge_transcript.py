@@ -51,8 +51,12 @@ def push(bridge: Any, world: World) -> None:
     world.samples = records(SAMPLE, 0)
 
 
-def emit(name: str, *values: Any, window: str = "operator") -> Any:
-    return lambda bridge, _world: getattr(getattr(bridge, window), name).emit(*values)
+def emit(name: str, *values: Any) -> Any:
+    return lambda bridge, _world: getattr(bridge.participant, name).emit(*values)
+
+
+def ask(what: str, *details: Any) -> Any:
+    return lambda bridge, _world: bridge.operator.ask(what, *details)
 
 
 def event(kind: Any, *values: Any) -> Any:
@@ -90,24 +94,24 @@ STEPS: dict[str, Any] = {
     "go on": event(Continue),
     "shown": shown_at,
     "push": push,
-    "pointer": emit("pointer", 0.01, 0.02, 0.03, window="participant"),
-    "buttons": emit("buttons", 2, window="participant"),
-    "painted": emit("painted", 5_000_000, window="participant"),
-    "left": emit("left", window="participant"),
-    "note": emit("note_written", "left-handed"),
-    "mark": emit("mark_set"),
-    "pause": emit("pause_asked"),
-    "resume": emit("resume_asked"),
-    "repeat": emit("repeat_asked", "phone rang"),
-    "stop": emit("stop_asked"),
-    "fade in": emit("fade_in_asked"),
-    "exclude a trial": emit("exclude_asked", 1, "asleep"),
-    "exclude all": emit("exclude_asked", None, "no consent"),
-    "exclude again": emit("exclude_asked", 9, "again"),
+    "pointer": emit("pointer", 0.01, 0.02, 0.03),
+    "buttons": emit("buttons", 2),
+    "painted": emit("painted", 5_000_000),
+    "left": emit("left"),
+    "note": ask("note", "left-handed"),
+    "mark": ask("mark"),
+    "pause": ask("pause"),
+    "resume": ask("resume"),
+    "repeat": ask("repeat", "phone rang"),
+    "stop": ask("stop"),
+    "fade in": ask("resume"),
+    "exclude a trial": ask("exclude", 1, "asleep"),
+    "exclude all": ask("exclude", None, "no consent"),
+    "exclude again": ask("exclude", 9, "again"),
     "participant stops": event(ForceStopped, "participant"),
-    "panel fails": lambda bridge, _: bridge.operator.panels.failed.emit("forces", ValueError("no plot")),
+    "panel fails": ask("failed", "forces", ValueError("no plot")),
     "thread ends": lambda bridge, _: bridge._thread_exceptions.ended.emit("the writer ended"),
-    "diagnose": emit("diagnose_asked"),
+    "diagnose": ask("diagnose"),
     "disk is full": let(full=True),
     "disk has space": let(full=False),
     "servo stops": let(fault="the servo stopped: no samples"),
@@ -116,14 +120,14 @@ STEPS: dict[str, Any] = {
     "second error": fail(ValueError("second")),
     "bug": fail(RuntimeError("out of ideas")),
     "no clip": fail(VideoError("the clip ended")),
-    "reconnect": emit("reconnect_asked"),
+    "reconnect": ask("reconnect"),
     "line": lambda bridge, _: bridge.tell_of_device("press the button"),
     "reconnected": reconnected,
     "not reconnected": lambda bridge, _: bridge.reconnection.failed.emit(DeviceNotFound("still none")),
     "late": let(overruns=3, rate_hz=900.0, worst_gap_s=0.004),
-    "withdraw": emit("end_asked", "withdrawn", "felt unwell"),
-    "abort": emit("end_asked", "aborted", "broken"),
-    "close": emit("close_asked"),
+    "withdraw": ask("end", "withdrawn", "felt unwell"),
+    "abort": ask("end", "aborted", "broken"),
+    "close": ask("close"),
     "accept": lambda bridge, _: bridge.operator.question.accept(),
     "leave": lambda bridge, _: bridge.leave_now(),
 }

@@ -7,9 +7,9 @@ import weakref
 import pytest
 from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 
-from study_app.gui.widgets.dialogs import Notice
+from study_app.gui.kit.dialogs import Question
 from study_app.gui.widgets.main_view import EscapeKey
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.session.transitions.events import EndRequested
@@ -111,15 +111,15 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
 @pytest.mark.parametrize(
     ("owner", "method", "do", "name"),
     [
-        ("operator.controls.NotesCard", "show_view", lambda bridge: bridge.operator.mark_set.emit(), "Notes"),
+        ("operator.controls.NotesCard", "show_view", lambda bridge: bridge.operator.ask("mark"), "Notes"),
         ("operator.controls.NoteField", "toPlainText", write_note, "Notes"),
         ("operator.plots.PositionCard", "show_health", lambda bridge: bridge.show_traces(), "Position"),
         ("widgets.live_plots.Plot", "paintEvent", lambda it: it.operator.position.plot.viewport().update(), "Position"),
         ("operator.session_panels.Rail", "paintEvent", lambda bridge: bridge.operator.rail.update(), "Session"),
-        ("operator.session_panels.Tally", "show_view", lambda bridge: bridge.operator.mark_set.emit(), "Counts"),
+        ("operator.session_panels.Tally", "show_view", lambda bridge: bridge.operator.ask("mark"), "Counts"),
     ],
 )
-def test_a_panel_that_fails_is_replaced_by_a_line_and_the_session_goes_on(
+def test_a_panel_that_fails_is_told_once_and_the_session_goes_on(
     make, world, qtbot, monkeypatch, caplog, owner, method, do, name
 ):
     breaking = Breaking(monkeypatch, owner, method)
@@ -127,15 +127,13 @@ def test_a_panel_that_fails_is_replaced_by_a_line_and_the_session_goes_on(
     begin_trial(bridge, world)
     QApplication.processEvents()
     breaking.now(bridge, do)
-    panels = bridge.operator.panels
-    qtbot.waitUntil(lambda: None not in panels.covers.values() and bool(panels.covers))
+    qtbot.waitUntil(lambda: bool(bridge.operator.findChildren(Question)))
     for _ in range(3):
         do(bridge)
         bridge.show_tiles()
         QApplication.processEvents()
-    cover = next(cover for panel, cover in panels.covers.items() if panels.names[panel] == name)
-    assert cover.isVisible()
-    assert cover.line.text() == f"{name}: this panel failed. The session continues."
+    said = [one.text() for notice in bridge.operator.findChildren(Question) for one in notice.findChildren(QLabel)]
+    assert said.count(f"{name}: this panel failed. The session continues.") == 1
     assert (world.force_is_on, bridge.trouble) == (True, "")
     assert isinstance(bridge.participant.page, TaskPage)
     assert "broke" not in world.events()
@@ -174,8 +172,8 @@ def test_a_thread_that_ends_by_an_exception_is_told_noted_and_ends_no_session(br
     thread = threading.Thread(target=lambda: 1 / 0, name="recorder")
     thread.start()
     thread.join()
-    qtbot.waitUntil(lambda: bridge.operator.findChildren(Notice) != [])
-    (notice,) = bridge.operator.findChildren(Notice)
+    qtbot.waitUntil(lambda: bridge.operator.findChildren(Question) != [])
+    (notice,) = bridge.operator.findChildren(Question)
     assert notice.isVisible()
     assert "recorder" in caplog.text
     caplog.clear()
@@ -228,7 +226,7 @@ def test_what_the_device_asks_for_is_shown_and_the_button_waits(lost, device, wo
     banner = lost.operator.banner
     qtbot.mouseClick(banner.reconnect, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: device.calls == 1)
-    lost.operator.reconnect_asked.emit()
+    lost.operator.ask("reconnect")
     lost.tell_of_device("Homing (red light): pull the grip out.")
     assert banner.then.text() == "Homing (red light): pull the grip out."
     assert not banner.reconnect.isEnabled()
@@ -239,13 +237,13 @@ def test_what_the_device_asks_for_is_shown_and_the_button_waits(lost, device, wo
     assert not world.force_is_on
     assert not banner.isVisible()
     assert lost.view().state == "force off"
-    lost.operator.resume_asked.emit()
+    lost.operator.ask("resume")
     assert isinstance(lost.participant.page, TaskPage)
     assert world.force_is_on
 
 
 def test_a_session_that_ends_meanwhile_stays_ended(lost, device, world, qtbot):
-    lost.operator.reconnect_asked.emit()
+    lost.operator.ask("reconnect")
     lost.participant.event.emit(EndRequested(world.now_s, "aborted", "cable"))
     device.go_on.set()
     settled(lost, qtbot)

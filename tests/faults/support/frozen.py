@@ -57,7 +57,7 @@ def main(folder: str, how: str) -> int:
 
     def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         if isinstance(participant.page, PausePage):
-            operator.resume_asked.emit()
+            operator.ask("resume")
             return True
         if how == "felt" and not stopped and isinstance(participant.page, TaskPage):
             newest = machines[0].servo.telemetry.latest()
@@ -65,7 +65,7 @@ def main(folder: str, how: str) -> int:
                 stopped.append(int(newest["scene"]))
                 os.kill(os.getpid(), signal.SIGSTOP)
         if stopped and isinstance(participant.page, QuestionnairePage | TextPage):
-            operator.end_asked.emit("aborted", "seen")
+            operator.ask("end", "aborted", "seen")
             return True
         return False
 

@@ -19,10 +19,10 @@ from study_app import app
 from study_app.app.session import live_session
 from study_app.devices.rig import Rig
 from study_app.gui.application import application_here
+from study_app.gui.kit.dialogs import Question
 from study_app.gui.operator.session_panels import StepLine
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.gui.widgets.dialogs import Notice
 from study_app.gui.widgets.live_plots import TracePlot
 from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage, TroublePage
@@ -136,14 +136,14 @@ class Scene:
         return True
 
     def see_lines(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
-        covers = operator.panels.covers
-        if len(covers) == 2 and all(cover is not None and cover.isVisible() for cover in covers.values()):
-            self.told["panels"] = sorted(cover.toolTip() for cover in covers.values())
+        failed = [one.text() for one in operator.findChildren(QLabel) if "this panel failed" in one.text()]
+        if len(failed) == 2:
+            self.told["panels"] = sorted(failed)
             self.told["force with failed panels"] = self.rig.servo.force_is_on
             self.told["trouble with failed panels"] = operator.banner.isVisible()
             operator.come_forward()
             self.step = self.see_lines_in_front
-        return len(covers) < 2
+        return len(failed) < 2
 
     def see_lines_in_front(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         QGuiApplication.processEvents()
@@ -173,7 +173,7 @@ class Scene:
     def see_loss(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         QGuiApplication.processEvents()
         self.picture("recorder")
-        for notice in operator.findChildren(Notice):
+        for notice in operator.findChildren(Question):
             notice.accept()
         participant.come_forward()
         self.step = self.go_on

@@ -67,7 +67,7 @@ def reasoned(ask: str) -> Callable[[Any], None]:
     def act(window: Any) -> None:
         getattr(window, ask)()
         for reason in ("  ", "phone rang"):
-            window.question.reason.setText(reason)
+            window.question.editors["reason"].control.setText(reason)
             if reason.strip() or ask != "ask_to_end":  # an end needs none
                 window.question.go_on.click()
 
@@ -130,7 +130,7 @@ RUNNING: Actions = {
     ),
     "reconnecting": in_turn(clicked("banner.reconnect"), told(beyond=RECONNECTS, force_on=False)),
     "in the dark theme": lambda window: window.header.theme_button.click(),
-    "panel failed": lambda window: window.panels.draw(window.tiles, lambda: 1 / 0),
+    "panel failed": lambda window: window.draw("Servo", lambda: 1 / 0),
 }
 DISK: Actions = {
     "a form": told(lambda it: it.welcome()),

@@ -37,15 +37,19 @@ def running(window, told, health):
     return window
 
 
+def stops(what, _details):
+    return what == "stop"
+
+
 def test_escape_held_stops_the_force_and_a_tap_does_not(running, qtbot):
     handle = running.windowHandle()
     asked = []
-    running.stop_asked.connect(lambda: asked.append(True))
+    running.asked.connect(lambda *_asked: asked.append(True))
     QTest.keyPress(handle, Qt.Key.Key_Escape)
     QTest.keyRelease(handle, Qt.Key.Key_Escape)
     assert not running.escape.findChild(QTimer).isActive()
     assert asked == []
-    with qtbot.waitSignal(running.stop_asked, timeout=HOLD_MS * 5):
+    with qtbot.waitSignal(running.asked, timeout=HOLD_MS * 5, check_params_cb=stops):
         QTest.keyPress(handle, Qt.Key.Key_Escape)
     QTest.keyRelease(handle, Qt.Key.Key_Escape)
 
@@ -57,7 +61,7 @@ def test_a_question_about_a_trial_goes_with_the_trial(running, told, health, qtb
     assert running.question is not None  # its statements are being answered
     told.answer(1)
     told.start(2)
-    with qtbot.assertNotEmitted(running.repeat_asked):
+    with qtbot.assertNotEmitted(running.asked):
         running.show_view(told.view(health))
     assert running.question is None
 
@@ -68,20 +72,20 @@ def test_keyboard_is_on_close_session_once_the_session_is_over(running, told, he
     told.tell("session_ended", status="aborted", reason="", fingerprint="wwww-mmmm-wwww")
     running.show_view(told.view(health, force_on=False))
     assert running.focusWidget() is running.buttons.close_session
-    with qtbot.waitSignal(running.close_asked):
+    with qtbot.waitSignal(running.asked, check_params_cb=lambda what, _: what == "close"):
         qtbot.keyClick(running.focusWidget(), Qt.Key.Key_Return)
 
 
 def test_no_question_keeps_a_hand_from_the_force_stop_or_from_escape(running, qtbot):
     running.ask_to_end()
     assert running.question.windowModality() == Qt.WindowModality.NonModal
-    with qtbot.waitSignal(running.stop_asked):
+    with qtbot.waitSignal(running.asked, check_params_cb=stops):
         qtbot.mousePress(running.stop.stop, Qt.MouseButton.LeftButton)
     qtbot.mouseRelease(running.stop.stop, Qt.MouseButton.LeftButton)
     running.question.activateWindow()
     handle = running.question.windowHandle()
     qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is handle)
-    with qtbot.waitSignal(running.stop_asked, timeout=HOLD_MS * 5):
+    with qtbot.waitSignal(running.asked, timeout=HOLD_MS * 5, check_params_cb=stops):
         QTest.keyPress(handle, Qt.Key.Key_Escape)
 
 

@@ -29,10 +29,10 @@ def decided(qtbot, asked, dialog, by, reason):
     click(qtbot, dialog.go_on)
     assert dialog.isVisible()
     assert "name" in dialog.missing.text()
-    dialog.by.setText(by)
-    qtbot.keyClick(dialog.by, Qt.Key.Key_Return)
+    dialog.editors["by"].show_value(by)
+    qtbot.keyClick(dialog.editors["by"].control, Qt.Key.Key_Return)
     assert "reason" in dialog.missing.text()
-    dialog.reason.setText(reason)
+    dialog.editors["reason"].show_value(reason)
     with qtbot.waitSignal(asked) as heard:
         click(qtbot, dialog.go_on)
     return heard.args
@@ -72,7 +72,7 @@ def test_rows_are_chosen_by_the_keyboard_and_the_choice_begins_the_dialog(place,
     place.show_view(replace(view(), sessions=(facts("P000"), *view().sessions)))
     assert place.sessions.rows.chosen.participant == "P002", "what was chosen stays so when sessions come"
     click(qtbot, place.exclusions.leave_out)
-    assert place.dialog.session.currentText() == "P002"
+    assert place.dialog.editors["session"].control.currentText() == "P002"
     place.dialog.reject()
 
 
@@ -80,10 +80,10 @@ def test_leaving_out_wants_a_name_and_a_reason(place, qtbot):
     place.sessions.rows.table.selectRow(1)
     click(qtbot, place.exclusions.leave_out)
     dialog = place.dialog
-    assert [dialog.trial.itemText(at) for at in range(3)] == [
+    assert [dialog.editors["trial"].control.itemText(at) for at in range(3)] == [
         "Whole session", "Trial 2: Part 1, L2", "Trial 3: Part 1, L1"
     ]  # fmt: skip
-    dialog.trial.setCurrentIndex(2)
+    dialog.editors["trial"].control.setCurrentIndex(2)
     asked = decided(qtbot, place.leave_out_asked, dialog, "AK", "phone rang")
     assert asked == [("P001", 1, 3, "AK", "phone rang")]
 

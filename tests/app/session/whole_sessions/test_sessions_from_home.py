@@ -52,7 +52,7 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
                 steps.append("looked")
         elif steps == ["asked", "looked"] and operator is not None and operator.buttons.end.isEnabled():
             steps.append("ended")
-            operator.end_asked.emit("withdrawn", "")
+            operator.ask("end", "withdrawn", "")
             operator.close()
         elif steps == ["asked", "looked", "ended"] and home is not None and home.sessions.shown:
             steps.append(home.sessions.shown[0].status)
@@ -157,7 +157,7 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
             begin(window(PreflightWindow))
         elif len(steps) == 2 and operator is not None and operator.buttons.end.isEnabled():
             steps.append(operator.rail.heading.text())
-            operator.end_asked.emit("withdrawn", "")
+            operator.ask("end", "withdrawn", "")
             operator.close()
         elif len(steps) == 3 and home is not None and not home.reading:
             home.sessions.show_kind("every")

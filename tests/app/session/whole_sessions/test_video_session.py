@@ -123,7 +123,7 @@ class Operator(Person):
         if isinstance(page, TroublePage):
             self.troubles.add(self.bridge.view().trouble)
         if isinstance(page, PausePage):
-            operator.resume_asked.emit()
+            operator.ask("resume")
         elif operator.banner.reconnect.isVisible() and operator.banner.reconnect.isEnabled():
             QTest.mouseClick(operator.banner.reconnect, Qt.MouseButton.LeftButton)
 

@@ -180,7 +180,7 @@ def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypat
     def look(participant):
         corner = participant.grab().toImage().pixelColor(2, 2).name()
         seen.extend((participant.isFullScreen(), participant.frame_px > 0, corner, participant.windowTitle()))
-        window(OperatorWindow).exclude_asked.emit(None, "tried alone")
+        window(OperatorWindow).ask("exclude", None, "tried alone")
         os.kill(os.getpid(), signal.SIGTERM)
 
     person = Person(once=look)
