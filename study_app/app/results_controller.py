@@ -5,9 +5,8 @@ The process lives while the place is shown; reports and tables are written by on
 
 import importlib.util
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -34,40 +33,18 @@ from study_app.analysis.worker_messages import (
     start_analysis_worker,
 )
 from study_app.gui.application import open_here
-from study_app.gui.results.figures import FigureShown, Going, LeftOut, Opened, ResultsView, StudyChoice, Trouble
+from study_app.gui.results.figures import ResultsView, Trouble, unblinded_words
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.sessions.session_facts import session_facts
-from study_app.store.exclusions import Exclusion
 from study_app.store.folders import StudyFolder
 from study_app.store.sites.merged import FOLDER, folders_of
 from study_app.workers.server import Crashed, Refused
-
-
-def left_out(row: Exclusion) -> LeftOut:
-    """Return a row of ``exclusions.csv``."""
-    name = row.participant if row.session == 1 else f"{row.participant}, session {row.session}"
-    what = name if row.trial is None else f"{name}, trial {row.trial}"
-    return LeftOut(what, row.rule_or_person, row.reason, _time(row.excluded_at), row.what)
 
 
 def exclusions_at(study: Path) -> Path:
     """Return the list of exclusions; of a merged study the folder of its sites, each of which has one."""
     folders = folders_of(study)
     return StudyFolder(study).exclusions if "" in folders else study / FOLDER
-
-
-def opened(reveal: Mapping[str, str]) -> Opened:
-    """Return how the key was opened."""
-    by, reason = str(reveal.get("by", "unknown")), str(reveal.get("reason", "no reason given"))
-    return Opened(_time(reveal.get("at")), by, reason)
-
-
-def _time(text: object) -> datetime | None:
-    """Return the time in a file, None where there is none: people may have changed it."""
-    try:
-        return datetime.fromisoformat(str(text))
-    except ValueError:
-        return None
 
 
 LISTEN_MS: Final = 40
@@ -112,7 +89,7 @@ class ResultsController(QObject):
         self._writer: AnalysisClient | None = None
         self._orders: dict[int, Order] = {}
         self._since_s = 0.0
-        self._going: Going | None = None
+        self._going: Progress | None = None
         self._redrawn: set[str] = set()
         self._blocks = 0
         self._listening = QTimer(self, interval=LISTEN_MS)
@@ -172,7 +149,7 @@ class ResultsController(QObject):
             self._orders = {}
         self._orders[self.reader.order(order)] = order
         self._since_s = time.monotonic()
-        self._going = Going(what, 0.0)
+        self._going = Progress(what, 0.0)
         self._listening.start()
 
     def _listen(self) -> None:
@@ -205,7 +182,7 @@ class ResultsController(QObject):
                 self._orders = {}
                 self._show(trouble=MISTAKE, figures=(), drawing=None, testing=None)
             case Progress() if newest:
-                self._going = Going(answer.what, answer.share)
+                self._going = answer
             case StudiesFound() if newest:
                 self._take_studies(answer)
             case SessionsFound() if newest:
@@ -216,11 +193,6 @@ class ResultsController(QObject):
                 self._take_figure(answer)
 
     def _take_studies(self, found: StudiesFound) -> None:
-        kinds = {True: "simulated", False: ""}
-        studies = tuple(
-            StudyChoice(one.folder, "pilot" if one.pilot else kinds[one.simulated])  # type: ignore[arg-type]
-            for one in found.studies
-        )
         there = [one.folder for one in found.studies]
         chosen = self.view.chosen if self.view.chosen in there else None
         if chosen is None and there:
@@ -230,7 +202,7 @@ class ResultsController(QObject):
             self.view = ResultsView(trouble=Trouble("No studies yet", sentence, "Go to Home", "home"))
             self.place.show_view(self.view)
             return
-        self._show(studies=studies)
+        self._show(studies=found.studies)
         self._read(chosen)
 
     def _choose(self, folder: Path) -> None:
@@ -253,10 +225,10 @@ class ResultsController(QObject):
         self._show(
             sessions=tuple(facts),
             listed=True,
-            left_out=tuple(map(left_out, found.exclusions)),
+            left_out=found.exclusions,
             exclusions_file=exclusions_at(found.folder),
             sealed=reveal is None,
-            opened=None if reveal is None else opened(reveal),
+            opened="" if reveal is None else unblinded_words(reveal),
         )
 
     def _take_study(self, found: StudyFound) -> None:
@@ -269,10 +241,9 @@ class ResultsController(QObject):
     def _take_figure(self, drawn: FigureDrawn) -> None:
         """Show a figure in the place of the one before of its name, or below the others."""
         self._redrawn.add(drawn.name)
-        new = FigureShown(drawn.name, drawn.title, drawn.caption, drawn.svg)
         there = [figure.name for figure in self.view.figures]
-        figures = [new if figure.name == drawn.name else figure for figure in self.view.figures]
-        self._show(figures=tuple(figures if drawn.name in there else [*figures, new]))
+        figures = [drawn if figure.name == drawn.name else figure for figure in self.view.figures]
+        self._show(figures=tuple(figures if drawn.name in there else [*figures, drawn]))
 
     def _end(self, order: Order, *, newest: bool) -> None:
         if isinstance(order, Decided):

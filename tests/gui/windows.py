@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from study_app.gui.kit.devices import devices_shown
 from study_app.gui.lab.view import LabPlace
 from study_app.gui.preflight.window import LEAST as LEAST_PREFLIGHT
 from study_app.gui.preflight.window import PreflightView, PreflightWindow, preflight_view
-from study_app.gui.results.figures import Opened
+from study_app.gui.results.figures import unblinded_words
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.settings import view as settings_view
 from study_app.gui.settings.display_test import DisplayTest
@@ -67,7 +67,7 @@ WELL = Measurements(
 )
 SCALED = replace(WELL, screen=Screen(60.0, 1.5))
 GOES_ON = (("Continues at", "Liquid setting 2, attempt\u00a02"), ("Kept", "2 of 8 answers"))
-OPENED = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed")
+OPENED = unblinded_words({"at": "2026-11-19", "by": "AK", "reason": "collection closed"})
 
 
 def shown(qtbot: Any, made: Any, size: tuple[int, int], theme: Any = LIGHT) -> Any:

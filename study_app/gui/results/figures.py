@@ -1,8 +1,6 @@
 """What the results window shows, as one frozen value, and its figures."""
 
-import queue
 import re
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -10,19 +8,22 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
-from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QWidget
 
+from study_app.analysis.worker_messages import FigureDrawn, Progress, StudyAt
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.gui.theme.theme import FAMILIES, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Bar, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted
+from study_app.store.exclusions import Exclusion
 
 NAMED: int = 5
 """Of so many sessions that are not in the figures each is named."""
@@ -33,64 +34,33 @@ Remedy: TypeAlias = Literal["again", "home", "read", "stop"]
 NOTHING: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = MappingProxyType({})
 
 
-@dataclass(frozen=True, slots=True)
-class StudyChoice:
-    """A study one can choose: its folder, and what it is where it holds no participants' data."""
-
-    folder: Path
-    kind: Literal["", "simulated", "pilot"] = ""
-
-    @property
-    def name(self) -> str:
-        """The folder's name, and what it is where it holds no participants' data."""
-        return f"{self.folder.name}  ·  {self.kind}" if self.kind else self.folder.name
+Kind: TypeAlias = Literal["", "simulated", "pilot"]
 
 
-@dataclass(frozen=True, slots=True)
-class Opened:
-    """Who opened the key, when and why."""
-
-    at: datetime | None
-    by: str
-    reason: str
-
-    @property
-    def words(self) -> str:
-        """A line: "Unblinded 19 Nov by AK: collection closed"."""
-        day = "" if self.at is None else f" {self.at.day} {self.at:%b}"
-        return f"Unblinded{day} by {self.by}: {self.reason}"
+def kind_of(study: StudyAt) -> Kind:
+    """Return what a study is where it holds no participants' data."""
+    return "pilot" if study.pilot else "simulated" if study.simulated else ""
 
 
-@dataclass(frozen=True, slots=True)
-class FigureShown:
-    """A figure as SVG in print's colours; without one, ``caption`` says why."""
-
-    name: str
-    title: str
-    caption: str
-    svg: bytes = field(default=b"", repr=False)
+def unblinded_words(reveal: Mapping[str, str]) -> str:
+    """Return who opened the key, when and why: "Unblinded 19 Nov by AK: collection closed"."""
+    at = time_of(reveal.get("at"))
+    day = "" if at is None else f" {at.day} {at:%b}"
+    return f"Unblinded{day} by {reveal.get('by', 'unknown')}: {reveal.get('reason', 'no reason given')}"
 
 
-@dataclass(frozen=True, slots=True)
-class LeftOut:
-    """What is excluded from the analysis, by which rule or person, why and when.
-
-    ``which`` is participant, session and trial (None: the whole session).
-    """
-
-    what: str
-    by: str
-    reason: str
-    at: datetime | None
-    which: tuple[str, int, int | None]
+def excluded_words(one: Exclusion) -> str:
+    """Return what is excluded: "P003, session 2, trial 4"."""
+    name = one.participant if one.session == 1 else f"{one.participant}, session {one.session}"
+    return name if one.trial is None else f"{name}, trial {one.trial}"
 
 
-@dataclass(frozen=True, slots=True)
-class Going:
-    """What is being done, and which share of all is done (0 to 1)."""
-
-    what: str
-    share: float
+def time_of(text: object) -> datetime | None:
+    """Return the time in a file, None where there is none: people may have changed it."""
+    try:
+        return datetime.fromisoformat(str(text))
+    except ValueError:
+        return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,30 +79,31 @@ class ResultsView:
 
     ``trials`` are the main trials of each session (participant, number), with the words for them. ``colours`` are the
     figures' colours in print, by the role in the theme that takes their place. ``sealed`` is None while it is not
-    known; ``listed`` says whether the study's sessions are read. ``drawing`` goes on where there are no figures yet,
-    ``testing`` besides those there are; ``untested`` says that this was stopped.
+    known, ``opened`` says how the key was opened; ``listed`` says whether the study's sessions are read. ``drawing``
+    goes on where there are no figures yet, ``testing`` besides those there are; ``untested`` says that this was
+    stopped.
     """
 
-    studies: tuple[StudyChoice, ...] = ()
+    studies: tuple[StudyAt, ...] = ()
     chosen: Path | None = None
     sessions: tuple[SessionFacts, ...] = ()
     listed: bool = False
     sealed: bool | None = None
-    opened: Opened | None = None
-    left_out: tuple[LeftOut, ...] = ()
+    opened: str = ""
+    left_out: tuple[Exclusion, ...] = ()
     exclusions_file: Path | None = None
     trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = field(default_factory=lambda: NOTHING)
     doubts: tuple[str, ...] = ()
-    figures: tuple[FigureShown, ...] = ()
+    figures: tuple[FigureDrawn, ...] = ()
     colours: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    drawing: Going | None = None
-    testing: Going | None = None
+    drawing: Progress | None = None
+    testing: Progress | None = None
     untested: bool = False
     trouble: Trouble | None = None
 
     @property
-    def kind(self) -> Literal["", "simulated", "pilot"]:
-        return next((study.kind for study in self.studies if study.folder == self.chosen), "")
+    def kind(self) -> Kind:
+        return next((kind_of(study) for study in self.studies if study.folder == self.chosen), "")
 
     @property
     def without_sessions(self) -> str:
@@ -167,7 +138,6 @@ def _are(names: Sequence[str], what: str) -> str:
     return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} {what}"
 
 
-LOOK_MS = 15
 LETTERS = re.compile(rb"(<text.*?</text>)", re.DOTALL)
 FAMILY = re.compile(rb"font-family: [^;\"]*")
 SIZE = re.compile(rb'viewBox="0 0 ([0-9.]+) ([0-9.]+)"')
@@ -224,15 +194,13 @@ def drawn(svg: bytes, size: QSize, ratio: float) -> QImage:
 class FigureView(Themed, QWidget):
     """One figure as wide as it is given room, with its true proportions."""
 
-    def __init__(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
+    def __init__(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         super().__init__()
         self._figure, self._colours = figure, colours
         self._image = QImage()
         self._wanted: tuple[object, ...] = ()
-        self._drawing: threading.Thread | None = None
-        self._made: queue.SimpleQueue[tuple[tuple[object, ...], QImage]] = queue.SimpleQueue()
-        self._look = QTimer(self, interval=LOOK_MS)
-        self._look.timeout.connect(self._take)
+        self._drawing = Background(self)
+        self._drawing.done.connect(self._take)
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
@@ -240,9 +208,9 @@ class FigureView(Themed, QWidget):
 
     @property
     def settled(self) -> bool:
-        return self._drawing is None and not self._image.isNull()
+        return not self._drawing.busy and not self._image.isNull()
 
-    def show_figure(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
+    def show_figure(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         """Draw another figure from now on; the one before stays until that one is drawn."""
         self._figure, self._colours = figure, colours
         found = SIZE.search(figure.svg)
@@ -278,32 +246,12 @@ class FigureView(Themed, QWidget):
         if wanted == self._wanted:
             return
         self._wanted = wanted
-        if self._drawing is None:
-            self._begin()
+        figure, colours, theme = self._figure, self._colours, self.theme
+        self._drawing.run(lambda: drawn(themed_svg(figure.svg, colours, theme), size, ratio))
 
-    def _begin(self) -> None:
-        wanted, figure, colours, theme = self._wanted, self._figure, self._colours, self.theme
-        size, ratio = self.size(), self.devicePixelRatioF()
-        made = self._made
-
-        def draw() -> None:
-            made.put((wanted, drawn(themed_svg(figure.svg, colours, theme), size, ratio)))
-
-        self._drawing = threading.Thread(target=draw, name="figure", daemon=True)
-        self._drawing.start()
-        self._look.start()
-
-    def _take(self) -> None:
-        """Show what was drawn; begin again where something else is wanted by now."""
-        try:
-            what, self._image = self._made.get_nowait()
-        except queue.Empty:
-            return
-        self._look.stop()
-        self._drawing = None
+    def _take(self, image: QImage) -> None:
+        self._image = image
         self.update()
-        if what != self._wanted:
-            self._begin()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         if self._image.isNull():
@@ -327,7 +275,7 @@ LEAST_WIDTH, MOST_WIDTH = 830, 1240
 class FigureCard(Card):
     """One figure, or why it is not there; its caption is shown where that is asked for."""
 
-    def __init__(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
+    def __init__(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         super().__init__(padding=PADDING, gap=8)
         self.figure = figure
         self.drawing: FigureView | None = None
@@ -348,7 +296,7 @@ class FigureCard(Card):
         self.more.setParent(self)  # in the corner that figures leave free
         self.show_figure(figure, colours)
 
-    def show_figure(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
+    def show_figure(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         self.figure = figure
         self.caption.setText(figure.caption)
         there = bool(figure.svg)
@@ -396,7 +344,7 @@ class WorkLine(Card):
         row = hbox((self.words, 1), (self.bar, 1), self.stop, self.again, spacing=16)
         add_layout(self.column, row)
 
-    def show_going(self, going: Going | None, *, untested: bool) -> None:
+    def show_going(self, going: Progress | None, *, untested: bool) -> None:
         """Say how far it is; ``untested``: that it was stopped, and what is missing."""
         self.setVisible(going is not None or untested)
         self.bar.setVisible(going is not None)
@@ -437,7 +385,7 @@ class TroubleCard(Card):
         self.bar.hide()
         self._remedy = trouble.remedy
 
-    def show_going(self, going: Going) -> None:
+    def show_going(self, going: Progress) -> None:
         self.show_trouble(Trouble(f"{going.what[:1].upper()}{going.what[1:]} …", "", "Stop", "stop"))
         self.bar.setVisible(True)
         self.bar.show_share(going.share)

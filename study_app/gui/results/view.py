@@ -10,7 +10,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QDialog, QLineEdit, QScrollArea, QSizePolicy, QWidget
 
 from study_app.gui.kit.fields import Editor, Field
-from study_app.gui.results.figures import FiguresPanel, LeftOut, ResultsView, in_figures
+from study_app.gui.results.figures import FiguresPanel, ResultsView, excluded_words, in_figures, kind_of, time_of
 from study_app.gui.sessions.session_facts import Column, SessionFacts, matching, started_words, states_of
 from study_app.gui.sessions.session_page import LeaveOutDialog, SessionPage, take_back_question, unblind_question
 from study_app.gui.sessions.sessions_table import SessionsTable
@@ -22,6 +22,7 @@ from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.main_view import Place
 from study_app.number_text import counted
+from study_app.store.exclusions import Exclusion
 
 WIDTH = 600
 WARNED = 3
@@ -234,7 +235,7 @@ class SessionsCard(Card):
 class ExclusionsCard(Card):
     """What is left out, each with its reason.
 
-    ``take_back_asked`` carries the `LeftOut` that is to count again.
+    ``take_back_asked`` carries the `Exclusion` that is to count again.
     """
 
     take_back_asked = Signal(object)
@@ -255,7 +256,7 @@ class ExclusionsCard(Card):
         add_parts(self.column, self.none, (self.area, 1), hbox(STRETCH, self.open))
         self.show_left_out(())
 
-    def show_left_out(self, listed: Sequence[LeftOut]) -> None:
+    def show_left_out(self, listed: Sequence[Exclusion]) -> None:
         """Show what is left out, the last decision first; the keyboard does not leave with a line."""
         at = self.window().focusWidget()
         if at is not None and any(line.isAncestorOf(at) for line in self.lines):
@@ -272,23 +273,24 @@ class ExclusionsCard(Card):
         grows = QSizePolicy.Policy.Preferred if listed else QSizePolicy.Policy.Maximum
         self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
 
-    def _line(self, one: LeftOut) -> QWidget:
+    def _line(self, one: Exclusion) -> QWidget:
         back = ActionButton("undo", "Include again …", role="plain", height=30)
-        back.setAccessibleName(f"Include again: {one.what}")
+        back.setAccessibleName(f"Include again: {excluded_words(one)}")
         back.clicked.connect(lambda: self.take_back_asked.emit(one))
         return _line(one, back)
 
 
-def _line(one: LeftOut, back: ActionButton) -> QWidget:
+def _line(one: Exclusion, back: ActionButton) -> QWidget:
     """Return one decision: what, why, who and when."""
     made = QWidget()
-    what = label(one.what, "label", wraps=True, weight=600)
+    what = label(excluded_words(one), "label", wraps=True, weight=600)
     why = label(one.reason, "label", "text2", wraps=True, weight=400)
     now = datetime.now().astimezone()
-    when = "" if one.at is None else f", {started_words(one.at.astimezone(now.tzinfo), now)}"
-    who = label(f"{one.by}{when}", "small", "text2")
+    at = time_of(one.excluded_at)
+    by = one.rule_or_person + ("" if at is None else f", {started_words(at.astimezone(now.tzinfo), now)}")
+    who = label(by, "small", "text2")
     vbox(hbox((what, 1), back), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
-    made.setAccessibleName(f"{one.what}: {one.reason} ({one.by}{when})")
+    made.setAccessibleName(f"{excluded_words(one)}: {one.reason} ({by})")
     return made
 
 
@@ -415,7 +417,8 @@ class ResultsPlace(Place):
         with QSignalBlocker(self.study):
             self.study.clear()
             for study in self.view.studies:
-                self.study.addItem(study.name, study.folder)
+                kind = kind_of(study)
+                self.study.addItem(f"{study.folder.name}  ·  {kind}" if kind else study.folder.name, study.folder)
             places = [study.folder for study in self.view.studies]
             self.study.setCurrentIndex(places.index(self.view.chosen) if self.view.chosen in places else -1)
         self.study.setVisible(bool(self.view.studies))
@@ -429,8 +432,8 @@ class ResultsPlace(Place):
             chips.append(("warn", "info", "Pilot", "Pilot sessions, stored separately"))
         if self.view.sealed:
             chips.append(("neutral", "lock", "Blinded: shown by code", "The names of the settings are sealed"))
-        if self.view.opened is not None:
-            chips.append(("neutral", "eye", _shortened(self.view.opened.words), self.view.opened.words))
+        if self.view.opened:
+            chips.append(("neutral", "eye", _shortened(self.view.opened), self.view.opened))
         if self.view.doubts:
             words = "1 file is" if len(self.view.doubts) == 1 else f"{len(self.view.doubts)} files are"
             chips.append(("warn", "warning", f"{words} not as recorded", "\n".join(self.view.doubts)))
@@ -471,10 +474,10 @@ class ResultsPlace(Place):
         )
         self._open(dialog)
 
-    def _ask_take_back(self, one: LeftOut) -> None:
-        dialog = take_back_question(self, self.theme, one.what, one.reason)
+    def _ask_take_back(self, one: Exclusion) -> None:
+        dialog = take_back_question(self, self.theme, excluded_words(one), one.reason)
         dialog.accepted.connect(
-            lambda: self.take_back_asked.emit((*one.which, dialog.value("by"), dialog.value("reason")))
+            lambda: self.take_back_asked.emit((*one.what, dialog.value("by"), dialog.value("reason")))
         )
         self._open(dialog)
 

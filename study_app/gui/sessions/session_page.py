@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPointF, QRectF, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QDialog, QScrollArea, QSizePolicy, QWidget
 
@@ -33,7 +33,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, smooth_painter
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.gui.widgets.row_table import CHIP_ROLE, Index, Table
+from study_app.gui.widgets.row_table import CHIP_ROLE, Rows, Table
 from study_app.number_text import counted
 from study_app.store.blinded.blinding import opened, opened_key
 from study_app.store.delivered import beyond_limits
@@ -421,48 +421,25 @@ class MotionPlot(Themed, QWidget):
 HEADINGS = ("Trial", "Presented", "Ended", "Limits", "Answers", "Notes")
 WIDTHS = ((20, 56), (120, 130), (60, 90), (60, 134), (30, 70), (160, 120))
 SIZE = (1040, 700)
-NOWHERE = QModelIndex()
 
 
-class TrialsModel(QAbstractTableModel):
-    """The trials of a session as rows of a table."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.trials: tuple[TrialRecord, ...] = ()
-
-    def show(self, trials: tuple[TrialRecord, ...]) -> None:
-        self.beginResetModel()
-        self.trials = trials
-        self.endResetModel()
-
-    def rowCount(self, parent: Index = NOWHERE) -> int:
-        return 0 if parent.isValid() else len(self.trials)
-
-    def columnCount(self, parent: Index = NOWHERE) -> int:
-        return 0 if parent.isValid() else len(HEADINGS)
-
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        across = orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole
-        return HEADINGS[section] if across else None
-
-    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        trial, heading = self.trials[index.row()], HEADINGS[index.column()]
-        chip = trial_chip(trial) if heading == "Limits" else None
-        if role == CHIP_ROLE:
-            return chip
-        if role == Qt.ItemDataRole.ToolTipRole:
-            return trial_words(trial)
-        if role not in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole):
-            return None
-        said = {
-            "Trial": str(trial.number),
-            "Presented": trial.words,
-            "Ended": trial.outcome,
-            "Answers": f"{trial.answers} + {len(trial.unconfirmed)}?" if trial.unconfirmed else str(trial.answers),
-            "Notes": trial.notes,
-        }
-        return chip[2] if chip else said[heading]
+def trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
+    """Return the values of a trial's cell under a heading, by their roles."""
+    chip = trial_chip(trial)
+    words = {
+        "Trial": str(trial.number),
+        "Presented": trial.words,
+        "Ended": trial.outcome,
+        "Limits": chip[2],
+        "Answers": f"{trial.answers} + {len(trial.unconfirmed)}?" if trial.unconfirmed else str(trial.answers),
+        "Notes": trial.notes,
+    }[heading]
+    return {
+        Qt.ItemDataRole.DisplayRole: words,
+        Qt.ItemDataRole.AccessibleTextRole: words,
+        Qt.ItemDataRole.ToolTipRole: trial_words(trial),
+        CHIP_ROLE: chip if heading == "Limits" else None,
+    }
 
 
 def trial_chip(trial: TrialRecord) -> Any:
@@ -505,7 +482,7 @@ class SessionPage(QDialog):
         self.setWindowTitle(f"{facts.name}, {facts.study}")
         self.status, self.validity = Chip(*status_chip(facts)), Chip(*validity_chip(facts))
         self.about, self.limits = label("", "body", "text2", wraps=True), label("", "body", wraps=True)
-        self.model = TrialsModel()
+        self.model = Rows({heading: heading for heading in HEADINGS}, trial_cell)
         self.trials = Table(self.model, WIDTHS, "Trials")
         self.trial = label("", "label", "text2", wraps=True)
         self.motion = MotionPlot()
@@ -600,7 +577,7 @@ class SessionPage(QDialog):
     @property
     def chosen(self) -> TrialRecord | None:
         row = self.trials.chosen_row
-        return None if row is None else self.model.trials[row]
+        return None if row is None else self.model.rows[row]
 
     def _choose_trial(self) -> None:
         trial = self.chosen

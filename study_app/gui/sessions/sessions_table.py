@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 from typing import Any
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.sessions.session_facts import (
@@ -19,94 +19,43 @@ from study_app.gui.sessions.session_facts import (
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.row_table import BELOW_ROLE, CARE_ROLE, CHIP_ROLE, MARGIN, Index, Table
+from study_app.gui.widgets.row_table import BELOW_ROLE, CARE_ROLE, CHIP_ROLE, MARGIN, Index, Rows, Table
 
-NOWHERE = QModelIndex()
+ROLE = Qt.ItemDataRole
 
 
-class SessionsModel(QAbstractTableModel):
-    """Sessions as rows of a table; only those that match are in it."""
-
-    def __init__(self, columns: Sequence[Column]) -> None:
-        super().__init__()
-        self.columns = tuple(columns)
-        self._every: tuple[SessionFacts, ...] = ()
-        self._matches: Callable[[SessionFacts], bool] = lambda _facts: True
-        self._now = datetime.now().astimezone()
-        self.shown: tuple[SessionFacts, ...] = ()
-
-    def show(self, found: Sequence[SessionFacts], now: datetime) -> None:
-        self._every, self._now = tuple(found), now
-        self.keep(self._matches)
-
-    def keep(self, matches: Callable[[SessionFacts], bool]) -> None:
-        """Show the sessions alone that match, now and later."""
-        self.beginResetModel()
-        self._matches = matches
-        self.shown = tuple(filter(matches, self._every))
-        self.endResetModel()
-
-    def rowCount(self, parent: Index = NOWHERE) -> int:
-        return 0 if parent.isValid() else len(self.shown)
-
-    def columnCount(self, parent: Index = NOWHERE) -> int:
-        return 0 if parent.isValid() else len(self.columns)
-
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Return a column's heading; of a row, whose session it is."""
-        if role == Qt.ItemDataRole.DisplayRole:
-            return self.columns[section].heading if orientation == Qt.Orientation.Horizontal else None
-        return None
-
-    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        facts, name = self.shown[index.row()], self.columns[index.column()].name
-        chip = {"status": status_chip, "validity": validity_chip}.get(name)
-        match role:
-            case Qt.ItemDataRole.DisplayRole:
-                return chip(facts)[2] if chip else self._words(facts, name)
-            case Qt.ItemDataRole.AccessibleTextRole:
-                words = chip(facts)[2] if chip else self._words(facts, name)
-                return ", ".join(filter(None, (words, self._below(facts, name))))
-            case Qt.ItemDataRole.ToolTipRole:
-                if name == "version" and facts.version:
-                    return f"Show what changed in the study since version {facts.version}"
-                if name == "validity" and facts.excluded is not None:
-                    return f"Excluded from the analysis: {facts.excluded}"
-                said = f"{facts.name}: began {started_words(facts.started, self._now)}, {answers_words(facts)} answers"
-                return ", ".join(filter(None, (said, incidents(facts))))
-            case Qt.ItemDataRole.FontRole if name == "participant":
-                return font("label", weight=600, scale=1.08)
-            case Qt.ItemDataRole.FontRole if name == "version":
-                face = font("label", weight=400, tabular=True)
-                face.setUnderline(True)
-                return face
-            case _ if role == CHIP_ROLE:
-                return chip(facts) if chip else None
-            case _ if role == BELOW_ROLE:
-                return self._below(facts, name)
-            case _ if role == CARE_ROLE:
-                return facts.needs_care
-        return None
-
-    def _below(self, facts: SessionFacts, name: str) -> str:
-        """Return the small words below a cell's: its kind of session, and what happened to its device or outlets."""
-        if name == "status" and facts.reconnected:
-            return "device reconnected"
-        if name == "status" and facts.outlets_lost:
-            return "outlet failed"
-        return facts.kind if name == "study" else ""
-
-    def _words(self, facts: SessionFacts, name: str) -> str:
-        match name:
-            case "participant":
-                return facts.name
-            case "study":
-                return facts.study
-            case "started":
-                return started_words(facts.started, self._now)
-            case "version":
-                return facts.version
-        return answers_words(facts)
+def session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any]:
+    """Return the values of a session's cell in the column of a name, by their roles."""
+    chip = {"status": status_chip, "validity": validity_chip}.get(name)
+    incident = "device reconnected" if facts.reconnected else "outlet failed" if facts.outlets_lost else ""
+    below = {"status": incident, "study": facts.kind}.get(name, "")
+    began = started_words(facts.started, now)
+    said = f"{facts.name}: began {began}, {answers_words(facts)} answers"
+    tip, face = ", ".join(filter(None, (said, incidents(facts)))), None
+    match name:
+        case "participant":
+            words, face = facts.name, font("label", weight=600, scale=1.08)
+        case "study":
+            words = facts.study
+        case "started":
+            words = began
+        case "version":
+            words, face = facts.version, font("label", weight=400, tabular=True)
+            face.setUnderline(True)
+            tip = f"Show what changed in the study since version {words}" if words else tip
+        case _:
+            words = answers_words(facts) if chip is None else chip(facts)[2]
+    if name == "validity" and facts.excluded is not None:
+        tip = f"Excluded from the analysis: {facts.excluded}"
+    return {
+        ROLE.DisplayRole: words,
+        ROLE.AccessibleTextRole: ", ".join(filter(None, (words, below))),
+        ROLE.ToolTipRole: tip,
+        ROLE.FontRole: face,
+        CHIP_ROLE: None if chip is None else chip(facts),
+        BELOW_ROLE: below,
+        CARE_ROLE: facts.needs_care,
+    }
 
 
 class SessionsTable(QWidget):
@@ -126,12 +75,17 @@ class SessionsTable(QWidget):
 
     def __init__(self, columns: Sequence[Column], none: str) -> None:
         super().__init__()
-        self.model = SessionsModel(columns)
+        self._names = [column.name for column in columns]
+        self._every: tuple[SessionFacts, ...] = ()
+        self._matches: Callable[[SessionFacts], bool] = lambda _facts: True
+        self._now = datetime.now().astimezone()
+        headings: dict[str, str] = {column.name: column.heading for column in columns}
+        self.model = Rows(headings, lambda facts, name: session_cell(facts, name, self._now))
         self.table = Table(self.model, [(column.width, column.least) for column in columns], "Sessions")
         self.none = label(none, "body", "text2", wraps=True)
         self.none.setContentsMargins(MARGIN, MARGIN, MARGIN, MARGIN)
         vbox(self.none, (self.table, 1), spacing=0, margins=0, parent=self)
-        self.table.opened.connect(lambda index: self.opened.emit(self.model.shown[index.row()]))
+        self.table.opened.connect(lambda index: self.opened.emit(self.shown[index.row()]))
         self.table.clicked.connect(self._click)
         self.table.selectionModel().selectionChanged.connect(lambda *_changes: self.chosen_changed.emit())
         self.model.modelReset.connect(self._tell_rows)
@@ -139,23 +93,26 @@ class SessionsTable(QWidget):
 
     @property
     def shown(self) -> tuple[SessionFacts, ...]:
-        return self.model.shown
+        return self.model.rows
 
     @property
     def chosen(self) -> SessionFacts | None:
         row = self.table.chosen_row
-        return None if row is None else self.model.shown[row]
+        return None if row is None else self.shown[row]
 
     def show_rows(self, found: Sequence[SessionFacts], now: datetime) -> None:
-        """Show these sessions in place of those before; the one that was chosen stays so."""
-        before = self.chosen
-        self.model.show(found, now)
-        self._choose(before)
+        """Show these sessions in place of those before, as far as they match; the one that was chosen stays so."""
+        self._every, self._now = tuple(found), now
+        self.show_matching(self._matches)
 
     def show_matching(self, matches: Callable[[SessionFacts], bool]) -> None:
-        before = self.chosen
-        self.model.keep(matches)
-        self._choose(before)
+        """Show the sessions alone that match, now and later."""
+        before, self._matches = self.chosen, matches
+        self.model.show(filter(matches, self._every))
+        places = [one.folder for one in self.shown]
+        if before is not None and before.folder in places:
+            self.table.selectRow(places.index(before.folder))
+        self.chosen_changed.emit()
 
     def open_chosen(self) -> None:
         if self.chosen is not None:
@@ -166,15 +123,8 @@ class SessionsTable(QWidget):
             self.version_asked.emit(self.chosen)
 
     def _click(self, index: Index) -> None:
-        facts = self.model.shown[index.row()]
-        if self.model.columns[index.column()].name == "version" and facts.version:
-            self.version_asked.emit(facts)
-
-    def _choose(self, before: SessionFacts | None) -> None:
-        places = [one.folder for one in self.shown]
-        if before is not None and before.folder in places:
-            self.table.selectRow(places.index(before.folder))
-        self.chosen_changed.emit()
+        if self._names[index.column()] == "version":
+            self.ask_for_version()
 
     def _tell_rows(self) -> None:
         self.none.setVisible(not self.shown)

@@ -3,9 +3,10 @@
 The model gives each cell's words as its display text, so that screen readers hear what is drawn.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
-from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QKeyEvent, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -30,6 +31,47 @@ BELOW_ROLE = Qt.ItemDataRole.UserRole + 2
 """A word in small letters below the text or chip."""
 CARE_ROLE = Qt.ItemDataRole.UserRole + 3
 """Whether the row is tinted because it needs care."""
+
+
+NOWHERE = QModelIndex()
+
+
+class Rows(QAbstractTableModel):
+    """Values as rows of a table.
+
+    Parameters
+    ----------
+    headings : of each column its name and its heading
+    cell : returns the values of a row's cell in the column of a name, by their roles
+    """
+
+    def __init__(self, headings: Mapping[str, str], cell: Callable[[Any, str], Mapping[int, Any]]) -> None:
+        super().__init__()
+        self._names, self._headings, self._cell = (*headings,), (*headings.values(),), cell
+        self.rows: tuple[Any, ...] = ()
+        self._cells: dict[tuple[int, int], Mapping[int, Any]] = {}
+
+    def show(self, rows: Iterable[Any]) -> None:
+        """Show these rows in place of those before."""
+        self.beginResetModel()
+        self.rows, self._cells = tuple(rows), {}
+        self.endResetModel()
+
+    def rowCount(self, parent: Index = NOWHERE) -> int:
+        return 0 if parent.isValid() else len(self.rows)
+
+    def columnCount(self, parent: Index = NOWHERE) -> int:
+        return 0 if parent.isValid() else len(self._names)
+
+    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        across = orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole
+        return self._headings[section] if across else None
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        at = index.row(), index.column()
+        if at not in self._cells:
+            self._cells[at] = self._cell(self.rows[at[0]], self._names[at[1]])
+        return self._cells[at].get(role)
 
 
 class _Cells(QStyledItemDelegate):
@@ -81,7 +123,7 @@ class Table(Themed, QTableView):
 
     opened = Signal(QModelIndex)
 
-    def __init__(self, model: QAbstractItemModel, widths: Sequence[tuple[int, int]], name: str) -> None:
+    def __init__(self, model: Rows, widths: Sequence[tuple[int, int]], name: str) -> None:
         super().__init__()
         self._widths = tuple(widths)
         self.setAccessibleName(name)

@@ -4,8 +4,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from study_app.gui.results.figures import FigureShown, LeftOut, ResultsView, StudyChoice
+from study_app.analysis.worker_messages import FigureDrawn, StudyAt
+from study_app.gui.results.figures import ResultsView
 from study_app.gui.sessions.session_facts import SessionFacts
+from study_app.store.exclusions import Exclusion
 
 COLOURS = {"text": "#13202c", "accent": "#0b65a3", "grid": "#e6ebef", "band": "#c8dded"}
 SVG = b"""<?xml version="1.0"?>
@@ -43,14 +45,14 @@ def facts(participant: str, **changes: Any) -> SessionFacts:
 def view(**changes: Any) -> ResultsView:
     people = [facts("P007", status="unfinished", validity=None), *(facts(f"P{number:03d}") for number in range(1, 7))]
     held: dict[str, Any] = {
-        "studies": (StudyChoice(STUDY, "simulated"), StudyChoice(Path("results/demo"))),
+        "studies": (StudyAt(STUDY, True, False, 2.0), StudyAt(Path("results/demo"), False, False, 1.0)),
         "chosen": STUDY,
         "sessions": tuple(people),
         "sealed": True,
         "trials": {("P001", 1): ((2, "Part 1, L2"), (3, "Part 1, L1"))},
         "figures": (
-            FigureShown("liquids", "Agreement for each setting", "Agreement with nine statements.", SVG),
-            FigureShown("delays", "Answers by delay setting", "Agreement with five statements.", SVG),
+            FigureDrawn("liquids", "Agreement for each setting", "Agreement with nine statements.", SVG),
+            FigureDrawn("delays", "Answers by delay setting", "Agreement with five statements.", SVG),
         ),
         "colours": COLOURS,
         "exclusions_file": STUDY / "exclusions.csv",
@@ -58,4 +60,4 @@ def view(**changes: Any) -> ResultsView:
     return ResultsView(**(held | changes))
 
 
-LEFT_OUT = LeftOut("P003, trial 4", "AK", "phone rang", datetime(2026, 11, 19, tzinfo=UTC), ("P003", 1, 4))
+LEFT_OUT = Exclusion("P003", 1, 4, "AK", "phone rang", "2026-11-19T00:00:00+00:00")

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from PySide6.QtWidgets import QWidget
 
+from study_app.analysis.worker_messages import FigureDrawn, Progress
 from study_app.errors import StoreError
-from study_app.gui.results.figures import FigureShown, Going, Opened, Trouble
+from study_app.gui.results.figures import Trouble, unblinded_words
 from study_app.gui.sessions.session_page import MOTION_HIDDEN, SessionPage, SessionRecord, TrialRecord
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
@@ -33,6 +34,7 @@ def then(button: str, **changes: Any) -> Callable[[Any], None]:
 
 
 FIGURES = view().figures
+OPENED = unblinded_words({"at": STARTED.isoformat(), "by": "AK", "reason": "closed, " + "and so on " * 20})
 PEOPLE = (
     facts("P001", status="damaged", validity=None),
     facts("P002", status="withdrawn", validity="invalid", answers=3, answers_of=62),
@@ -43,14 +45,16 @@ PEOPLE = (
     facts("P007", simulated=False, status="broken", started=datetime(2025, 1, 2, 3, 4, tzinfo=UTC)),
 )
 RESULTS: Actions = {
-    "all states": of_results(sessions=PEOPLE, left_out=(LEFT_OUT, replace(LEFT_OUT, what="P005", at=None))),
-    "unblinded": of_results(sealed=False, opened=Opened(STARTED, "AK", "closed, " + "and so on " * 20)),
+    "all states": of_results(
+        sessions=PEOPLE, left_out=(LEFT_OUT, replace(LEFT_OUT, participant="P005", trial=None, excluded_at="?"))
+    ),
+    "unblinded": of_results(sealed=False, opened=OPENED),
     "doubts": of_results(doubts=("P001/journal.jsonl", "P002/trials.csv"), chosen=Path("results/demo")),
-    "pilot": of_results(studies=(replace(view().studies[0], kind="pilot"),)),
+    "pilot": of_results(studies=(replace(view().studies[0], pilot=True),)),
     "empty figure": of_results(figures=(replace(FIGURES[1], svg=b"", caption="No completed session."),)),
-    "three figures": of_results(figures=(*FIGURES, FigureShown("third", "Third", "Caption.", SVG))),
-    "drawing": of_results(figures=(), drawing=Going("drawing", 0.4)),
-    "testing": of_results(testing=Going("testing: Unusable", 0.7)),
+    "three figures": of_results(figures=(*FIGURES, FigureDrawn("third", "Third", "Caption.", SVG))),
+    "drawing": of_results(figures=(), drawing=Progress("drawing", 0.4)),
+    "testing": of_results(testing=Progress("testing: Unusable", 0.7)),
     "untested": then("work.stop", untested=True),
     "trouble": then("work.again", figures=(), trouble=Trouble("It cannot be", "P002 is damaged.", "Look", "again")),
     "reading": then("trouble.button", sessions=(), figures=()),

@@ -128,7 +128,7 @@ def test_a_page_shows_the_motion_of_a_trial_once_it_may_be_seen(qtbot, study):
     page = page_of(qtbot, study)
     qtbot.waitUntil(lambda: page.motion.points > 100)
     assert page.motion.accessibleDescription().startswith("Position of the hand over ")
-    row = next(row for row, one in enumerate(page.model.trials) if one.number != page.chosen.number)
+    row = next(row for row, one in enumerate(page.model.rows) if one.number != page.chosen.number)
     page.trials.selectRow(row)
     assert page.motion.points == 0, "another trial's motion is not shown meanwhile"
     qtbot.waitUntil(lambda: page.motion.points > 100)
@@ -155,7 +155,7 @@ def test_a_trial_is_left_out_and_taken_back(qtbot, study):
     (one,) = exclusions(study)
     assert (one.trial, one.reason) == (number, "phone rang")
     assert "phone rang" in page.lines[0].findChild(QLabel).text()
-    row = next(row for row, one in enumerate(page.model.trials) if one.number == number)
+    row = next(row for row, one in enumerate(page.model.rows) if one.number == number)
     assert said(page, row, 3) == "Excluded"
     qtbot.mouseClick(page.lines[0].findChild(QPushButton), Qt.MouseButton.LeftButton)
     page.decision.editors["by"].show_value("BC")
