@@ -14,7 +14,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -241,11 +241,10 @@ class LabOpening(QObject):
 class LabSaving(QObject):
     """The liquids at hand; writes presets, one at a time, and looks which liquids there are then.
 
-    ``said`` tells what was written or opened last. ``saved`` comes when something was written, ``failed`` carries what
+    ``said`` tells what was written or opened last. ``failed`` carries what
     was met instead.
     """
 
-    saved = Signal()
     failed = Signal(object)
     _done = Signal(object)
 
@@ -253,7 +252,7 @@ class LabSaving(QObject):
         super().__init__()
         self.liquids = liquids
         self.said = ""
-        self._before: threading.Thread | None = None
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="preset")
         self._files: list[tuple[Scene, Path]] = []
         self._done.connect(self._tell, Qt.ConnectionType.QueuedConnection)
 
@@ -281,25 +280,12 @@ class LabSaving(QObject):
 
     def wait(self, patience_s: float = PATIENCE_S) -> None:
         """Wait until everything is on the disk, and tell of it."""
-        if self._before is not None:
-            self._before.join(patience_s)
-            QCoreApplication.sendPostedEvents(self)
+        wait([self._pool.submit(lambda: None)], patience_s)
+        QCoreApplication.sendPostedEvents(self)
 
     def _begin(self, write: Callable[[], str], more: tuple[str, ...]) -> None:
         at_hand = (*(it.source for it in self.liquids), *more)
-        self._before = threading.Thread(
-            target=self._write, args=(self._before, write, at_hand), name="preset", daemon=True
-        )
-        self._before.start()
-
-    def _write(self, before: threading.Thread | None, write: Callable[[], str], at_hand: tuple[str, ...]) -> None:
-        if before is not None:
-            before.join()
-        try:
-            found: object = write(), liquids_at_hand(saved=at_hand)
-        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
-            found = error
-        self._done.emit(found)
+        self._pool.submit(lambda: (write(), liquids_at_hand(saved=at_hand))).add_done_callback(self._done.emit)
 
     def _save(self, path: Path, setting: Setting) -> str:
         save(path, preset_text(setting))
@@ -310,24 +296,22 @@ class LabSaving(QObject):
         file = next((path for scene, path in self._files if scene == setting.scene and path.is_file()), None)
         return use_in_study(study, setting, file)
 
-    def _tell(self, found: Exception | tuple[str, tuple[Choice, ...]]) -> None:
-        if isinstance(found, Exception):
-            self.failed.emit(found)
+    def _tell(self, written: Future[tuple[str, tuple[Choice, ...]]]) -> None:
+        if error := written.exception():
+            self.failed.emit(error)
             return
-        self.said, written = found
-        self.liquids = tuple(dict.fromkeys((*self.liquids, *written)))
-        self.saved.emit()
+        self.said, found = written.result()
+        self.liquids = tuple(dict.fromkeys((*self.liquids, *found)))
 
 
 PREPARING: Final = "Loading the force model …"
 NAMES: Final = {DRAG: ("drag_coefficient",), WAKE: ("drag_coefficient", "length", "scaling")}
 
 
-class LabEstimation(QObject):
+class LabEstimation:
     """An estimation for the lab's selected setting: `poll` with each frame, `shown` for its view, `close` to end."""
 
-    def __init__(self, place: LabPlace, lab: LabController) -> None:
-        super().__init__()
+    def __init__(self, lab: LabController) -> None:
         self._lab = lab
         self._executor: ThreadPoolExecutor | None = None
         self._loading: Future[LiveEstimation] | None = None
@@ -335,13 +319,6 @@ class LabEstimation(QObject):
         self.estimation: LiveEstimation | None = None
         self._trouble = self._refused = ""
         self._sources = (*SOURCES, *(LSL if available() else ()))
-        place.estimate_source_chosen.connect(self._choose_source)
-        place.estimate_parameters_chosen.connect(self._choose_parameters)
-        place.estimate_apply_asked.connect(self._apply)
-        place.estimate_follow_asked.connect(self._follow)
-
-    def fail(self, error: BaseException) -> None:
-        self._lab.fail(error)
 
     def poll(self) -> None:
         """Take what was measured since, and apply what is applied continuously."""
@@ -404,13 +381,18 @@ class LabEstimation(QObject):
             follows=self.estimation.follows,
         )
 
-    @guarded
-    def _choose_source(self, source: str, path: Path | None) -> None:
-        self._want(source, self._wanted[1], path)
-
-    @guarded
-    def _choose_parameters(self, parameters: str) -> None:
-        self._want(self._wanted[0], parameters, self._wanted[2])
+    def do(self, what: str, *details: Any) -> None:
+        """Do what is asked for on its card."""
+        source, parameters, path = self._wanted
+        match what, *details:
+            case "source", path, source:
+                self._want(source, parameters, path)
+            case "parameters", parameters:
+                self._want(source, parameters, path)
+            case "apply", *_ if self.estimation is not None:
+                self._change(self.estimation.applied)
+            case "follow", on if self.estimation is not None:
+                self.estimation.follows = on
 
     def _want(self, source: str, parameters: str, path: Path | None) -> None:
         """Estimate from a source; load what that needs in the thread first."""
@@ -432,11 +414,6 @@ class LabEstimation(QObject):
             self._trouble = f"{error}"
             self._wanted = (OFF, parameters, None)
 
-    @guarded
-    def _apply(self) -> None:
-        if self.estimation is not None:
-            self._change(self.estimation.applied)
-
     def _change(self, edit: Callable[[Workbench], Workbench]) -> None:
         """Change the selected setting; where it refuses the values, say so and apply none continuously."""
         assert self.estimation is not None  # noqa: S101 - of which the values are
@@ -448,11 +425,6 @@ class LabEstimation(QObject):
             return
         self._refused = ""
         self._lab.feel(bench)
-
-    @guarded
-    def _follow(self, on: bool) -> None:
-        if self.estimation is not None:
-            self.estimation.follows = on
 
 
 def _load(executor: ThreadPoolExecutor) -> LiveEstimation:
@@ -515,7 +487,7 @@ class LabController(QObject):
         self._prices = Prices(make_appraiser)
         self._opening = LabOpening(open_live, options)
         self._saving = LabSaving(liquids_at_hand() if liquids is None else liquids)
-        self.estimation = LabEstimation(place, self)
+        self.estimation = LabEstimation(self)
         self.chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
@@ -530,33 +502,62 @@ class LabController(QObject):
         return timer
 
     def _connect(self) -> None:
-        place, opening, saving = self.place, self._opening, self._saving
         for signal, slot in (
-            (place.entered, self._enter),
-            (place.left, self.leave),
-            (place.changed, self._change),
-            (place.liquid_chosen, self._choose),
-            (place.copied, self._copy),
-            (place.switched, self._switch),
-            (place.blind_asked, self._blind),
-            (place.undo_asked, self._undo),
-            (place.redo_asked, self._redo),
-            (place.device_chosen, self._open),
-            (place.cancel_asked, self._cancel),
-            (place.path_chosen, self._play),
-            (place.stop_asked, self._stop_force),
-            (place.fade_in_asked, self._fade_in),
-            (place.hand_moved, self._point),
-            (place.hand_pressed, self._press),
-            (place.save_asked, self._save),
-            (place.preset_opened, self._open_preset),
-            (place.use_asked, self._use),
-            (opening.opened, self._begin),
-            (opening.failed, self._could_not_open),
-            (opening.said, self._say),
-            (saving.failed, self._could_not_save),
+            (self.place.asked, self._asked),
+            (self._opening.opened, self._begin),
+            (self._opening.failed, self._could_not_open),
+            (self._opening.said, self._say),
+            (self._saving.failed, self._could_not_save),
         ):
             signal.connect(slot)
+
+    @guarded
+    def _asked(self, what: str, details: tuple[Any, ...]) -> None:
+        """Do what is asked for in the place."""
+        bench, live = self.bench, self.live
+        match what, *details:
+            case "enter", *_:
+                self._enter()
+            case "leave", *_:
+                self.leave()
+            case "change", name, value, held:
+                self._try(lambda: bench.change(name, value, held=held), name)
+            case "liquid", side, chosen:
+                self._choose(side, chosen)
+            case "copy", *_:
+                self._try(bench.copy_to_other, "")
+            case "switch", *_:  # a knob that is held is let go of at once, for it was the other one's
+                self.feel(bench.switch())
+                self._show()
+            case "blind", True:
+                self.feel(bench.blinded(self.chance), anew=True)
+            case "blind", *_:
+                self.feel(bench.revealed())
+            case "undo" | "redo", *_:
+                self.feel(bench.undo() if what == "undo" else bench.redo())
+            case "device", name:
+                self._open(name)
+            case "cancel", *_:
+                self._cancel()
+            case "stop", *_:
+                self._stop_force()
+            case "fade in", *_:
+                self._fade_in()
+            case "path", name if live is not None:
+                live.play(name)
+            case "point", x_m, y_m, z_m if live is not None:
+                live.point_to(x_m, y_m, z_m)
+            case "press", buttons if live is not None:
+                live.press(buttons)
+            case "save", path, setting:
+                self._save(path, setting)
+            case "use", path, setting:
+                self._forget_trouble()
+                self._saving.use(path, setting)
+            case "preset", path:
+                self._open_preset(path)
+            case "source" | "parameters" | "apply" | "follow", *_:
+                self.estimation.do(what, *details)
 
     @property
     def liquids(self) -> tuple[Choice, ...]:
@@ -653,7 +654,6 @@ class LabController(QObject):
         self.study = study
         self.feel(Workbench(a, b), anew=True)
 
-    @guarded
     def _enter(self) -> None:
         if self._entered:
             return
@@ -673,7 +673,6 @@ class LabController(QObject):
     def _show(self) -> None:
         self.place.show_view(self.view())
 
-    @guarded
     def _open(self, name: str) -> None:
         self._let_go()
         self.device, self.trouble, self._said = name, "", ""
@@ -692,7 +691,6 @@ class LabController(QObject):
     def _could_not_open(self, error: Exception) -> None:
         raise error
 
-    @guarded
     def _cancel(self) -> None:
         self._opening.cancel()
         self.trouble = "No device is open"
@@ -701,17 +699,8 @@ class LabController(QObject):
     def _say(self, line: str) -> None:
         self._said = line
 
-    @guarded
-    def _change(self, name: str, value: object, held: bool) -> None:
-        self._try(lambda: self.bench.change(name, value, held=held), name)  # type: ignore[arg-type]
-
-    @guarded
     def _choose(self, side: Side, choice: Choice) -> None:
         self._try(lambda: self.bench.choose(side, spoken(choice.liquid), choice.scene), "")
-
-    @guarded
-    def _copy(self) -> None:
-        self._try(self.bench.copy_to_other, "")
 
     def _try(self, edit: Callable[[], Workbench], name: str) -> None:
         """Make an edit, or keep why it was refused, for its parameter."""
@@ -724,27 +713,6 @@ class LabController(QObject):
                 self.trouble = str(error)
             return
         self.feel(bench)
-
-    @guarded
-    def _switch(self) -> None:
-        """Feel the other setting; a knob that is held is let go of at once, for it was the other one's."""
-        self.feel(self.bench.switch())
-        self._show()
-
-    @guarded
-    def _blind(self, asked: bool) -> None:
-        if asked:
-            self.feel(self.bench.blinded(self.chance), anew=True)
-        else:
-            self.feel(self.bench.revealed())
-
-    @guarded
-    def _undo(self) -> None:
-        self.feel(self.bench.undo())
-
-    @guarded
-    def _redo(self) -> None:
-        self.feel(self.bench.redo())
 
     def feel(self, bench: Workbench, *, anew: bool = False) -> None:
         """Let a workbench be felt at once, and be appraised once it has rested for a while."""
@@ -763,12 +731,6 @@ class LabController(QObject):
     def _ask_price(self) -> None:
         self._prices.ask(self.bench.in_hand.scene)
 
-    @guarded
-    def _play(self, name: str | None) -> None:
-        if self.live is not None:
-            self.live.play(name)
-
-    @guarded
     def _stop_force(self) -> None:
         """Send zero force; a device that is being opened, which would bring its own, is given up."""
         if self.live is not None:
@@ -776,7 +738,6 @@ class LabController(QObject):
         elif self._opening.busy_with is not None:
             self._cancel()
 
-    @guarded
     def _fade_in(self) -> None:
         """Let the force return; where the servo stopped itself, by opening its device again."""
         if self.live is None or self.live.servo.fault is not None:
@@ -784,17 +745,6 @@ class LabController(QObject):
         else:
             self.live.fade_in()
 
-    @guarded
-    def _point(self, x_m: float, y_m: float, z_m: float) -> None:
-        if self.live is not None:
-            self.live.point_to(x_m, y_m, z_m)
-
-    @guarded
-    def _press(self, buttons: int) -> None:
-        if self.live is not None:
-            self.live.press(buttons)
-
-    @guarded
     def _save(self, path: Path, setting: Setting) -> None:
         if self.bench.blind:
             self.trouble = "no preset can be saved during a blind comparison: end it first"
@@ -802,12 +752,6 @@ class LabController(QObject):
         self._forget_trouble()
         self._saving.save(path, setting)
 
-    @guarded
-    def _use(self, study: Path, setting: Setting) -> None:
-        self._forget_trouble()
-        self._saving.use(study, setting)
-
-    @guarded
     def _open_preset(self, path: Path) -> None:
         """Feel the first liquid of a file; its others are at hand from then on."""
         try:

@@ -70,7 +70,7 @@ def _take_lab(camera: Camera, controller: MainController, theme: Theme) -> None:
     controller.window.go("lab")
     lab: Any = camera.until(lambda: controller.lab_and_designer.lab, "the lab")
     camera.until(lambda: lab.live, "the lab's device")
-    lab.place.path_chosen.emit(PATH)
+    lab.place.ask("path", PATH)
     camera.until(lambda: not lab.view().measuring, "the lab's costs")
     camera.wait(FELT_MS)
     camera.take(controller.window, f"lab-{theme.name}", WIDE)

@@ -3,7 +3,9 @@
 It draws a `LabView` and says what is asked for; it knows no device and no servo.
 """
 
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
@@ -31,38 +33,14 @@ SUFFIX = ".toml"
 class LabPlace(Place):
     """The lab as a place of the operator's window.
 
-    ``changed(name, value, held)`` is a parameter of the felt side in SI, ``held`` while its slider is dragged;
-    ``hand_moved`` [m, hand frame] and ``hand_pressed`` are the mouse's while it moves the ball; ``entered`` and
-    ``left`` come as the place is shown and hidden; ``save_asked`` is a file and the `Setting` that was felt when it was
-    asked for; ``use_asked`` a study's file and that `Setting`, ``preset_opened`` the file of a preset.
-    ``put_back_asked`` is the felt side and its `Setting`, for the study that is edited. ``estimate_source_chosen`` is
-    where a measured force comes from, and the path of a file; the others with this name are requests of its card.
+    ``asked(what, details)`` carries requests by their names: of parameters in SI (``held`` while a slider is dragged),
+    of the mouse while it moves the ball [m, hand frame], of files with the `Setting` that was felt, of the device, the
+    force and the estimation; "enter" and "leave" as the place is shown and hidden. ``put_back_asked`` is the felt side
+    and its `Setting`, for the study that is edited.
     """
 
-    changed = Signal(str, object, bool)
-    liquid_chosen = Signal(str, object)
-    switched = Signal()
-    blind_asked = Signal(bool)
-    undo_asked = Signal()
-    redo_asked = Signal()
-    device_chosen = Signal(str)
-    path_chosen = Signal(object)
-    stop_asked = Signal()
-    fade_in_asked = Signal()
-    cancel_asked = Signal()
-    save_asked = Signal(Path, object)
-    use_asked = Signal(Path, object)
+    asked = Signal(str, tuple)
     put_back_asked = Signal(str, object)
-    preset_opened = Signal(Path)
-    copied = Signal()
-    hand_moved = Signal(float, float, float)
-    hand_pressed = Signal(int)
-    estimate_source_chosen = Signal(str, object)
-    estimate_parameters_chosen = Signal(str)
-    estimate_apply_asked = Signal()
-    estimate_follow_asked = Signal(bool)
-    entered = Signal()
-    left = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -131,44 +109,49 @@ class LabPlace(Place):
         self._side_area.setFixedWidth(SIDE_WIDTH)
 
     def _connect(self) -> None:
-        header, form = self.header, self.form
-        for mine, part in (
-            (self.switched, header.sides.switched),
-            (self.blind_asked, header.blind_asked),
-            (self.device_chosen, header.device_chosen),
-            (self.path_chosen, header.path_chosen),
-            (self.undo_asked, header.undo.clicked),
-            (self.redo_asked, header.redo.clicked),
-            (self.stop_asked, header.stop.pressed),
-            (self.changed, form.changed),
-            (self.liquid_chosen, form.liquid_chosen),
-            (self.copied, form.copy.clicked),
-            (self.fade_in_asked, self.note.fade_in.clicked),
-            (self.cancel_asked, self.note.cancel.clicked),
-            (self.hand_moved, self.tank.moved),
-            (self.hand_pressed, self.tank.pressed),
-            (self.estimate_parameters_chosen, self.estimate.parameters_chosen),
-            (self.estimate_apply_asked, self.estimate.apply.clicked),
-            (self.estimate_follow_asked, self.estimate.follow_asked),
+        header, form, tank, estimate = self.header, self.form, self.tank, self.estimate
+        for part, what in (
+            (header.blind_asked, "blind"),
+            (header.device_chosen, "device"),
+            (header.path_chosen, "path"),
+            (form.changed, "change"),
+            (form.liquid_chosen, "liquid"),
+            (tank.moved, "point"),
+            (tank.pressed, "press"),
+            (estimate.parameters_chosen, "parameters"),
+            (estimate.follow_asked, "follow"),
         ):
-            part.connect(mine)
-        self.estimate.source_chosen.connect(self._choose_source)
-        header.save.clicked.connect(self.ask_where_to_save)
-        form.open.clicked.connect(self.ask_which_to_open)
-        form.use.clicked.connect(self.ask_which_study)
-        form.back.clicked.connect(self.put_back)
+            part.connect(partial(self.ask, what))
+        for pressed, what in (
+            (header.sides.switched, "switch"),
+            (header.undo.clicked, "undo"),
+            (header.redo.clicked, "redo"),
+            (header.stop.pressed, "stop"),
+            (form.copy.clicked, "copy"),
+            (self.note.fade_in.clicked, "fade in"),
+            (self.note.cancel.clicked, "cancel"),
+            (estimate.apply.clicked, "apply"),
+        ):
+            pressed.connect(lambda *_checked, what=what: self.ask(what))
+        for button, ask in (
+            (header.save, self.ask_where_to_save),
+            (form.open, self.ask_which_to_open),
+            (form.use, self.ask_which_study),
+            (form.back, self.put_back),
+        ):
+            button.clicked.connect(ask)
+        estimate.source_chosen.connect(self._choose_source)
         self._escape.held.connect(self._stop)
+
+    def ask(self, what: str, *details: Any) -> None:
+        """Ask for something by its name."""
+        self.asked.emit(what, details)
 
     def _shortcuts(self) -> None:
         """Give X, undo and redo to the place alone: other places of the window have keys of their own."""
-        for sequence, signal in (
-            (KEY, self.switched),
-            ("Ctrl+Z", self.undo_asked),
-            ("Ctrl+Shift+Z", self.redo_asked),
-            ("Ctrl+Y", self.redo_asked),
-        ):
+        for sequence, what in ((KEY, "switch"), ("Ctrl+Z", "undo"), ("Ctrl+Shift+Z", "redo"), ("Ctrl+Y", "redo")):
             shortcut = QShortcut(QKeySequence(sequence), self, context=Qt.ShortcutContext.WidgetWithChildrenShortcut)
-            shortcut.activated.connect(signal)
+            shortcut.activated.connect(partial(self.ask, what))
 
     @property
     def view(self) -> LabView | None:
@@ -187,28 +170,18 @@ class LabPlace(Place):
 
     def ask_where_to_save(self) -> None:
         """Ask for the preset's file; nothing waits meanwhile, and the force can be stopped while the dialog is open."""
-        if (setting := self._free_to_ask()) is None:
-            return
-        dialog = self._file_dialog(f"Save preset: {setting.title}", "Presets")
-        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setDefaultSuffix(SUFFIX[1:])
-        dialog.selectFile(f"{preset_name(setting.title)}{SUFFIX}")
-        dialog.fileSelected.connect(lambda name: self.save_asked.emit(Path(name), setting))
-        dialog.show()
+        if (setting := self._free_to_ask()) is not None:
+            dialog = self._ask_for_file(f"Save preset: {setting.title}", "Presets", "save", setting, saves=True)
+            dialog.setDefaultSuffix(SUFFIX[1:])
+            dialog.selectFile(f"{preset_name(setting.title)}{SUFFIX}")
 
     def ask_which_to_open(self) -> None:
         if self._free_to_ask() is not None:
-            dialog = self._file_dialog("Open preset", "Presets and protocols")
-            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-            dialog.fileSelected.connect(lambda name: self.preset_opened.emit(Path(name)))
-            dialog.show()
+            self._ask_for_file("Open preset", "Presets and protocols", "preset")
 
     def ask_which_study(self) -> None:
         if (setting := self._free_to_ask()) is not None:
-            dialog = self._file_dialog(f"Use {setting.title} in a study", "Protocols")
-            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-            dialog.fileSelected.connect(lambda name: self.use_asked.emit(Path(name), setting))
-            dialog.show()
+            self._ask_for_file(f"Use {setting.title} in a study", "Protocols", "use", setting)
 
     def put_back(self) -> None:
         if (setting := self._free_to_ask()) is not None and self._view is not None:
@@ -216,12 +189,9 @@ class LabPlace(Place):
 
     def _choose_source(self, source: str) -> None:
         if source != FILE:
-            self.estimate_source_chosen.emit(source, None)
+            self.ask("source", None, source)
         elif self._free_to_ask() is not None:
-            dialog = self._file_dialog("Measured motion and force", "Tables", ".csv")
-            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-            dialog.fileSelected.connect(lambda name: self.estimate_source_chosen.emit(FILE, Path(name)))
-            dialog.show()
+            self._ask_for_file("Measured motion and force", "Tables", "source", FILE, suffix=".csv")
 
     def _free_to_ask(self) -> Setting | None:
         """Return the felt setting; None while another question is open, or the comparison is blind."""
@@ -229,11 +199,19 @@ class LabPlace(Place):
             return None
         return self._view.workbench.in_hand
 
-    def _file_dialog(self, title: str, files: str, suffix: str = SUFFIX) -> QFileDialog:
-        """Return a question for a file, which begins in the workspace's protocols."""
-        self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{suffix})")
-        self.dialog.finished.connect(self._forget_dialog)
-        return self.dialog
+    def _ask_for_file(
+        self, title: str, files: str, what: str, *details: Any, suffix: str = SUFFIX, saves: bool = False
+    ) -> QFileDialog:
+        """Ask for a file, at first in the workspace's protocols, then for what is to be done with it."""
+        dialog = self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{suffix})")
+        if saves:
+            dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        else:
+            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.fileSelected.connect(lambda name: self.ask(what, Path(name), *details))
+        dialog.finished.connect(self._forget_dialog)
+        dialog.show()
+        return dialog
 
     def _forget_dialog(self) -> None:
         if self.dialog is not None:
@@ -243,7 +221,7 @@ class LabPlace(Place):
     def _stop(self) -> None:
         """Ask for zero force when Esc was held, in whichever window of the program."""
         if self.isVisible():
-            self.stop_asked.emit()
+            self.ask("stop")
 
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
@@ -256,11 +234,11 @@ class LabPlace(Place):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self.setFocus()
-        self.entered.emit()
+        self.ask("enter")
 
     def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
-        self.left.emit()
+        self.ask("leave")
         if self.dialog is not None:
             self.dialog.reject()
 

@@ -49,6 +49,6 @@ def felt(visit: LabController, qtbot: Any) -> LabController:
     visit.bench = visit.bench.choose("A", "Honey", load_scene("rek2024", "honey"))
     visit.place.show()
     qtbot.waitUntil(lambda: visit.live is not None, timeout=OPENS_MS)
-    visit.place.path_chosen.emit("circle")
+    visit.place.ask("path", "circle")
     qtbot.waitUntil(lambda: force_n(visit) > 0.3, timeout=SOON_MS)
     return visit

@@ -68,13 +68,13 @@ def test_closing_the_window_ends_in_zero_force(felt: LabController) -> None:
 
 
 def test_the_force_stops_at_once_and_fades_in_again(felt: LabController, qtbot: Any) -> None:
-    felt.place.stop_asked.emit()
+    felt.place.ask("stop")
     qtbot.waitUntil(lambda: force_n(felt) == 0.0, timeout=SOON_MS)
     assert not felt.view().force_on
-    felt.place.switched.emit()
-    felt.place.switched.emit()
+    felt.place.ask("switch")
+    felt.place.ask("switch")
     assert not felt.view().force_on
-    felt.place.fade_in_asked.emit()
+    felt.place.ask("fade in")
     qtbot.waitUntil(lambda: force_n(felt) > 0.3, timeout=SOON_MS)
 
 
@@ -93,7 +93,7 @@ def test_an_exception_in_a_slot_ends_in_zero_force_and_words(felt: LabController
     assert not view.force_on
     assert view.may_fade_in
     caplog.clear()  # it is written down once, with its trace
-    felt.place.fade_in_asked.emit()
+    felt.place.ask("fade in")
     qtbot.waitUntil(lambda: felt.live is not None, timeout=OPENS_MS)
     assert felt.view().trouble == ""
 
@@ -131,7 +131,7 @@ def test_a_lost_device_is_told_and_can_be_opened_again(felt: LabController, qtbo
     live.device.unplug()  # type: ignore[attr-defined]
     qtbot.waitUntil(lambda: "stopped responding" in felt.view().trouble, timeout=SOON_MS)
     assert not felt.view().force_on
-    felt.place.fade_in_asked.emit()
+    felt.place.ask("fade in")
     qtbot.waitUntil(lambda: felt.live is not None and felt.live is not live, timeout=OPENS_MS)
     assert is_let_go(live)
     assert felt.view().trouble == ""
@@ -146,15 +146,15 @@ def test_while_blind_nothing_tells_one_from_the_other(felt: LabController, qtbot
     assert felt.view().body_radius_m == pytest.approx(0.001)
     qtbot.waitUntil(lambda: felt.live.due_in_s is None, timeout=SOON_MS)
     before = felt.live.servo.serial  # the scene that was asked for last, though no tick may have taken it yet
-    felt.place.blind_asked.emit(True)
+    felt.place.ask("blind", True)
     qtbot.waitUntil(lambda: felt.live.servo.telemetry.latest().scene > before, timeout=SOON_MS)
     view = felt.view()
     assert view.workbench.blind
     assert view.felt == "A"
     assert view.body_radius_m == pytest.approx(0.0034)
-    felt.place.switched.emit()
-    felt.place.save_asked.emit(tmp_path / "told.toml", felt.bench.a)
+    felt.place.ask("switch")
+    felt.place.ask("save", tmp_path / "told.toml", felt.bench.a)
     assert "blind" in felt.view().trouble
     assert not list(tmp_path.iterdir())
-    felt.place.blind_asked.emit(False)
+    felt.place.ask("blind", False)
     assert not felt.view().workbench.blind

@@ -64,11 +64,11 @@ def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_open
     visit = make_lab(open_live=devices)
     visit.place.show()
     qtbot.waitUntil(lambda: devices.asked == ["scripted"], timeout=SOON_MS)
-    visit.place.stop_asked.emit()
+    visit.place.ask("stop")
     devices.gate.set()
     qtbot.waitUntil(lambda: devices.closed == 1, timeout=SOON_MS)
     assert visit.live is None
     view = visit.view()
     assert (view.busy, view.trouble, view.may_fade_in) == ("", "No device is open", True)
-    visit.place.changed.emit("liquid.density_kg_m3", 900.0, False)
+    visit.place.ask("change", "liquid.density_kg_m3", 900.0, False)
     assert visit.view().trouble == "No device is open"  # an edit opens none

@@ -25,7 +25,7 @@ def lab(visit: LabController, qtbot: Any) -> LabController:
     visit.bench = visit.bench.choose("A", "Water", WATER).choose("B", "Planted", other)
     visit.place.show()
     qtbot.waitUntil(lambda: visit.live is not None, timeout=OPENS_MS)
-    visit.place.path_chosen.emit("circle")
+    visit.place.ask("path", "circle")
     return visit
 
 
@@ -34,7 +34,7 @@ def drag(visit: LabController) -> float:
 
 
 def test_an_estimate_is_shown_applied_on_a_click_and_taken_back(lab: LabController, qtbot: Any) -> None:
-    lab.place.estimate_source_chosen.emit("other", None)
+    lab.place.ask("source", None, "other")
     assert lab.view().estimate.message
     qtbot.waitUntil(lambda: lab.view().estimate.may_apply, timeout=OPENS_MS)
     (row,) = lab.view().estimate.rows
@@ -43,14 +43,14 @@ def test_an_estimate_is_shown_applied_on_a_click_and_taken_back(lab: LabControll
     assert drag(lab) == Setting("Water", WATER, WATER).value("body.drag_coefficient")
     lab.place.estimate.apply.click()
     assert drag(lab) == pytest.approx(0.42, rel=0.03)
-    lab.place.undo_asked.emit()
+    lab.place.ask("undo")
     assert drag(lab) == pytest.approx(0.47)
 
 
 def test_it_follows_until_the_place_is_left(lab: LabController, qtbot: Any) -> None:
-    lab.place.estimate_source_chosen.emit("other", None)
+    lab.place.ask("source", None, "other")
     qtbot.waitUntil(lambda: lab.view().estimate.may_follow, timeout=OPENS_MS)
-    lab.place.estimate_follow_asked.emit(True)
+    lab.place.ask("follow", True)
     qtbot.waitUntil(lambda: drag(lab) == pytest.approx(0.42, rel=0.03), timeout=SOON_MS)
     assert lab.view().estimate.follows
     assert lab.live is not None
@@ -61,7 +61,7 @@ def test_it_follows_until_the_place_is_left(lab: LabController, qtbot: Any) -> N
 
 
 def test_a_file_that_cannot_be_read_is_said_in_the_card(lab: LabController, qtbot: Any, tmp_path: Path) -> None:
-    lab.place.estimate_source_chosen.emit("file", tmp_path / "none.csv")
+    lab.place.ask("source", tmp_path / "none.csv", "file")
     qtbot.waitUntil(lambda: "none.csv" in lab.view().estimate.message, timeout=OPENS_MS)
     assert lab.view().estimate.source == "off"
     assert lab.trouble == ""
@@ -71,12 +71,12 @@ def test_a_file_that_cannot_be_read_is_said_in_the_card(lab: LabController, qtbo
 def test_a_value_that_the_setting_refuses_is_said_and_the_force_goes_on(
     lab: LabController, qtbot: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lab.place.estimate_source_chosen.emit("other", None)
+    lab.place.ask("source", None, "other")
     qtbot.waitUntil(lambda: lab.view().estimate.may_apply, timeout=OPENS_MS)
     estimation = lab.estimation.estimation
     assert estimation is not None
     monkeypatch.setattr(type(estimation), "applied", lambda _self, bench: bench.change("body.drag_coefficient", -1.0))
-    lab.place.estimate_apply_asked.emit()
+    lab.place.ask("apply")
     assert "Not applied: " in lab.view().estimate.message
     assert lab.live is not None
     assert lab.live.servo.force_is_on
@@ -110,7 +110,7 @@ def test_a_preset_is_on_the_disk_before_the_program_ends(
 
     monkeypatch.setattr("study_app.app.lab_controller.save", slowly)
     for name in ("one.toml", "two.toml"):
-        visit.place.save_asked.emit(tmp_path / name, visit.bench.a)
+        visit.place.ask("save", tmp_path / name, visit.bench.a)
     assert not list(tmp_path.iterdir())
     threading.Timer(0.05, ended.set).start()
     visit.end(Patience(20.0))

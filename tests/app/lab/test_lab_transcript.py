@@ -80,8 +80,8 @@ def short(value: Any) -> str:
     )
 
 
-def emit(name: str, *values: Any) -> Any:
-    return lambda lab, *_: getattr(lab.place, name).emit(*values)
+def ask(what: str, *details: Any) -> Any:
+    return lambda lab, *_: lab.place.ask(what, *details)
 
 
 def raising(error: Exception) -> Any:
@@ -92,12 +92,11 @@ def raising(error: Exception) -> Any:
 
 
 def files(name: str, *names: str) -> Any:
-    def ask(lab: LabController, _live: Recorded, folder: Path) -> None:
-        path = folder.joinpath(*names)
-        getattr(lab.place, name).emit(*([path] if name == "preset_opened" else [path, lab.bench.in_hand]))
+    def choose(lab: LabController, _live: Recorded, folder: Path) -> None:
+        lab.place.ask(name, folder.joinpath(*names), *([] if name == "preset" else [lab.bench.in_hand]))
         lab._saving.wait()
 
-    return ask
+    return choose
 
 
 def lets(**values: Any) -> Any:
@@ -105,67 +104,67 @@ def lets(**values: Any) -> Any:
 
 
 STEPS: dict[str, Any] = {
-    "not entered: a knob": emit("changed", "liquid.density_kg_m3", 1100.0, False),
-    "not entered: stop": emit("stop_asked"),
-    "left before it was entered": emit("left"),
-    "entered": emit("entered"),
-    "entered twice": emit("entered"),
+    "not entered: a knob": ask("change", "liquid.density_kg_m3", 1100.0, False),
+    "not entered: stop": ask("stop"),
+    "left before it was entered": ask("leave"),
+    "entered": ask("enter"),
+    "entered twice": ask("enter"),
     "said": lambda lab, *_: lab._opening.said.emit("switch it on"),
-    "a knob is held": emit("changed", "liquid.density_kg_m3", 1300.0, True),
-    "a knob is let go of": emit("changed", "liquid.density_kg_m3", 1200.0, False),
-    "a drag coefficient": emit("changed", "body.drag_coefficient", 0.6, False),
-    "out of range": emit("changed", "liquid.density_kg_m3", -5.0, False),
-    "undo": emit("undo_asked"),
-    "redo": emit("redo_asked"),
+    "a knob is held": ask("change", "liquid.density_kg_m3", 1300.0, True),
+    "a knob is let go of": ask("change", "liquid.density_kg_m3", 1200.0, False),
+    "a drag coefficient": ask("change", "body.drag_coefficient", 0.6, False),
+    "out of range": ask("change", "liquid.density_kg_m3", -5.0, False),
+    "undo": ask("undo"),
+    "redo": ask("redo"),
     "due": lets(due_in_s=5.0),
-    "switch": emit("switched"),
+    "switch": ask("switch"),
     "none due": lets(due_in_s=None),
-    "choose": emit("liquid_chosen", "B", Choice("rek2024", "syrup", "Syrup")),
-    "choose none": emit("liquid_chosen", "B", Choice("rek2024", "treacle", "Treacle")),
-    "copy": emit("copied"),
+    "choose": ask("liquid", "B", Choice("rek2024", "syrup", "Syrup")),
+    "choose none": ask("liquid", "B", Choice("rek2024", "treacle", "Treacle")),
+    "copy": ask("copy"),
     "costs are asked": lambda lab, *_: lab._cost_due.timeout.emit(),
     "old costs": lets(told=[(0, COSTS)]),
     "costs": lambda lab, live, _: live.told.extend([(live.orders, COSTS), (live.orders, ERRORS)]),
     "costs again": lambda lab, *_: lab._cost_due.timeout.emit(),
     "appraiser died": lets(works=False, told=[(3, Crashed(-9))]),
-    "path": emit("path_chosen", "circle"),
-    "no path": emit("path_chosen", None),
-    "point": emit("hand_moved", 0.01, 0.02, -0.01),
-    "press": emit("hand_pressed", 3),
-    "stop": emit("stop_asked"),
-    "fade in": emit("fade_in_asked"),
-    "blind": emit("blind_asked", True),
-    "switch while blind": emit("switched"),
-    "save while blind": files("save_asked", "told.toml"),
-    "reveal": emit("blind_asked", False),
-    "save": files("save_asked", "syrup.toml"),
-    "use": files("use_asked", "study.toml"),
-    "use in none": files("use_asked", "syrup.toml"),
-    "save nowhere": files("save_asked", "nowhere", "mine.toml"),
-    "open": files("preset_opened", "syrup.toml"),
-    "open none": files("preset_opened", "broken.toml"),
+    "path": ask("path", "circle"),
+    "no path": ask("path", None),
+    "point": ask("point", 0.01, 0.02, -0.01),
+    "press": ask("press", 3),
+    "stop": ask("stop"),
+    "fade in": ask("fade in"),
+    "blind": ask("blind", True),
+    "switch while blind": ask("switch"),
+    "save while blind": files("save", "told.toml"),
+    "reveal": ask("blind", False),
+    "save": files("save", "syrup.toml"),
+    "use": files("use", "study.toml"),
+    "use in none": files("use", "syrup.toml"),
+    "save nowhere": files("save", "nowhere", "mine.toml"),
+    "open": files("preset", "syrup.toml"),
+    "open none": files("preset", "broken.toml"),
     "of a study": lambda lab, *_: lab.feel_of_study(lab.bench.b, lab.bench.a, "demo"),
-    "source": emit("estimate_source_chosen", "off", None),
-    "parameters": emit("estimate_parameters_chosen", "wake"),
-    "apply": emit("estimate_apply_asked"),
-    "follow": emit("estimate_follow_asked", True),
+    "source": ask("source", None, "off"),
+    "parameters": ask("parameters", "wake"),
+    "apply": ask("apply"),
+    "follow": ask("follow", True),
     "fault": lambda _lab, live, _folder: setattr(live.servo, "fault", ServoFault("no samples for 50 ms")),
-    "fade in after a fault": emit("fade_in_asked"),
+    "fade in after a fault": ask("fade in"),
     "known error": lambda lab, *_: lab.fail(ServoFault("the loop ended")),
-    "open again": emit("fade_in_asked"),
+    "open again": ask("fade in"),
     "bug": lambda lab, *_: lab.fail(RuntimeError("out of ideas")),
     "the same bug": lambda lab, *_: lab.fail(RuntimeError("out of ideas")),
     "bug while opening": lambda lab, *_: lab._opening.failed.emit(KeyError("x")),
-    "device": emit("device_chosen", "mouse"),
-    "no device": emit("device_chosen", "falcon"),
-    "cancelled": emit("cancel_asked"),
-    "back": emit("device_chosen", "scripted"),
+    "device": ask("device", "mouse"),
+    "no device": ask("device", "falcon"),
+    "cancelled": ask("cancel"),
+    "back": ask("device", "scripted"),
     "cannot be closed": lambda _lab, live, _folder: setattr(live, "close", raising(ServoFault("the servo is stuck"))),
     "stuck bug": lambda lab, *_: lab.fail(ValueError("second")),
-    "opened anew": emit("fade_in_asked"),
+    "opened anew": ask("fade in"),
     "stuck": lambda _lab, live, _folder: setattr(live, "close", raising(ServoFault("the servo is stuck"))),
-    "left": emit("left"),
-    "a knob after it": emit("changed", "liquid.density_kg_m3", 1000.0, False),
+    "left": ask("leave"),
+    "a knob after it": ask("change", "liquid.density_kg_m3", 1000.0, False),
 }
 OPENING = ("entered", "fade in after a fault", "open again", "device", "no device", "back", "opened anew")
 

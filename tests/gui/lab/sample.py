@@ -125,5 +125,5 @@ def blind(bench: Workbench, *, first: str = "A", felt: str = "A") -> Workbench:
 
 def heard(place: Any, name: str) -> list[tuple[Any, ...]]:
     said: list[tuple[Any, ...]] = []
-    getattr(place, name).connect(lambda *what: said.append(what))
+    place.asked.connect(lambda what, details: said.append(details) if what == name else None)
     return said

@@ -38,7 +38,7 @@ FOUND = EstimateShown(
 
 
 def test_sources_a_file_and_parameters_are_chosen(place: Any, still: LabView, tmp_path: Path) -> None:
-    sources, parameters = heard(place, "estimate_source_chosen"), heard(place, "estimate_parameters_chosen")
+    sources, parameters = heard(place, "source"), heard(place, "parameters")
     place.show_view(dataclasses.replace(still, estimate=dataclasses.replace(FOUND, sources=(*SOURCES, *LSL))))
     for at in (2, 4, 3):
         place.estimate.source.activated.emit(at)
@@ -46,5 +46,5 @@ def test_sources_a_file_and_parameters_are_chosen(place: Any, still: LabView, tm
     assert isinstance(place.dialog, QFileDialog)
     place.dialog.fileSelected.emit(str(tmp_path / "robot.csv"))
     place.dialog.reject()
-    assert sources == [("device", None), ("lsl", None), ("file", tmp_path / "robot.csv")]
+    assert sources == [(None, "device"), (None, "lsl"), (tmp_path / "robot.csv", "file")]
     assert parameters == [("wake",)]

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def told(place: Any, still: LabView) -> list[tuple[Any, ...]]:
     said: list[tuple[Any, ...]] = []
-    place.changed.connect(lambda *what: said.append(what))
+    place.asked.connect(lambda what, details: said.append(details) if what == "change" else None)
     place.show_view(still)
     return said
 
@@ -83,7 +83,7 @@ def test_escape_leaves_what_was_refused(place: Any, told: Any, still: LabView) -
 
 def test_stop_force_speaks_at_the_press_and_is_never_disabled_hidden_or_moved(place: Any, still: LabView) -> None:
     place.show_view(still)
-    said = heard(place, "stop_asked")
+    said = heard(place, "stop")
     QTest.mousePress(place.header.stop, Qt.MouseButton.LeftButton)
     assert len(said) == 1
     QTest.mouseRelease(place.header.stop, Qt.MouseButton.LeftButton)
@@ -115,15 +115,15 @@ def test_esc_held_stops_the_force_from_any_part_also_while_a_preset_is_being_sav
 ) -> None:
     place.show_view(still)
     qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is not None)
-    with qtbot.waitSignal(place.stop_asked, timeout=HOLD_MS + 2000):
+    with qtbot.waitSignal(place.asked, timeout=HOLD_MS + 2000, check_params_cb=lambda what, _: what == "stop"):
         QTest.keyPress(QGuiApplication.focusWindow(), Qt.Key.Key_Escape)
     QTest.keyRelease(QGuiApplication.focusWindow(), Qt.Key.Key_Escape)
-    said = heard(place, "stop_asked")
+    said = heard(place, "stop")
     place.header.save.click()
     assert not place.dialog.isModal()
     place.dialog.activateWindow()
     qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is place.dialog.windowHandle())
-    with qtbot.waitSignal(place.stop_asked, timeout=HOLD_MS + 2000):
+    with qtbot.waitSignal(place.asked, timeout=HOLD_MS + 2000, check_params_cb=lambda what, _: what == "stop"):
         QTest.keyPress(QGuiApplication.focusWindow(), Qt.Key.Key_Escape)  # which closes the dialog at once
     place.window().activateWindow()
     qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is not None)
@@ -141,7 +141,7 @@ def test_a_knob_held_while_the_other_side_is_called_for_changes_nothing_there(pl
     slider = place.form.rows["wake.length"].slider
     QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=QPoint(30, 16))
     place.show_view(dataclasses.replace(still, workbench=still.workbench.switch()))
-    said = heard(place, "changed")
+    said = heard(place, "change")
     QTest.mouseMove(slider, QPoint(50, 16))
     QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=QPoint(50, 16))
     assert said == []

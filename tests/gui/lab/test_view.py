@@ -64,7 +64,7 @@ def test_while_blind_both_sides_look_alike_but_for_which_is_felt(place: Any, mov
 
 
 def test_the_mouse_moves_the_ball_from_a_click_to_the_next_and_only_while_it_leads(place: Any, still: LabView) -> None:
-    moves, bits = heard(place, "hand_moved"), heard(place, "hand_pressed")
+    moves, bits = heard(place, "point"), heard(place, "press")
     place.show_view(still)
     middle = place.tank.rect().center()
     QTest.mouseClick(place.tank, Qt.MouseButton.LeftButton, pos=middle)
