@@ -178,14 +178,24 @@ class DevicesController(QObject):
 
     def make_place(self) -> DevicesPlace:
         place = self.place = DevicesPlace()
-        place.look_asked.connect(self.look)
-        place.chosen.connect(lambda name: self._workstation.change({"device": name}))
-        place.option_chosen.connect(lambda name, path: self._workstation.change({name: path}))
-        place.diagnose_asked.connect(self.diagnose)
-        place.report_asked.connect(open_here)
-        place.left.connect(self.end_diagnosis)
+        place.asked.connect(self._asked)
         self._show()
         return place
+
+    def _asked(self, what: str, detail: Any) -> None:
+        match what:
+            case "look":
+                self.look()
+            case "choose":
+                self._workstation.change({"device": detail})
+            case "option":
+                self._workstation.change(detail)
+            case "diagnose":
+                self.diagnose(detail)
+            case "report":
+                open_here(detail)
+            case "leave":
+                self.end_diagnosis()
 
     def look(self) -> None:
         if self.looking.busy or self._ended:

@@ -195,15 +195,15 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
     place = devices.make_place()
     qtbot.addWidget(place)
     steps: list[tuple[str, Any]] = [
-        ("look_asked", ()), ("chosen", ("falcon",)), ("look_asked", ()), ("option_chosen", ("firmware", "/f.bin")),
-        ("chosen", ("falcon:FT1",)), ("diagnose_asked", ("falcon",)), ("diagnose_asked", ("mouse",)), ("left", ()),
-        ("look_asked", ()), ("look_asked", ()),
+        ("look", None), ("choose", "falcon"), ("look", None), ("option", {"firmware": "/f.bin"}),
+        ("choose", "falcon:FT1"), ("diagnose", "falcon"), ("diagnose", "mouse"), ("leave", None),
+        ("look", None), ("look", None),
     ]  # fmt: skip
     for number, (name, given) in enumerate(steps):
         heard.clear()
         if number == len(steps) - 1:
             devices.end()
-        getattr(place, name).emit(*given)
+        place.asked.emit(name, given)
         if devices.looking.busy:
             heard.append(f"looking {place.refresh.isEnabled()}")
             devices.looking.wait()

@@ -113,7 +113,7 @@ class TestDeviceOfAnotherPackage:
         place = DevicesPlace()
         qtbot.addWidget(place)
         place.show_devices(devices_shown(backends()), "toy-hand")
-        row = place.simulated.rows["toy-hand"]
+        row = place.rows["toy-hand"]
         assert row.title.text() == "Toy hand"
         assert row.title.isChecked()
         assert row.chip.word == "Ready"
@@ -192,10 +192,10 @@ def test_a_broken_entry_point_is_one_row_and_every_other_device_stays(site, qtbo
     place = DevicesPlace()
     qtbot.addWidget(place)
     place.show_devices(devices_shown(backends()), "mouse")
-    row = place.people.rows["toy (toy_broken)"]
+    row = place.rows["toy (toy_broken)"]
     assert row.chip.word == "Not available"
     assert reason in row.why.text()
-    assert place.people.rows["mouse"].title.isChecked()
+    assert place.rows["mouse"].title.isChecked()
     assert "toy" not in list_devices()
 
 

@@ -113,8 +113,8 @@ DEVICES: Actions = {
         {"falcon": BenchShown("Measured: mass 0.20 kg.", Path("b.md")), "mouse": BenchShown("Missing: /gone.", None)}
     ),
     "pressed": in_turn(
-        clicked("people.rows.falcon.title", "people.rows.falcon.diagnose", "people.rows.falcon.report", "refresh"),
-        clicked("options.firmware.forget"),
+        clicked("rows.falcon.title", "rows.falcon.diagnose", "rows.falcon.report", "refresh"),
+        typed("options.firmware.editor.control", " "),
         lambda place: (place.enter(), place.leave(), place.resize(928, 640)),
     ),
     "no benches, light": lambda place: (place.show_benches({}), apply_theme(place, LIGHT)),

@@ -3,35 +3,32 @@
 It draws values and says what is asked for; it opens no device.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QLabel, QWidget
+from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QLabel, QWidget
 
 from study_app.devices.descriptor import DeviceOption
 from study_app.gui.kit.devices import BenchShown, DeviceShown, remembered_options
+from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, file_of
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Radio
-from study_app.gui.widgets.labels import Elided, label, set_ink
+from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.main_view import Place
 
-LEAST_WORDS = 280  # narrower, wrapped words would ask for room that they do not need
 INSET = 30  # behind a radio's mark
 
 
 class DeviceRow(QWidget):
-    """One device; ``diagnose_asked`` carries its name, ``report_asked`` the path of the report of its last bench."""
+    """One device, and its last bench; ``ask`` is given what is asked for of it."""
 
-    diagnose_asked = Signal(str)
-    report_asked = Signal(Path)
-
-    def __init__(self, shown: DeviceShown) -> None:
+    def __init__(self, shown: DeviceShown, ask: Callable[..., object]) -> None:
         super().__init__()
         self.name = shown.name
         self.title: Radio | QLabel = Radio(shown.title) if shown.choosable else label(shown.title, "strong")
@@ -43,11 +40,11 @@ class DeviceRow(QWidget):
         self.diagnose = ActionButton("pulse", "Diagnose …", height=36)
         self.diagnose.setAccessibleName(f"Diagnose {shown.title}")
         self.diagnose.setVisible(shown.diagnosable)
-        self.diagnose.clicked.connect(lambda: self.diagnose_asked.emit(self.name))
+        self.diagnose.clicked.connect(lambda: ask("diagnose", self.name))
         self.bench = _words("text2")
         self.report = ActionButton("file", "Bench report", height=36)
         self.report.setAccessibleName(f"Bench report of {shown.title}")
-        self.report.clicked.connect(lambda: self.report_asked.emit(self._report))
+        self.report.clicked.connect(lambda: ask("report", self._report))
         self._report: Path | None = None
         inset = () if shown.choosable else (INSET,)
         head = hbox(*inset, self.title, STRETCH, self.chip, spacing=10)
@@ -79,48 +76,6 @@ class DeviceRow(QWidget):
         self.report.setVisible(self._report is not None)
 
 
-class DeviceList(Card):
-    """Devices under each other; ``chosen`` carries the name of the one to begin with: one of all in the ``group``."""
-
-    chosen = Signal(str)
-    diagnose_asked = Signal(str)
-    report_asked = Signal(Path)
-
-    def __init__(self, title: str, group: QButtonGroup) -> None:
-        super().__init__(title, gap=6)
-        self.rows: dict[str, DeviceRow] = {}
-        self._group = group
-
-    def show_devices(self, shown: tuple[DeviceShown, ...]) -> None:
-        """Show devices; rows of those that are there already stay, with the keyboard in them."""
-        for device in shown:
-            if device.name in self.rows:
-                self.rows[device.name].show_device(device)
-            else:
-                self._add(device)
-
-    def show_benches(self, benches: Mapping[str, BenchShown]) -> None:
-        for name, row in self.rows.items():
-            row.show_bench(benches.get(name.partition(":")[0]))
-
-    def mark(self, kind: str) -> None:
-        for name, row in self.rows.items():
-            if isinstance(row.title, Radio):
-                row.title.setChecked(name == kind)
-
-    def _add(self, device: DeviceShown) -> None:
-        if self.rows:
-            self.column.addWidget(Rule())
-        row = DeviceRow(device)
-        self.rows[device.name] = row
-        self.column.addWidget(row)
-        row.diagnose_asked.connect(self.diagnose_asked)
-        row.report_asked.connect(self.report_asked)
-        if isinstance(row.title, Radio):
-            self._group.addButton(row.title)
-            row.title.clicked.connect(lambda: self.chosen.emit(device.name))
-
-
 def _words(ink: str, *, small: bool = False) -> QLabel:
     made = label("", "small" if small else "label", ink, wraps=True)  # type: ignore[arg-type]
     made.setFont(font("small" if small else "label", weight=400))
@@ -130,38 +85,20 @@ def _words(ink: str, *, small: bool = False) -> QLabel:
 
 STACKED_BELOW = 1000
 COLUMN_PX = 340
-NO_FILE = "No file chosen"
+NONE = "No file chosen"
 
 
 class OptionCard(Card):
-    """The file of a device's option; ``chosen`` carries its path, None to forget it."""
-
-    chosen = Signal(object)
+    """The file of a device's option; an empty field is none."""
 
     def __init__(self, option: DeviceOption) -> None:
         super().__init__(option.title, gap=8)
-        self._option = option
         about = label(option.about, "label", "text2", wraps=True, weight=400)
         about.setMinimumWidth(LEAST_WORDS)
-        self.file = Elided("label", "text")
-        self.choose = ActionButton("file", "Choose file …", height=38)
-        self.forget = ActionButton("", "Forget", height=38)
-        self.choose.clicked.connect(self._choose)
-        self.forget.clicked.connect(lambda: self.chosen.emit(None))
-        buttons = hbox((self.choose, 1), self.forget, spacing=12)
-        add_parts(self.column, about, self.file, buttons)
-        self._path = ""
-        self.show_file(None)
-
-    def show_file(self, path: str | None) -> None:
-        self._path = path or ""
-        self.file.show_text(path or NO_FILE)
-        self.forget.setEnabled(path is not None)
-
-    def _choose(self) -> None:
-        path, _ = QFileDialog.getOpenFileName(self, self._option.title, self._path, self._option.file_filter)
-        if path:
-            self.chosen.emit(path)
+        exists = partial(file_of, option.name)
+        field = Field(option.name, "File", "file", (), placeholder=NONE, file_filter=option.file_filter, parse=exists)
+        self.editor = Editor(field)
+        add_parts(self.column, about, self.editor)
 
 
 class HelpCard(Card):
@@ -183,40 +120,30 @@ class HelpCard(Card):
 class DevicesPlace(Place):
     """Every device with its state.
 
-    ``look_asked`` where the machine is to be looked at again; ``chosen`` carries the name of the device that sessions
-    begin with; ``option_chosen`` an option's name, and a path or None; ``diagnose_asked`` a device's name;
-    ``report_asked`` the path of a bench report; ``left`` comes with `leave`.
+    ``asked(what, detail)``: to "look" at the machine again, to "choose" a device by its name, to "diagnose" one, to
+    open a "report"; of an "option" its name and a path or None; "leave" where the place is left.
     """
 
-    look_asked = Signal()
-    chosen = Signal(str)
-    option_chosen = Signal(str, object)
-    diagnose_asked = Signal(str)
-    report_asked = Signal(Path)
-    left = Signal()
+    asked = Signal(str, object)
 
     def __init__(self) -> None:
         super().__init__()
         self._group = QButtonGroup(self)
-        self.people = DeviceList("Input devices", self._group)
-        self.simulated = DeviceList("Simulated devices", self._group)
+        self.lists = {False: Card("Input devices", gap=6), True: Card("Simulated devices", gap=6)}
+        self.rows: dict[str, DeviceRow] = {}
         self.options = {option.name: OptionCard(option) for option in remembered_options()}
         self.help = HelpCard()
         self.refresh = ActionButton("repeat", "Refresh", key="F5")
-        self.refresh.clicked.connect(self.look_asked)
-        for part in (self.people, self.simulated):
-            part.chosen.connect(self.chosen)
-            part.diagnose_asked.connect(self.diagnose_asked)
-            part.report_asked.connect(self.report_asked)
-        for name, card in self.options.items():
-            card.chosen.connect(partial(self.option_chosen.emit, name))
+        self.refresh.clicked.connect(lambda: self.asked.emit("look", None))
+        for card in self.options.values():
+            card.editor.changed.connect(lambda name, path: self.asked.emit("option", {name: path}))
         self._lay_out()
 
     def _lay_out(self) -> None:
         about = label("New sessions use the selected device.", "body", "text2", wraps=True)
         titles = vbox(label("Devices", "title"), about, spacing=4)
         head = hbox((titles, 1), self.refresh, margins=(SHADOW, 0, SHADOW, 0))
-        lists = vbox(self.people, self.simulated, STRETCH, spacing=18)
+        lists = vbox(*self.lists.values(), STRETCH, spacing=18)
         column = vbox(*self.options.values(), self.help, STRETCH, spacing=18)
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(18)
@@ -228,28 +155,41 @@ class DevicesPlace(Place):
 
     def enter(self) -> None:
         """Look at the machine again: something may have been plugged in."""
-        self.look_asked.emit()
+        self.asked.emit("look", None)
 
     def leave(self) -> None:
         """Tell that the place is left, so that a running examination releases its device."""
-        self.left.emit()
+        self.asked.emit("leave", None)
 
     def show_devices(self, shown: tuple[DeviceShown, ...], preferred: str) -> None:
-        self.people.show_devices(tuple(one for one in shown if not one.simulated))
-        self.simulated.show_devices(tuple(one for one in shown if one.simulated))
+        """Show devices; rows of those that are there already stay, with the keyboard in them."""
+        for device in shown:
+            if device.name in self.rows:
+                self.rows[device.name].show_device(device)
+            else:
+                self._add(device)
         self._group.setExclusive(False)  # or what is marked could not lose its mark
-        for part in (self.people, self.simulated):
-            part.mark(preferred.partition(":")[0])
-            apply_theme_within(part, self.theme)
+        for name, row in self.rows.items():
+            if isinstance(row.title, Radio):
+                row.title.setChecked(name == preferred.partition(":")[0])
         self._group.setExclusive(True)
 
+    def _add(self, device: DeviceShown) -> None:
+        card = self.lists[device.simulated]
+        row = self.rows[device.name] = DeviceRow(device, self.asked.emit)
+        add_parts(card.column, *([Rule()] if card.findChild(DeviceRow) else []), row)
+        if isinstance(row.title, Radio):
+            self._group.addButton(row.title)
+            row.title.clicked.connect(lambda: self.asked.emit("choose", device.name))
+        apply_theme_within(card, self.theme)
+
     def show_benches(self, benches: Mapping[str, BenchShown]) -> None:
-        for part in (self.people, self.simulated):
-            part.show_benches(benches)
+        for name, row in self.rows.items():
+            row.show_bench(benches.get(name.partition(":")[0]))
 
     def show_options(self, values: Mapping[str, Path]) -> None:
         for name, card in self.options.items():
-            card.show_file(str(values[name]) if name in values else None)
+            card.editor.show_value(values.get(name, ""))
 
     def show_looking(self, looking: bool) -> None:
         self.refresh.setEnabled(not looking)

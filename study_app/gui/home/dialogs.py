@@ -15,7 +15,7 @@ from study_app.gui.display.screens import screens_shown
 from study_app.gui.home.study_facts import StudyFacts
 from study_app.gui.kit.devices import device_label, device_or_default, window_options
 from study_app.gui.kit.dialogs import Question
-from study_app.gui.kit.fields import Editor, Field, choice, seed
+from study_app.gui.kit.fields import Editor, Field, choice, file_of, seed
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.background import Background
@@ -273,7 +273,7 @@ class NewSessionDialog(QDialog):
                 Field(
                     option.name, option.title, "file" if option.file_filter else "line", aside=option.hint,
                     placeholder=option.placeholder, file_filter=option.file_filter,
-                    parse=partial(_file, option.name) if option.file_filter else str,
+                    parse=partial(file_of, option.name) if option.file_filter else str,
                 )
                 for option in window_options()
             ),
@@ -440,12 +440,6 @@ class NewSessionDialog(QDialog):
             source=self.facts.source,
             device_options={name: value for name, value in chosen.items() if value},
         )
-
-
-def _file(name: str, text: str) -> Path | None:
-    if text and not Path(text).is_file():
-        raise ValueError(f"there is no {name} in {text}: choose the file, or leave the field empty")
-    return Path(text) if text else None
 
 
 class WorkspaceDialog(Question):

@@ -77,6 +77,13 @@ def seed(aside: str = "") -> Field:
     return Field("seed", "Seed", aside=aside, parse=parse)
 
 
+def file_of(name: str, text: str) -> Path | None:
+    """Return the file whose path was typed, None for an empty text."""
+    if text and not Path(text).is_file():
+        raise ValueError(f"there is no {name} in {text}: choose the file, or leave the field empty")
+    return Path(text) if text else None
+
+
 class Radios(QWidget):
     """Values of which one is chosen, at first the first, below each other."""
 
