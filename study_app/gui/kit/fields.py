@@ -52,17 +52,20 @@ def choice(name: str, label: str, options: Mapping[Any, str]) -> Field:
     return Field(name, label, "choice", tuple(options.items()))
 
 
-def number(name: str, label: str, unit: str, limits: tuple[float, float]) -> Field:
-    """Return the field of a number within limits; None where it is empty."""
+def number(
+    name: str, label: str, unit: str, limits: tuple[float, float], decimals: int = 1, *, may_miss: bool = True
+) -> Field:
+    """Return the field of a number within limits; None where it is empty, if it ``may_miss``."""
+    permitted = f"A number from {limits[0]:g} to {limits[1]:g} {unit}{'; leave empty if unknown' * may_miss}."
 
     def parse(text: str) -> float | None:
         value = read_number(text) if text else None
-        if text and (value is None or not limits[0] <= value <= limits[1]):
-            raise ValueError(f"A number from {limits[0]:g} to {limits[1]:g} {unit}; leave empty if unknown.")
+        if (text or not may_miss) and (value is None or not limits[0] <= value <= limits[1]):
+            raise ValueError(permitted)
         return value
 
     return Field(
-        name, label, unit=unit, parse=parse, write=lambda value: "" if value is None else write_number(value, 1)
+        name, label, unit=unit, parse=parse, write=lambda value: "" if value is None else write_number(value, decimals)
     )
 
 

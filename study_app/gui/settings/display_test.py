@@ -15,15 +15,14 @@ from PySide6.QtGui import QCloseEvent, QColor, QImage, QKeyEvent, QPainter, QPai
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QSizePolicy, QWidget
 
 from study_app.gui.display.screens import Frames
-from study_app.gui.kit.fields import LEAST_WORDS
+from study_app.gui.kit.fields import LEAST_WORDS, Editor, choice, number
 from study_app.gui.participant.tank.layers import paint_patch, patch_place
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
-from study_app.gui.widgets.cards import Icon
-from study_app.gui.widgets.controls import ActionButton, Choice
+from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
-from study_app.gui.widgets.numbers import NumberField, read_number, write_number
+from study_app.gui.widgets.numbers import write_number
 from study_app.store.workstation import OFFSET_MS, SPREAD_MS, DisplayOffset
 
 LEAST_S: Final = 2.0
@@ -89,6 +88,7 @@ DECIMALS = 2
 GREYS = 17
 LABEL = 20
 FIELD = 120
+WIDEST_FORM = 460
 
 
 class OffsetForm(QWidget):
@@ -99,75 +99,40 @@ class OffsetForm(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.mean, self.spread = NumberField(), NumberField()
-        self.how = Choice()
-        self.how.setProperty("dense", "true")
-        self.how.setFont(font("label"))
-        self.how.setMaximumWidth(220)
-        for way in HOWS:
-            self.how.addItem(way.capitalize(), way)
+        fields = (
+            number("mean", "Mean", "ms", OFFSET_MS, DECIMALS, may_miss=False),
+            number("spread", "Spread", "ms", SPREAD_MS, DECIMALS),
+            choice("how", "Measured by", {way: way.capitalize() for way in HOWS}),
+        )
+        self.editors = {one.name: Editor(one) for one in fields}
         self.said = label("", "label", "text2", wraps=True, weight=400, tabular=True)
         self.said.setMinimumWidth(LEAST_WORDS)
-        self.sign = Icon("warning", "bad", 16)
-        self.why = label("", "label", "bad", wraps=True)
         self.keep = ActionButton("save", "Save offset", height=38)
         self.forget = ActionButton("", "Forget", height=38)
-        for button in (self.keep, self.forget):
-            button.setAutoDefault(False)
-        self._lay_out()
+        foot = hbox(self.keep, self.forget, STRETCH, spacing=12)
+        vbox(self.said, *self.editors.values(), foot, spacing=8, margins=0, parent=self)
         self.keep.clicked.connect(self._keep)
         self.forget.clicked.connect(self.forgotten)
-        for field in (self.mean, self.spread):
-            field.setFixedWidth(88)
-            field.textEdited.connect(lambda: self._refuse(""))
-            field.returnPressed.connect(self._keep)
-        self._refuse("")
-
-    def _lay_out(self) -> None:
-        cells = grid(12, 6)
-        named = (("Mean, ms", self.mean), ("Spread, ms", self.spread), ("Measured by", self.how))
-        for column, (name, field) in enumerate(named):
-            over = label(name, "label", "text2")
-            over.setBuddy(field)
-            field.setAccessibleName(f"Display offset: {name}")
-            cells.addWidget(over, 0, column)
-            cells.addWidget(field, 1, column)
-        cells.setColumnStretch(2, 1)
-        cells.setColumnStretch(3, 2)
-        trouble = hbox((self.sign, 0, Qt.AlignmentFlag.AlignTop), (self.why, 1), spacing=6)
-        foot = hbox(self.keep, self.forget, STRETCH, spacing=12)
-        vbox(self.said, cells, trouble, foot, spacing=8, margins=0, parent=self)
 
     def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
         """Show what was measured; of another screen than ``screen`` it is said so."""
         self.forget.setEnabled(offset is not None)
         self.said.setText(offset_words(offset, screen))
-        if offset is None:
-            return
-        for field, value in ((self.mean, offset.mean_ms), (self.spread, offset.spread_ms)):
-            field.show_text(write_number(value, DECIMALS))
-        self.how.setCurrentIndex(max(0, self.how.findData(offset.how)))
+        if offset is not None:
+            for name, value in (("mean", offset.mean_ms), ("spread", offset.spread_ms), ("how", offset.how)):
+                self.editors[name].show_value(value)
 
     def _keep(self) -> None:
         found = []
-        for name, field, (least, most) in (("Mean", self.mean, OFFSET_MS), ("Spread", self.spread, SPREAD_MS)):
-            value = read_number(field.text() or "0") if field is self.spread else read_number(field.text())
-            good = value is not None and least <= value <= most
-            field.show_state("" if good else "refused")
-            if value is None or not good:
-                self._refuse(f"{name} must be a number from {least:g} to {most:g} ms.")
-                field.setFocus()
+        for editor in self.editors.values():
+            try:
+                found.append(editor.value)
+            except ValueError as refusal:
+                editor.show_refusal(str(refusal))
+                editor.control.setFocus()
                 return
-            found.append(value)
-        self._refuse("")
-        for field in (self.mean, self.spread):
-            field.setModified(False)
-        self.kept.emit(*found, self.how.currentData())
-
-    def _refuse(self, why: str) -> None:
-        self.why.setText(why)
-        self.why.setVisible(bool(why))
-        self.sign.setVisible(bool(why))
+        mean_ms, spread_ms, how = found
+        self.kept.emit(mean_ms, spread_ms or 0.0, how)
 
 
 def offset_words(offset: DisplayOffset | None, screen: str) -> str:
@@ -274,12 +239,11 @@ class DisplayTest(QWidget):
         self._toggled_ns = now_ns()
         self.interval_ms = FIRST_MS
         self._unpainted = False
-        self.interval = NumberField()
-        self.interval.setFixedWidth(88)
-        self.interval.setAccessibleName("Interval of the patch, ms")
-        self.interval.show_text(write_number(FIRST_MS, 0))
+        self.interval = Editor(number("interval", "Interval", "ms", INTERVAL_MS))
+        self.interval.show_value(FIRST_MS)
         self.values: list[QLabel] = [figures("–", "number") for _ in NAMES]
         self.offset = OffsetForm()
+        self.offset.setMaximumWidth(WIDEST_FORM)
         self.leave = ActionButton("", "Leave (Esc)", height=40)
         self._lay_out(screen_words)
         self._connect()
@@ -318,16 +282,13 @@ class DisplayTest(QWidget):
         return hbox(*fields, (words, 3), spacing=16)
 
     def _foot(self) -> QBoxLayout:
-        self.why = label("", "label", "bad", wraps=True)
-        titles = label("Photodiode's patch", "card"), label("Interval, ms", "label", "text2")
-        toggling = vbox(*titles, self.interval, self.why, STRETCH, spacing=6)
+        toggling = vbox(label("Photodiode's patch", "card"), self.interval, STRETCH, spacing=6)
         measured = vbox(label("Display offset", "card"), self.offset, STRETCH, spacing=6)
         return hbox(toggling, (measured, 1), spacing=48, margins=(0, 0, 120, 0))  # the patch's corner is free
 
     def _connect(self) -> None:
         self.leave.clicked.connect(self.close)
-        self.interval.entered.connect(self._set_interval)
-        self.interval.unread.connect(lambda _text: self._refuse_interval())
+        self.interval.changed.connect(lambda _name, value: self._set_interval(value))
         self.offset.kept.connect(self.kept)
         self.offset.forgotten.connect(self.forgotten)
 
@@ -363,18 +324,9 @@ class DisplayTest(QWidget):
     def patch_area(self) -> QRect:
         return patch_place(self.width(), self.height()).toAlignedRect()
 
-    def _set_interval(self, value: float) -> None:
-        if not INTERVAL_MS[0] <= value <= INTERVAL_MS[1]:
-            self._refuse_interval()
-            return
-        self.interval_ms = value
-        self.interval.show_state("")
-        self.interval.show_text(write_number(value, 0))
-        self.why.setText("")
-
-    def _refuse_interval(self) -> None:
-        self.interval.show_state("refused")
-        self.why.setText(f"From {INTERVAL_MS[0]:g} to {INTERVAL_MS[1]:g} ms.")
+    def _set_interval(self, value: float | None) -> None:
+        self.interval_ms = value or FIRST_MS
+        self.interval.show_value(self.interval_ms)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)

@@ -31,7 +31,7 @@ def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
     assert test.isVisible()
     real_place.open_test()
     assert real_place.test is test
-    qtbot.keyClicks(test.offset.mean, "20")
+    qtbot.keyClicks(test.offset.editors["mean"].control, "20")
     with qtbot.waitSignal(real_place.offset_measured):
         qtbot.mouseClick(test.offset.keep, Qt.MouseButton.LeftButton)
     with qtbot.waitSignal(test.left):
