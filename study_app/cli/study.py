@@ -68,7 +68,7 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
         camera = workstation.load_or_default()[0].camera
         file = find(protocol)
         missing = missing_here(study, file.parent, camera, time.monotonic_ns)
-        click.echo(describe.describe(study, delay_ticks))
+        click.echo(describe.describe(study, delay_ticks, workstation.device_without_force()))
         for sentence in to_translate(read(file.read_bytes(), file.parent)):
             click.echo(f"\nNote: {sentence}.")
         if missing:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pkgutil import resolve_name
 from typing import Final
 
+from study_app.devices import WITHOUT_FORCE
 from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, DeviceOption, framed, later, opened
 
 FIRMWARE: Final = DeviceOption(
@@ -106,7 +107,7 @@ DEVICES: Final = (
     ),
     DeviceDescriptor(
         name="mouse",
-        title="Mouse",
+        title=WITHOUT_FORCE["mouse"],
         icon="mouse",
         kind="seen",
         degrees_of_freedom=3,
@@ -132,7 +133,7 @@ DEVICES: Final = (
     ),
     DeviceDescriptor(
         name="spacemouse",
-        title="SpaceMouse",
+        title=WITHOUT_FORCE["spacemouse"],
         icon="mouse",
         kind="seen",
         degrees_of_freedom=3,

@@ -45,15 +45,19 @@ BLINDINGS = {
 }
 
 
-def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> str:
-    """Return the whole study in words, in its first language; ``delay_ticks`` is how many ticks late a force acts."""
+def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force: str = "") -> str:
+    """Return the whole study in words, in its first language.
+
+    Forces act ``delay_ticks`` ticks late; ``without_force`` is the name of the device that sessions use, if it gives
+    none.
+    """
     language = protocol.study.languages[0]
     effects = [line for name in protocol.liquids for line in (*describe_gate(protocol.scene_of(name)), "")]
     conditions = [
         (name, " + ".join(condition.liquid_ids), ", ".join(_drawn(condition)))
         for name, condition in protocol.conditions.items()
     ]
-    warned = [f"  {sentence}" for sentence in warnings(protocol)]
+    warned = [f"  {sentence}" for sentence in warnings(protocol, without_force=without_force)]
     decided = [("nothing", "there is no table [analysis]: the report will call all it finds exploratory")]
     if protocol.analysis is not None:
         named = [f"{name} by {one.label}" for name, one in protocol.conditions.items() if one.label]

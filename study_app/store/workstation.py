@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from study_app.devices import DEFAULT_DEVICE, NAME_PATTERN
+from study_app.devices import DEFAULT_DEVICE, NAME_PATTERN, WITHOUT_FORCE
 from study_app.errors import StoreError
 from study_app.outlets.session_outlets import SampleChoice
 from study_app.protocol.source.problems import faults_of
@@ -225,6 +225,12 @@ def load_or_default() -> tuple[MachineSettings, str]:
         return load(), ""
     except StoreError as error:
         return DEFAULTS, str(error)
+
+
+def device_without_force() -> str:
+    """Return the name of the device of this computer if it gives no force; "" if it does, or none was chosen."""
+    settings = load_or_default()[0]
+    return "" if settings is DEFAULTS else WITHOUT_FORCE.get(settings.device.partition(":")[0], "")
 
 
 def save(settings: MachineSettings) -> None:

@@ -17,6 +17,7 @@ from study_app.protocol.load import load
 from study_app.protocol.source.files import source_bytes
 from study_app.session import replay
 from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.workstation import MachineSettings, save
 from study_app.store.workstation import load as load_settings
 
 pytestmark = pytest.mark.slow
@@ -51,6 +52,15 @@ def test_help_loads_neither_qt_nor_the_compiler_nor_multiprocessing(tmp_path: Pa
     )
     finished = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert finished.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize(("device", "warned"), [("mouse", 1), ("falcon", 0), ("", 0)])
+def test_check_warns_of_what_the_device_of_this_computer_cannot_give(
+    liquid_study: Run, device: str, warned: int
+) -> None:
+    if device:
+        save(MachineSettings(device=device))
+    assert liquid_study("check", "forcedelay").stdout.count("Mouse gives no force") == warned
 
 
 def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liquid_study: Run) -> None:

@@ -11,6 +11,7 @@ from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
+from study_app.store.workstation import device_without_force
 
 MOST_PARTICIPANTS: Final = 200
 
@@ -49,7 +50,8 @@ def facts(study: Study) -> Facts:
     )
     if valid.forces:
         forces_n = {name: steady(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids}
-        known = replace(known, forces_n=forces_n, warnings=(*warnings(protocol, simulates=False), *translate))
+        warned = warnings(protocol, simulates=False, without_force=device_without_force())
+        known = replace(known, forces_n=forces_n, warnings=(*warned, *translate))
     if not valid.whole:
         return known
     orders = orders_of(protocol)

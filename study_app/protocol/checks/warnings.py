@@ -11,6 +11,7 @@ from study_app.haptics.model.effects.drag import REFERENCE, resistance_n
 from study_app.haptics.model.gate import met_mps
 from study_app.haptics.model.slope_limits import HAND_MPS, Steady, steady
 from study_app.protocol.blocks import Block
+from study_app.protocol.checks.consistency import LEAST_N, force_n
 from study_app.protocol.checks.delayed_force import delay_warnings
 from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.checks.force_limits import PACED, clipped_unpaced, fastest_hz
@@ -18,6 +19,7 @@ from study_app.protocol.model import Follow, Protocol, Published, Reach
 from study_app.protocol.questionnaires import instrument
 from study_app.protocol.questions import POINTS
 from study_app.protocol.trials.presented_levels import highest_damping
+from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK
 from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of, tracks_of
 
 TELLING = 0.39
@@ -30,15 +32,17 @@ NARROW = 1.3
 """A log-normal prior with a smaller factor decides the width: 95 % of it lie within a factor of 1.7. [choice]"""
 
 
-def warnings(protocol: Protocol, *, simulates: bool = True) -> tuple[str, ...]:
+def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str = "") -> tuple[str, ...]:
     """Return what is permitted and may still be a mistake, a sentence each.
 
-    ``simulates`` says whether what takes simulated observers, up to a second a block, is among it.
+    ``simulates`` says whether what takes simulated observers, up to a second a block, is among it; ``without_force`` is
+    the name of the device that sessions use, if it gives no force.
     """
     return (
         *liquid_warnings(protocol),
         *level_warnings(protocol, simulates=simulates),
         *delay_warnings(protocol),
+        *dict.fromkeys(_unperceived(protocol, without_force)),
         *_unanswerable(protocol),
         *_incomplete(protocol),
         *_from_memory(protocol),
@@ -183,6 +187,31 @@ def _unpaced(protocol: Protocol, block: Block) -> Iterator[str]:
             f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator takes more than "
             f"{error_percent:g} % of a damper's force: such trials are repeated: {PACED}"
         )
+
+
+def _unperceived(protocol: Protocol, without_force: str) -> Iterator[str]:
+    """Yield what nobody can perceive: a delay of what is not drawn, a force that there is not."""
+    for block in protocol.blocks_in_order:
+        conditions = {name: protocol.conditions[name] for name in protocol.conditions_in(block.id)}
+        vary = None if block.stimulus is None else protocol.stimuli[block.stimulus].vary
+        hides = [name for name, one in conditions.items() if one.ball == "hidden" and not one.shows_video]
+        for name, one in conditions.items():
+            places = {key: f"conditions.{name}.{key}" for key in OF_CONDITION if getattr(one, key)}
+            if vary in OF_CONDITION:
+                places[vary] = f"stimuli.{block.stimulus}.vary"
+            stroke = protocol.tasks[block.task].fastest_stroke(protocol.device.workspace_m)
+            gives_none = force_n(protocol.scene_for(name), stroke) < LEAST_N
+            for key, place in places.items():
+                if key == DELAY and name in hides:
+                    yield f'{place}: the ball is hidden, so that nobody sees how late it is: write ball = "shown"'
+                elif key in OF_LINK and (without_force or gives_none):
+                    what = f"{without_force or 'the condition'} gives no force"
+                    yield f"{place}: {what}, so that nobody feels whether it is late or lost"
+        of_liquids = protocol.compared_in(block.id) == "liquids" if vary is None else vary not in OF_CONDITION
+        if without_force and of_liquids and block.phase == "main":
+            seen = ": participants see how the liquids slow the ball down, and feel nothing"
+            seen = ", and the ball is hidden: nobody perceives its liquids" if hides else seen
+            yield f"blocks.{block.id}: {without_force} gives no force{seen}"
 
 
 def _unanswerable(protocol: Protocol) -> Iterator[str]:

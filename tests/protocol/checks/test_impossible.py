@@ -5,8 +5,9 @@ import pytest
 
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.checks.consistency import LEAST_N, force_n
-from study_app.protocol.load import load
-from study_app.protocol.source.files import shipped
+from study_app.protocol.checks.warnings import warnings
+from study_app.protocol.load import load, parse
+from study_app.protocol.source.files import shipped, source_bytes
 from study_app.protocol.trials.tasks import Explore, Stroke
 from tests.compiled import needs_servo
 
@@ -28,3 +29,25 @@ def test_the_estimated_force_is_near_that_of_the_model(name: str) -> None:
         found = simulate(weak, Motion(t_s, np.column_stack((along_m, 0 * t_s, 0 * t_s))))
         peak_n = float(np.sqrt(found.fx_n**2 + found.fy_n**2 + found.fz_n**2).max())
         assert LEAST_N < peak_n < 3 * force_n(weak, stroke) < 20 * peak_n, condition
+
+
+@pytest.mark.parametrize(
+    ("study", "old", "new", "device", "place"),
+    [
+        ("viscosityjnd", 'ball = "hidden"', 'ball = "hidden"\ndelay_ms = 50', "", "conditions.damper.delay_ms"),
+        ("delaydetect", "[conditions.water]", "[conditions.water]", "Mouse", ""),
+        ("forcedelay", "format = 2", "format = 2", "Mouse", "stimuli.delay.vary: Mouse gives no force"),
+        ("forcedelay", "damping_nspm = 4", "damping_nspm = 0.01", "", "stimuli.delay.vary: the condition gives no"),
+        ("demo", "format = 1", "format = 1", "Mouse", "blocks.liquids: Mouse gives no force: participants see"),
+        ("viscosityjnd", "format = 2", "format = 2", "Mouse", "blocks.viscosity: Mouse gives no force, and the"),
+    ],
+)
+def test_a_condition_that_nobody_can_perceive_is_warned_of(
+    study: str, old: str, new: str, device: str, place: str
+) -> None:
+    text = source_bytes(study).decode()
+    assert old in text
+    found = warnings(parse(text.replace(old, new, 1).encode(), study), simulates=False, without_force=device)
+    perceived = [one for one in found if "gives no force" in one or "ball is hidden" in one]
+    assert [one for one in perceived if one.startswith(place)] if place else perceived == []
+    assert not [one for one in warnings(load(study), simulates=False) if one in perceived]
