@@ -111,7 +111,7 @@ class MissingExtra(StudyError):
     """What was asked for needs libraries that were not installed."""
 
 
-ANALYSIS_LIBRARIES: Final = frozenset({"jinja2", "markupsafe", "matplotlib", "pandas", "scipy"})
+ANALYSIS_LIBRARIES: Final = frozenset({"jinja2", "markupsafe", "matplotlib", "pandas", "pyreadstat", "scipy"})
 """What the extra ``analysis`` installs: a computer that only runs sessions does without."""
 
 

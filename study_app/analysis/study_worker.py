@@ -91,13 +91,13 @@ def _studies(results: Path) -> Iterator[StudyAt]:
 
 def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
     """Tell of the sessions, then of the study, then draw; once the key is open, evaluate and draw the rest."""
-    from study_app.analysis.data.study_tables import load_study  # noqa: PLC0415
-
     send(Progress("reading sessions", 0.0))
     opened = reveals_of(folder) if all_opened(folder) else ()
     send(SessionsFound(folder, tuple(participants_of(folder)), all_exclusions(folder), opened[-1] if opened else None))
     _go_on(stop)
     send(Progress("reading answers", 0.1))
+    from study_app.analysis.data.study_tables import load_study  # noqa: PLC0415
+
     study = load_study(folder)
     send(_study_found(study))
     _go_on(stop)

@@ -50,7 +50,7 @@ def exclusions_at(study: Path) -> Path:
 LISTEN_MS: Final = 40
 PATIENCE_S: Final = 0.3
 """What takes longer than this says that it goes on."""
-NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install pyreadstat"
+NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install 'liquid-study[analysis]'"
 MISTAKE: Final = Trouble(
     "A bug in the program stopped the evaluation", "The terminal shows the details.", "Refresh", "again"
 )
@@ -265,6 +265,10 @@ class ResultsController(QObject):
             trouble = Trouble("The results folder cannot be read", sentence, "Refresh", "again")
             self.view = ResultsView(trouble=trouble)
             self.place.show_view(self.view)
+        elif refused.lacks_extra:
+            sentence = sentence.replace("this needs", "Figures need")
+            trouble = Trouble("Your data are complete", sentence, "Refresh", "again")
+            self._show(trouble=trouble, figures=(), drawing=None, testing=None)
         elif self.view.listed and not self.view.sessions:
             sentence = "Results appear after the first session has started."
             trouble = Trouble("No sessions yet", sentence, "Go to Home", "home")

@@ -20,7 +20,7 @@ from typing import Any, Final, TypeAlias
 
 import psutil
 
-from study_app.errors import StudyError, naming_the_extra
+from study_app.errors import MissingExtra, StudyError, naming_the_extra
 
 Send: TypeAlias = Callable[[Any], object]
 """Sends an answer before the last one."""
@@ -34,10 +34,14 @@ _END: Final = object()
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """An order could not be carried out, with the reason and without partial effects. ``stopped``: by request."""
+    """An order could not be carried out, with the reason and without partial effects.
+
+    ``stopped``: by request; ``lacks_extra``: libraries are not installed.
+    """
 
     sentence: str
     stopped: bool = False
+    lacks_extra: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +120,7 @@ def serve(orders: Connection, answers: Connection, task: str, *, background: boo
                     carry_out: Task = resolve_name(task)
                     last = carry_out(order, partial(_send, answers, number), lambda: not waiting.empty())
             except StudyError as error:
-                last = Refused(str(error), stopped=isinstance(error, Stopped))
+                last = Refused(str(error), isinstance(error, Stopped), isinstance(error, MissingExtra))
             answers.send((number, last, True))
 
 

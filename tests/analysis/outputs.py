@@ -33,7 +33,7 @@ def figures_as_lines() -> Iterator[None]:
 
 def sav_lines(path: Path) -> Iterator[str]:
     """Yield the labels of the variables of a file of SPSS, and the cells."""
-    pyreadstat = pytest.importorskip("pyreadstat", reason="the extra spss is not installed")
+    pyreadstat = pytest.importorskip("pyreadstat", reason="the extra analysis is not installed")
     frame, meta = pyreadstat.read_sav(str(path), user_missing=True)
     for column in frame:
         labels = meta.variable_value_labels.get(column, {})

@@ -22,7 +22,7 @@ from tests.studies import made_up, once
 
 pytestmark = pytest.mark.slow
 
-pytest.importorskip("pyreadstat", reason="the extra spss is not installed")
+pytest.importorskip("pyreadstat", reason="the extra analysis is not installed")
 
 GOLDEN = Path(__file__).parent / "golden"
 FILES = {"levels": levels_file}

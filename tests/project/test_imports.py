@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 FIND_THEIR_MODULES = ("study_app.haptics.model.effects",)
 HEAVY = ("numba", "llvmlite", "PySide6", "pyqtgraph", "pandas", "scipy", "matplotlib")
-EXTRAS = {"analysis", "cfd", "cluster", "lsl", "spss", "triggers", "video"}
+EXTRAS = {"analysis", "cfd", "cluster", "lsl", "triggers", "video"}
 ROOT = Path(__file__).resolve().parents[2] / "study_app"
 
 

@@ -1,10 +1,11 @@
 """Tidy tables of all participants in files, with a codebook that explains every column, statement and level."""
 
+import importlib
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 from study_app.analysis.data.study_tables import Study, load_study
-from study_app.analysis.export import psychds_dataset, spss
+from study_app.analysis.export import psychds_dataset
 from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_bytes, table_files
 from study_app.analysis.export.tables import deliver, wide
 from study_app.analysis.results import Failure, Progress, silent
@@ -41,12 +42,12 @@ def export(
     Raises
     ------
     AnalysisError
-        The results cannot be evaluated, the library for .sav is missing, or ``to`` cannot be written; nothing was.
+        The results cannot be evaluated, or ``to`` cannot be written; nothing was.
     StoreError
         The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
     """
     if "sav" in extras:
-        spss.require()
+        importlib.import_module("pyreadstat")  # before anything is read
     progress("reading", 0.0)
     study = load_study(folder)
     progress("making the tables", 0.3)

@@ -6,7 +6,6 @@ both declared as missing; of any other number what is missing is SPSS's own. SPS
 
 from __future__ import annotations
 
-import importlib
 import re
 import tempfile
 from collections.abc import Mapping
@@ -21,7 +20,6 @@ from study_app.analysis.data.blocks import PlacedScore
 from study_app.analysis.data.measures import LEVELS
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.tables import Cells, Delivered, QuestionCells
-from study_app.errors import AnalysisError
 from study_app.store.tables.csv_files import Column
 
 CANNOT_JUDGE: Final = 98
@@ -31,16 +29,6 @@ LABEL_BYTES: Final = 255
 FILE_LABEL_BYTES: Final = 64
 TEXT_BYTES: Final = 32_767
 _RESERVED: Final = frozenset(("ALL", "AND", "BY", "EQ", "GE", "GT", "LE", "LT", "NE", "NOT", "OR", "TO", "WITH"))
-
-
-def require() -> None:
-    """Refuse to begin where the library is missing."""
-    try:
-        importlib.import_module("pyreadstat")
-    except ImportError as error:
-        raise AnalysisError(
-            "--sav needs the package 'pyreadstat', which is not installed: pip install pyreadstat"
-        ) from error
 
 
 def long_sav(study: Study, table: Delivered) -> bytes:
@@ -107,9 +95,11 @@ def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]]) -> 
     levels = {names[name]: found for name, found in coded.items()}
     flags = {name: {0: "false", 1: "true"} for name, column in columns.items() if column.kind == "flag"}
     frame = pd.DataFrame({names[column.name]: _plain(column, table.frame[column.name]) for column in table.columns})
+    import pyreadstat  # noqa: PLC0415  # only this table needs it
+
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "table.sav"
-        importlib.import_module("pyreadstat").write_sav(
+        pyreadstat.write_sav(
             frame,
             str(path),
             file_label=_cut(f"{study.title} ({study.name} {study.version})", FILE_LABEL_BYTES),

@@ -1,9 +1,8 @@
 """Exports for other programs: what is written comes back, with every trap that such formats have."""
 
 import csv
-import importlib
 import io
-import types
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.export import spss
 from study_app.analysis.export.export import export
 from study_app.analysis.export.psychds_dataset import FOLDER
 from study_app.analysis.export.spss import CANNOT_JUDGE, NOT_ANSWERED, names_of
 from study_app.analysis.export.table_files import Extra
-from study_app.errors import AnalysisError
+from study_app.errors import AnalysisError, MissingExtra, naming_the_extra
 from study_app.protocol.load import parse
 from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
@@ -26,7 +24,7 @@ from tests.analysis.export.described import undescribed
 
 pytestmark = pytest.mark.slow
 
-pyreadstat = pytest.importorskip("pyreadstat", reason="the extra spss is not installed")
+pyreadstat = pytest.importorskip("pyreadstat", reason="the extra analysis is not installed")
 
 NOTE = '=1+1, "so" — naïve 😀\nnew line'
 ALL: tuple[Extra, ...] = ("wide", "parquet", "sav", "psych-ds")
@@ -155,13 +153,11 @@ def test_names_are_ones_that_spss_takes_and_stay_apart() -> None:
 def test_without_its_library_sav_is_refused_in_one_line_before_anything_is_read(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    def missing(name: str) -> types.ModuleType:
-        if name == "pyreadstat":
-            raise ModuleNotFoundError(name)
-        return importlib.import_module(name)
-
-    monkeypatch.setattr(spss.importlib, "import_module", missing)
-    with pytest.raises(AnalysisError, match=r"--sav needs the package 'pyreadstat'.*pip install pyreadstat"):
+    monkeypatch.setitem(sys.modules, "pyreadstat", None)
+    with (
+        pytest.raises(MissingExtra, match=r"needs pyreadstat.*pip install 'liquid-study\["),
+        naming_the_extra(),
+    ):
         export(tmp_path / "nothing", tmp_path / "out", extras=["sav"])
 
 
