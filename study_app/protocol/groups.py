@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Annotated, Any, Final, Protocol, Self, TypeAlias
 
 from pydantic import Field, model_validator
@@ -102,6 +102,21 @@ def every_step(protocol: HasSteps) -> Steps:
         return protocol.sequence
     of_groups = (_of_group(protocol, group) for group in protocol.groups or (None,))
     return tuple(dict.fromkeys(step for steps in of_groups for step in steps))
+
+
+def follows(protocol: HasSteps, form: str, blocks: Container[str]) -> tuple[str | None, ...]:
+    """Return the blocks that a form comes after, None before the first; empty if no session has the form twice."""
+    found: dict[str | None, None] = {}
+    again = False
+    for group in protocol.groups or (None,):
+        for steps in _sequences(protocol, group) or (steps_of(protocol, group, 1),):
+            again |= steps.count(form) > 1
+            before: str | None = None
+            for step in steps:
+                if step == form:
+                    found[before] = None
+                before = step if step in blocks else before
+    return tuple(found) if again else ()
 
 
 def groups_with(protocol: HasSteps, step: str) -> tuple[str, ...]:

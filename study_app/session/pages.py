@@ -96,7 +96,7 @@ class QuestionnairePage:
 
     Where all are statements, ``labels`` name the points of their scale, lowest first; otherwise there are none.
     ``chosen`` holds (item id, value) of the choices already made, when the page comes back after a pause. ``trial`` is
-    None where the page is a ``form``, which is its name.
+    None where the page is a ``form``, which is its name, asked for the ``time``-th time.
     """
 
     trial: int | None
@@ -108,11 +108,16 @@ class QuestionnairePage:
     progress: Progress | None
     chosen: tuple[tuple[str, Value], ...] = ()
     form: str | None = None
+    time: int = 1
 
     @property
     def stream(self) -> str:
         """The name of the random stream that simulated answers to it are drawn from."""
-        return f"{self.trial}/answers" if self.form is None else f"form/{self.form}/answers"
+        return (
+            f"{self.trial}/answers"
+            if self.form is None
+            else f"form/{self.form}{'' if self.time == 1 else f'/{self.time}'}/answers"
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,7 +70,7 @@ class Progress:
     trial_since_s: float | None = None
     trial_lasted_s: float | None = None
     targets: int = 0
-    answered: dict[int | str, int] = field(default_factory=dict)
+    answered: dict[int | tuple[str, str | None], int] = field(default_factory=dict)
     broken: dict[int, tuple[Broken, ...]] = field(default_factory=dict)
     lost: dict[int, str] = field(default_factory=dict)
     lacking: dict[int, int] = field(default_factory=dict)
@@ -156,7 +156,8 @@ class Progress:
 
     def _confirm(self, line: events.Responses | events.FormAnswered) -> None:
         """Take the answers of a trial or a form as confirmed."""
-        self.answered[line.form if isinstance(line, events.FormAnswered) else line.trial] = len(line.items)
+        of = (line.form, line.after) if isinstance(line, events.FormAnswered) else line.trial
+        self.answered[of] = len(line.items)
         if isinstance(line, events.Responses) and line.trial == self.of_intervals:
             answer = line.items[0]
             seconds = None if answer.onset_s is None or answer.first_s is None else answer.first_s - answer.onset_s

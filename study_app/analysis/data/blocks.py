@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase
 from study_app.protocol.model import Contrast, Protocol, Published
-from study_app.protocol.orders.block_orders import every_step_of
+from study_app.protocol.orders.block_orders import every_step_of, follows_in
 from study_app.protocol.questionnaires import Score
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
 from study_app.protocol.table import text_in
@@ -388,14 +388,25 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
         ) from error
 
 
+START: Final = "0"
+"""The code of a form before the first block, which no block has as its id."""
+
+
 @dataclass(frozen=True, slots=True)
 class QuestionPlace:
-    """Where questions were asked: after the trials of a block, with its ``settings``, or in a form, which has none."""
+    """Where questions were asked: after the trials of a block, with its ``settings``, or in a form.
+
+    A form that sessions have several times has a setting for each block that it comes after, others have none.
+    """
 
     id: str
     title: str
     is_form: bool
     settings: tuple[Setting, ...]
+
+    def name(self, setting: Setting) -> str:
+        """Return what tables and figures call a setting."""
+        return setting.label or "" if self.is_form else setting_name(setting, self.settings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -490,7 +501,11 @@ def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tu
             table = protocol["questionnaires"][step]
             titled = table["title"] is not None
             title = text_in(table["title"], language) if titled else step.replace("_", " ").capitalize()
-            yield QuestionPlace(step, title, True, ()), table
+            after = follows_in(protocol, step)
+            titles = {name: text_in(block["title"], language) for name, block in protocol["blocks"].items()}
+            labels = ((START, "At the start") if name is None else (name, f"After {titles[name]}") for name in after)
+            settings = tuple(Setting(name, condition=name, label=label) for name, label in labels)
+            yield QuestionPlace(step, title, True, settings), table
 
 
 def _question(table: Mapping[str, Any], where: QuestionPlace) -> Question:

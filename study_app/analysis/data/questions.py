@@ -7,7 +7,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.data.blocks import PlacedQuestion, PlacedScore, QuestionPlace, setting_name
+from study_app.analysis.data.blocks import PlacedQuestion, PlacedScore, QuestionPlace
 from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.results import GroupAnswers, QuestionResult, ScoreResult, number
@@ -174,11 +174,11 @@ def _question_result(study: Study, asked: PlacedQuestion) -> QuestionResult:
 
 
 def _groups(where: QuestionPlace, answers: pd.DataFrame) -> Iterator[tuple[str | None, str, pd.DataFrame]]:
-    """Yield the answers about each setting, or of a form all, with code and name."""
-    if where.is_form:
+    """Yield the answers about each setting with code and name; all, of a form that is asked once."""
+    if not where.settings:
         yield None, "All", answers
     for setting in where.settings:
-        yield setting.code, setting_name(setting, where.settings), answers[answers["code"] == setting.code]
+        yield setting.code, where.name(setting), answers[answers["code"] == setting.code]
 
 
 def scored(study: Study, asked: PlacedScore) -> pd.DataFrame:
@@ -186,13 +186,14 @@ def scored(study: Study, asked: PlacedScore) -> pd.DataFrame:
     rows = pd.concat([study.answers_to(one) for one in asked.questions])
     bounds = {one.id: one.bounds for one in asked.questions}
     found: list[dict[str, Any]] = []
-    for (participant, *_), answers in rows.groupby(_ONE, dropna=False, sort=True):
+    one = _ONE if not asked.where.is_form else [*_ONE, "code"]
+    for (participant, *_), answers in rows.groupby(one, dropna=False, sort=True):
         answered = {
             str(item): str(response) if pd.isna(value) else float(value)
             for item, response, value in zip(answers["item"], answers["response"], answers["value"], strict=True)
             if not pd.isna(response)
         }
-        code = None if asked.where.is_form else str(answers["code"].iloc[0])
+        code = str(answers["code"].iloc[0]) if asked.where.settings else None
         found.append({"participant": participant, "code": code, "score": score(asked.score, answered, bounds)})
     return pd.DataFrame(found, columns=["participant", "code", "score"])
 

@@ -267,7 +267,9 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
                 f"{block!r}: the file was changed or belongs to another study; make it again from the journal: "
                 f"liquid-study rebuild {sessions[which].folder.path}"
             )
-    which_one = [name for name in ("participant", "session", "form", "trial", "attempt", "item") if name in table]
+    which_one = [
+        name for name in ("participant", "session", "form", "after_block", "trial", "attempt", "item") if name in table
+    ]
     twice = np.flatnonzero(table.duplicated(which_one))
     if len(twice):
         which, row = _place(lengths, int(twice[0]))

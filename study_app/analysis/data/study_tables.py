@@ -26,6 +26,7 @@ from study_app.analysis.data import measures
 from study_app.analysis.data.blocks import (
     NO_QUESTIONS,
     NOTHING_DECIDED,
+    START,
     Block,
     Decided,
     Kind,
@@ -248,7 +249,9 @@ class Study:
     def answers_to(self, asked: PlacedQuestion) -> pd.DataFrame:
         """Return the rows of ``answered`` that count, of a question that no block of statements holds."""
         place = self.answered["form" if asked.where.is_form else "block"] == asked.where.id
-        return self.answered[self.answered["counted"] & place.fillna(False) & (self.answered["item"] == asked.id)]
+        rows = self.answered[self.answered["counted"] & place.fillna(False) & (self.answered["item"] == asked.id)]
+        by_block = asked.where.is_form and asked.where.settings
+        return rows.assign(code=rows["after_block"].fillna(START)) if by_block else rows
 
     @property
     def protocol_format(self) -> int:

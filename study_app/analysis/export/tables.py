@@ -12,7 +12,7 @@ from typing import Final, TypeAlias
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.data.blocks import Block, Item, PlacedQuestion, PlacedScore, Setting, setting_name
+from study_app.analysis.data.blocks import Block, Item, PlacedQuestion, PlacedScore, Setting
 from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.data.questions import scored
 from study_app.analysis.data.study_tables import Study
@@ -244,7 +244,8 @@ def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
 
     Columns are ``item__condition``, or ``item__code`` until the key was opened; where blocks or a form would give the
     same name, ``block__item__condition``. A repeated setting gives the median, as in the analysis, of options and texts
-    the last one. Questions of forms are ``form__item``, scores ``form__score``.
+    the last one. Questions of forms are ``form__item``, scores ``form__score``, of forms that are
+    asked several times ``form__item__block``.
     """
     people, cells = list(study.people), _wide_cells(study)
     simulated = dict(zip(study.participants["participant"], study.participants["simulated"], strict=True))
@@ -299,7 +300,7 @@ def _question(study: Study, cells: QuestionCells, people: list[str]) -> Answers:
     about = ""
     if setting is not None:
         answers = answers[answers["code"] == setting.code]
-        about = f" About {setting_name(setting, asked.where.settings)}."
+        about = f" {asked.where.name(setting)}." if asked.where.is_form else f" About {asked.where.name(setting)}."
     if isinstance(asked, PlacedScore):
         of = f" of {asked.instrument}" if asked.instrument else ""
         description = f"Score {asked.name}{of}, in {asked.where.title}.{about}"

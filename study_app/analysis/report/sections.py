@@ -413,7 +413,7 @@ def _scores(scores: Sequence[ScoreResult]) -> Iterator[str]:
     yield table_of(
         [(score.name, group.name, group.numbers) for score in scores for group in score.groups],
         ("Score", lambda one: one[0]),
-        ("Setting", lambda one: one[1]),
+        ("Answers", lambda one: one[1]),
         ("n", lambda one: str(one[2]["n"])),
         ("mean", lambda one: number(one[2]["mean"], 1)),
         ("SD", lambda one: number(one[2]["sd"], 1)),

@@ -121,6 +121,7 @@ def sequence(document: Document) -> Iterator[Fault]:
     used: set[str] = set()
     for place, steps in sequences_in(document):
         seen: set[str] = set()
+        since: set[str] = set()  # the block before, or the start
         for index, name in enumerate(steps):
             path = (*place, index)
             yield from _unknown(path, name, "page or block", {*pages, *blocks, *forms})
@@ -129,9 +130,10 @@ def sequence(document: Document) -> Iterator[Fault]:
             elif name in forms and (name in pages or name in blocks) and name not in used:
                 other = "page" if name in pages else "block"
                 yield Fault(("questionnaires", name), f"a {other} has this name too", apart)
-            elif name in forms and name in seen:
-                yield Fault(path, f'form "{name}" comes twice', "give the second one a name of its own")
+            elif name in forms and name in since:
+                yield Fault(path, f'form "{name}" comes twice after the same block', "put a block between the two")
             seen.add(str(name))
+            since = {*(since if name not in blocks else ()), str(name)}
         used |= seen
     unused = [("pages", name) for name in pages if name not in breaks]
     unused += [("blocks", name) for name in blocks if "groups" not in document]

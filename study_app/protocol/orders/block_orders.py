@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict
 
 from study_app.protocol.blocks import Block, Order, Phase
-from study_app.protocol.groups import Group, every_step
+from study_app.protocol.groups import Group, every_step, follows
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.trials.methods import TrackOrder
 from study_app.protocol.trials.tracks import method_of, tracks_of
@@ -116,7 +116,12 @@ class _KeptSteps(BaseModel):
 
 def every_step_of(protocol: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the steps of all groups and sessions of the protocol in a receipt, each once (ValueError: it has none)."""
-    return every_step(_KeptSteps.model_validate(protocol))
+    return tuple(dict.fromkeys(every_step(_KeptSteps.model_validate(protocol))))
+
+
+def follows_in(protocol: Mapping[str, Any], form: str) -> tuple[str | None, ...]:
+    """Return what `follows` returns, of the protocol in a receipt."""
+    return follows(_KeptSteps.model_validate(protocol), form, protocol["blocks"])
 
 
 def _items(questions: Questionnaire | None) -> dict[str, Any]:

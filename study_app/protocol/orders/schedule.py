@@ -20,6 +20,7 @@ williams latin  a row of a square, assigned by the number in the participant's i
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -79,10 +80,15 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class FormStep:
-    """A questionnaire on its own; ``items`` are item ids in the order shown."""
+    """A questionnaire on its own; ``items`` are item ids in the order shown.
+
+    ``after`` is the block before it, None before the first; ``time`` counts from 1 how often the session asks it.
+    """
 
     form: str
     items: tuple[str, ...]
+    after: str | None = None
+    time: int = 1
 
 
 Step: TypeAlias = PageStep | FormStep | Trial
@@ -109,14 +115,18 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, row
     """
     orders = orders_of(protocol) if isinstance(protocol, Protocol) else protocol
     steps: list[Step] = []
-    number = 1
+    number, after, times = 1, None, Counter[str]()
     for step in orders.steps:
         if isinstance(step, str):
             steps.append(PageStep(step))
             continue
         if isinstance(step, FormOrder):
-            steps.append(FormStep(step.id, _shuffled(step, seed, f"{participant}/form/{step.id}")))
+            times[step.id] += 1
+            again = "" if times[step.id] == 1 else f"/{times[step.id]}"
+            items = _shuffled(step, seed, f"{participant}/form/{step.id}{again}")
+            steps.append(FormStep(step.id, items, after, times[step.id]))
             continue
+        after = step.id
         codes = codes_of(orders.study, step, participant, seed, row_of)
         for index, code in enumerate(codes, start=1):
             items = _shuffled(step, seed, f"{participant}/{step.id}/{index}")

@@ -157,6 +157,7 @@ def _questionnaire_page(state: SessionState) -> pages.QuestionnairePage:
         progress=None if trial is None else _progress(state, trial),
         chosen=tuple((item, answer.value) for item, answer in state.answers.items() if answer.given),
         form=form,
+        time=step.time if isinstance(step, FormStep) else 1,
     )
 
 

@@ -93,7 +93,7 @@ def enter_reached(state: SessionState, done: Commands) -> Result:
         return start_trial(state, done, state.since_s, rest_until_s=rest_until_s)
     if isinstance(step, FormStep):
         state = replace(state, phase=Phase.ANSWERING)
-        return state, (*done, Write(journal.FormShown(form=step.form)), WriteTables(), show(state))
+        return state, (*done, Write(journal.FormShown(form=step.form, after=step.after)), WriteTables(), show(state))
     state = replace(state, phase=Phase.READING)
     return state, (*done, Write(journal.PageShown(page=state.page_id)), WriteTables(), show(state))
 
@@ -268,7 +268,7 @@ def submit(state: SessionState, event: Submitted) -> Result:
         for number, item in numbered
     )
     line: journal.Event = (
-        journal.FormAnswered(form=state.step.form, items=items)
+        journal.FormAnswered(form=state.step.form, after=state.step.after, items=items)
         if isinstance(state.step, FormStep)
         else journal.Responses(**which(state), items=items)
     )

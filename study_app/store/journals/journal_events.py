@@ -434,9 +434,10 @@ class OutletLost(Event):
 
 
 class FormShown(Event):
-    """A questionnaire was shown on its own."""
+    """A questionnaire was shown on its own, `after` a block; missing before the first."""
 
     form: Text
+    after: Text | None = None
 
 
 class OfItem(Event, group=True):
@@ -470,9 +471,10 @@ class Responses(OfAttempt):
 
 
 class FormAnswered(Event):
-    """The form was confirmed: every answer."""
+    """The form was confirmed: every answer; `after` is the block before it."""
 
     form: Text
+    after: Text | None = None
     items: Answers
 
 

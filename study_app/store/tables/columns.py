@@ -137,6 +137,9 @@ _RESPONSES_BY_NAME = {column.name: column for column in RESPONSES}
 RESPONSES_2: tuple[Column, ...] = (
     *SESSION_COLUMNS,
     optional("form", "text", "Id of the questionnaire that was presented on its own; n/a after a trial."),
+    optional(
+        "after_block", "text", "Block that the form came after; n/a before the first, and after a trial.", later=True
+    ),
     *(replace(column, may_miss=True) for column in (*TRIAL_COLUMNS, CODE)),
     replace(_RESPONSES_BY_NAME["item"], description="Id of the question; its words are in the session's receipt."),
     Column("kind", "text", f"Kind of the question: {', '.join(KINDS)}."),
@@ -364,7 +367,7 @@ def tables_of(protocol_format: int) -> dict[str, tuple[Column, ...]]:
     return {"responses": RESPONSES_2, "trials": TRIALS_2, "intervals": INTERVALS, "participants": PARTICIPANTS_2}
 
 
-LATER = frozenset(column.name for column in (*TRIALS_2, *INTERVALS) if column.later)
+LATER = frozenset(column.name for column in (*RESPONSES_2, *TRIALS_2, *INTERVALS) if column.later)
 """Columns that earlier versions did not write."""
 
 

@@ -76,7 +76,7 @@ class SessionRows:
                 about = {name: getattr(trial, name) for name in _TRIAL_COLUMNS}
                 self.responses += [_response(self._session, about, answer, line.at) for answer in line.items]
             case events.FormAnswered():
-                about = {**dict.fromkeys(_TRIAL_COLUMNS), "form": line.form}
+                about = {**dict.fromkeys(_TRIAL_COLUMNS), "form": line.form, "after_block": line.after}
                 self.responses += [_response(self._session, about, answer, line.at) for answer in line.items]
             case events.SessionEnded() | events.SessionResumed():
                 self._interrupt()
@@ -230,6 +230,7 @@ def _response(session: Row, about: Row, answer: events.Response, answered_at: st
     row = {
         **session,
         "form": None,
+        "after_block": None,
         **about,
         "kind": answer.kind,
         "response": value if answer.kind is None or value is None else _text(value),

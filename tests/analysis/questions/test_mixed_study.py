@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 from study_app.analysis.data.study_tables import Study, load_study
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.export.tables import wide
 from study_app.analysis.report.write_report import report
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
@@ -78,3 +80,36 @@ def test_results_window_is_told_of_every_figure(folder: Path) -> None:
     assert drawn["question-start-hand"] == "Start: Hand"
     assert "liquids" in drawn
     assert not any("comment" in name for name in drawn)  # texts are not drawn
+
+
+@pytest.mark.parametrize("grouped", [False, True])
+def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, grouped: bool) -> None:
+    orders = [["load", "stir", "usability", "load", "again", "load"], ["again", "load", "stir", "load"]]
+    groups = "".join(f"[groups.g{n}]\nsequence = {order}\n" for n, order in enumerate(orders)) if grouped else ""
+    again = '[blocks.again]\nquestionnaire = "after"\nconditions = ["thin", "thick"]\n'
+    last = 'conditions = ["thin", "thick"]'
+    old = 'sequence = ["start", "stir", "load", "usability", "end"]'
+    sequence = (old, "" if grouped else f"sequence = {orders[0]}"), (last, f"{last}\n{again}{groups}")
+    felt = {(block, name): (TrialFeatures(1.0, 4.0, 0.1, 0.02, 0.03, 0.0),) for block in ("stir", "again")
+            for name in ("thin", "thick")}  # fmt: skip
+    protocol = mixed_file(tmp_path, *sequence)
+    folder = rehearse_answers(protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=felt)
+    assert verify(folder).errors == ()
+    study = load_study(folder)
+    first = PEOPLE // 2 if grouped else PEOPLE
+    n = {"At the start": first, "After Stir": PEOPLE, "After Again": PEOPLE}
+    results = evaluate(study)
+    found = next(one for one in results.questions if (one.where, one.item) == ("load", "effort"))
+    assert {group.name: group.numbers["n"] for group in found.groups} == n
+    score = next(one for one in results.scores if one.where == "load")
+    assert {group.name: group.numbers["n"] for group in score.groups} == n
+    table, _ = wide(study)
+    rows = study.answered.query("form == 'load' and item == 'effort'").set_index("participant")
+    codes = ["0", "stir", "again"]
+    for code in codes:
+        after = rows[rows["after_block"].fillna("0") == code]["value"].reindex(table.frame["participant"])
+        assert table.frame[f"load__effort__{code}"].astype("Float64").to_list() == after.to_list()
+    assert len({tuple(table.frame[f"load__effort__{code}"].fillna(-1)) for code in codes}) == 3
+    assert "usability__sus1" in table.frame
+    report(folder, tmp_path / "report", failed=pytest.fail)
+    assert "After Again" in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
