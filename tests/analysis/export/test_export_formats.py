@@ -154,10 +154,7 @@ def test_without_its_library_sav_is_refused_in_one_line_before_anything_is_read(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyreadstat", None)
-    with (
-        pytest.raises(MissingExtra, match=r"needs pyreadstat.*pip install 'liquid-study\["),
-        naming_the_extra(),
-    ):
+    with pytest.raises(MissingExtra, match=r"needs pyreadstat.*pip install 'liquid-study\["), naming_the_extra():
         export(tmp_path / "nothing", tmp_path / "out", extras=["sav"])
 
 
