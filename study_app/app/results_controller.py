@@ -323,7 +323,7 @@ class ResultsController(QObject):
         last: Done | Refused | None = None
         for _, answer in self._writer.answers():
             if isinstance(answer, Progress) and dialog is not None:
-                dialog.show_progress(answer.what, answer.share)
+                dialog.show_progress(f"{answer.what[:1].upper()}{answer.what[1:]} …", answer.share)
             elif isinstance(answer, (Done, Refused)):
                 last = answer
             elif isinstance(answer, Crashed):
@@ -339,7 +339,7 @@ class ResultsController(QObject):
         elif last.stopped:
             dialog.stopped()
         else:
-            dialog.show_refused(last.sentence)
+            dialog.show_refused(f"{last.sentence}.")
 
 
 def _what_to_open(order: WriteTables | WriteReport, files: tuple[Path, ...]) -> Path:

@@ -207,14 +207,14 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
     assert not nobody_left()
     opened.click(opened.place.report)
     dialog: Any = opened.place.writing
-    dialog.to.show_value(str(tmp_path / "report"))
+    dialog.editors["to"].show_value(str(tmp_path / "report"))
     opened.click(dialog.go_on)
-    opened.click(dialog.cancel)
+    opened.click(dialog.back)
     qtbot.waitUntil(lambda: opened.place.writing is None, timeout=SOON_MS)
     assert not (tmp_path / "report").exists()
     opened.click(opened.place.report)
     dialog = opened.place.writing
-    dialog.to.show_value(str(tmp_path / "report"))
+    dialog.editors["to"].show_value(str(tmp_path / "report"))
     opened.click(dialog.go_on)
     opened.wait()
     opened.click(dialog.go_on)

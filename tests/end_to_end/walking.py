@@ -16,11 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.operator.operator_view import OperatorView, Session, operator_view, stages
 from study_app.gui.operator.servo_health import ServoHealth
+from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
@@ -53,6 +55,7 @@ SHORTER = {
 }
 ANSWERS, TRIALS = 62, 12
 CORRECTED = {2: 5}  # statement: first answer, of every page
+MOST_STOPS = 80  # of the keyboard in a window
 LEAVING_S, LEAVES = 0.8, 20  # a tank is left again, if it was not, after so long, and so often
 
 
@@ -169,6 +172,18 @@ class Person:
         assert self.program.xdotool("getwindowfocus") == self.window
         self.program.xdotool("key", *keys)
 
+    def walk_to(self, window: QWidget, part: QWidget, key: str) -> None:
+        """Press a key until the ring of the keyboard is seen at a part, which lies where it does in a window here."""
+        shell = self.program.xdotool("getwindowgeometry", "--shell", self.window).splitlines()
+        left, top = (int(line.partition("=")[2]) for line in shell if line.startswith(("X=", "Y=")))
+        at = part.mapTo(window, QPoint(part.width() // 2, 1))
+        ring = np.array(QColor(LIGHT.accent).getRgb()[2::-1], np.uint8)  # type: ignore[index]
+        for _ in range(MOST_STOPS):
+            if happens(lambda: np.array_equal(self.program.picture()[top + at.y(), left + at.x(), :3], ring), 0.2):
+                return
+            self.press(key)
+        raise AssertionError(f"the keyboard does not get to {part.accessibleName()}")
+
     def choose_language(self, page: TextPage, language: str) -> None:
         forward = page.languages.index(language) > page.languages.index(page.language)
         self.press("Tab", "Right" if forward else "Left")
@@ -265,7 +280,7 @@ def laid_out(window: QWidget, size: tuple[int, int]) -> None:
     window.activateWindow()
     for _ in range(3):
         QApplication.processEvents()
-    assert (window.width(), window.height()) == size
+    assert window.isVisible()
 
 
 def place_in(window: QWidget, part: QWidget) -> QPoint:
@@ -274,10 +289,10 @@ def place_in(window: QWidget, part: QWidget) -> QPoint:
     return part.mapTo(window, part.rect().center())
 
 
-def tabs_to(window: QWidget, part: QWidget, key: Qt.Key = Qt.Key.Key_Tab) -> int:
+def tabs_to(window: QWidget, part: QWidget) -> int:
     """Return how often Tab is pressed from where the keyboard is until it is on ``part``."""
-    for count in range(60):
+    for count in range(MOST_STOPS):
         if part.hasFocus():
             return count
-        QTest.keyClick(window.focusWidget() or window, key)
+        QTest.keyClick(window.focusWidget() or window, Qt.Key.Key_Tab)
     raise AssertionError(f"the keyboard does not get to {part.accessibleName() or part}")

@@ -534,9 +534,6 @@ class DesignerPlace(Place):
         if event.key() != Qt.Key.Key_Escape or not self.banner.close_by_key():
             super().keyPressEvent(event)
 
-    def wants_narrow_rail(self) -> bool:
-        return True
-
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.parts.arrange(self.width())

@@ -7,14 +7,15 @@ from typing import Any
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QDialog, QLineEdit, QProgressBar, QWidget
+from PySide6.QtWidgets import QDialog, QLineEdit, QSpinBox, QWidget
 
 from study_app.devices.registry import descriptor_of, list_devices
 from study_app.errors import StoreError, StudyError
 from study_app.gui.display.screens import screens_shown
+from study_app.gui.home.startup_window import FIRST_TIME
 from study_app.gui.home.study_facts import StudyFacts
 from study_app.gui.kit.devices import device_label, device_or_default, window_options
-from study_app.gui.kit.dialogs import Question
+from study_app.gui.kit.dialogs import Question, Work
 from study_app.gui.kit.fields import Editor, Field, choice, file_of, seed
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
@@ -40,7 +41,7 @@ MAX_PARTICIPANTS = 200
 LISTEN_MS = 40
 
 
-class RehearsalDialog(QDialog):
+class RehearsalDialog(Work):
     """How many simulated participants, then how far it is, then the way to their results; Cancel keeps whole sessions.
 
     It is accepted when the results are to be shown.
@@ -54,122 +55,78 @@ class RehearsalDialog(QDialog):
     def __init__(
         self, facts: StudyFacts, results: Path, *, theme: Theme = LIGHT, parent: QWidget | None = None
     ) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Rehearse")
-        self.setModal(True)
-        self.setMinimumWidth(520)
-        self._facts = facts
         self.folder = rehearsal_folder(results, facts.protocol.study.name)
-        self.participants = Editor(
-            Field("participants", "Simulated participants", "count", limits=(1, MAX_PARTICIPANTS))
+        super().__init__(
+            parent,
+            theme,
+            f"Rehearse {facts.title}",
+            "Whole sessions run faster than real time, with simulated participants. They are marked as simulated and "
+            f"stored separately, in {self.folder}.",
+            ActionButton("fast_forward", "Rehearse", role="primary"),
+            fields=(
+                Field("participants", "Simulated participants", "count", limits=(1, MAX_PARTICIPANTS)),
+                Field("seed", "Seed", "count", limits=(0, MAX_SEED)),
+            ),
+            width=520,
         )
-        self.seed = Editor(Field("seed", "Seed", "count", limits=(0, MAX_SEED)))
-        self.participants.show_value(5)
-        self.seed.show_value(1)
-        self.said = label(
-            "Whole sessions run faster than real time, with simulated participants. "
-            f"They are marked as simulated and stored separately, in {self.folder}.",
-            "body",
-            "text2",
-            wraps=True,
-        )
-        self.progress = QProgressBar(textVisible=False)
-        self.progress.setRange(0, 0)
-        self.progress.setFixedHeight(8)
-        self.progress.hide()
-        self.start = ActionButton("fast_forward", "Rehearse", role="primary")
-        self.cancel = ActionButton("", "Cancel")
-        self.start.setDefault(True)
+        self._facts = facts
+        for name, value in (("participants", 5), ("seed", 1)):
+            self.editors[name].show_value(value)
+        count = self.editors["participants"].control
+        assert isinstance(count, QSpinBox)  # noqa: S101 - made for a count
+        QTimer.singleShot(0, count, count.selectAll)  # once it has the keyboard
         self.worker: RehearsalClient | None = None
-        self._done: list[str] = []
-        self._stopping = False
-        self.over = False
-        row, foot = hbox((self.participants, 1), (self.seed, 1), spacing=16), hbox(self.cancel, STRETCH, self.start)
-        title = label(f"Rehearse {facts.title}", "title_dense")
-        vbox(title, self.said, row, self.progress, 6, foot, spacing=12, margins=(28, 24, 28, 24), parent=self)
-        apply_theme(self, theme)
-        self.start.clicked.connect(self._start)
-        self.cancel.clicked.connect(self.reject)
+        self._done = 0
+        self.begun.connect(self._start)
+        self.stop_asked.connect(self._stop)
+        self.opened.connect(lambda: self.done(QDialog.DialogCode.Accepted.value))
         self._listening = QTimer(self, interval=LISTEN_MS)
         self._listening.timeout.connect(self._listen)
 
     def _start(self) -> None:
-        if self.over:
-            self.accept()
-            return
-        if self.worker is not None:
-            return
-        for field in (self.participants, self.seed, self.start):
-            field.setEnabled(False)
-        self.progress.setRange(0, self.participants.value)
-        self.progress.show()
-        self._show_done()
+        count = self.value("participants")
+        self._done = 0
+        self.show_progress(f"0 of {count}: rehearsing …", 0.0)
         try:
             self.worker = WorkerClient(TASK, name="rehearsal")
         except OSError as error:
-            self._fail(str(error))
+            self.show_refused(str(error))
             return
-        self.worker.order(RehearsalOrder(self._facts.source, self.participants.value, self.seed.value, self.folder))
+        self.worker.order(RehearsalOrder(self._facts.source, count, self.value("seed"), self.folder))
         self._listening.start()
+
+    def _stop(self) -> None:
+        if self.worker is not None:
+            self.worker.close()
 
     def _listen(self) -> None:
         """Take the answers since; where the rehearsal is to stop, close once its process has ended."""
         assert self.worker is not None  # noqa: S101 - listening begins with it
-        if self._stopping:
+        if not self.back.isEnabled():
             if self.worker.ended:
                 self._listening.stop()
-                super().reject()
+                self.stopped()
             return
+        count = self.value("participants")
         for _, answer in self.worker.answers():
-            if isinstance(answer, str):
-                self._done.append(answer)
-                self._show_done()
-            elif isinstance(answer, Path):
-                self._finish()
+            if isinstance(answer, float):
+                self.show_progress(FIRST_TIME, answer)
+            elif isinstance(answer, str):
+                self._done += 1
+                self.show_progress(f"{self._done} of {count}: {answer}", self._done / count)
             else:
-                self._fail(answer.sentence)
-
-    def _show_done(self) -> None:
-        self.progress.setValue(len(self._done))
-        counted = f"{len(self._done)} of {self.participants.value}"
-        self.said.setText(f"{counted}: {self._done[-1]}" if self._done else f"{counted}: rehearsing …")
-
-    def _finish(self) -> None:
-        self._let_go()
-        self.over = True
-        self.said.setText(f"Done: {self.participants.value} simulated sessions, stored in {self.folder}.")
-        self.start.show_action("", "Open results")
-        self.start.setEnabled(True)
-        self.start.setFocus()
-        self.cancel.setText("Close")
-
-    def _fail(self, sentence: str) -> None:
-        self._let_go()
-        self.said.setText(sentence)
-        set_ink(self.said, "bad")
-        self.cancel.setText("Close")
-
-    def _let_go(self) -> None:
-        self._listening.stop()
-        self.progress.hide()
-        if self.worker is not None:
-            self.worker.close()
-
-    def reject(self) -> None:
-        """Have the rehearsal stop, if it runs, and close once it has."""
-        if self.worker is None or not self.worker.works:
-            super().reject()
-        elif not self._stopping:
-            self._stopping = True
-            self.cancel.setEnabled(False)
-            self.said.setText("Stopping …")
-            self.worker.close()
+                self._listening.stop()
+                self.worker.close()
+                if isinstance(answer, Path):
+                    self.show_done(f"Done: {count} simulated sessions, stored in {self.folder}.", "Open results")
+                else:
+                    self.show_refused(answer.sentence)
 
     def end(self) -> None:
         """Stop the rehearsal and wait for it: the windows are gone."""
+        self._listening.stop()
+        self.working = False
         if self.worker is not None:
-            self._stopping = True
-            self._listening.stop()
             self.worker.close()
             self.worker.wait_until_ended()
 

@@ -174,7 +174,7 @@ class Rail(Themed, QWidget):
 
 FULL = QSize(1440, 900)
 LEAST = QSize(1024, 640)
-NARROW_BELOW = 1400
+NARROW_BELOW = 1680
 
 
 def bug_words(error: BaseException) -> str:
@@ -256,7 +256,6 @@ class MainWindow(QMainWindow):
             self._here = name
             self.rail.mark(name)
             self.stack.setCurrentWidget(asked)
-            self._arrange()
             asked.enter()
         self._lead_in(self.rail.buttons[name], asked)
 
@@ -327,13 +326,9 @@ class MainWindow(QMainWindow):
         self.show_theme(LIGHT if self.theme.dark else DARK)
         self.theme_changed.emit(self.theme)
 
-    def _arrange(self) -> None:
-        here = self._places.get(self._here)
-        self.rail.narrow(self.width() < NARROW_BELOW or (here is not None and here.wants_narrow_rail()))
-
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._arrange()
+        self.rail.narrow(self.width() < NARROW_BELOW)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         for place in self._places.values():

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QFileDialog, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QDialog, QFileDialog, QProgressBar, QWidget
 
 from study_app.gui.kit.fields import Editor, Field
 from study_app.gui.theme.theme import Theme
@@ -13,10 +13,11 @@ from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import STRETCH, Part, hbox, vbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.labels import label, set_ink
 from study_app.workspace import workspace
 
 NOTHING: Final[Mapping[str, str]] = MappingProxyType({})
+STEPS: Final = 1000  # of a bar
 REASON: Final = "Please enter a reason; it is recorded."
 
 
@@ -71,8 +72,8 @@ class Question(QDialog):
         self.back.setAutoDefault(False)
         self.back.clicked.connect(self.reject)
         self.back.setHidden(go_on is None)
-        said = label(explanation, "body", "text2", wraps=True)
-        said.setMinimumWidth(420)
+        self.said = label(explanation, "body", "text2", wraps=True)
+        self.said.setMinimumWidth(420)
         warns = QWidget()
         sign = Icon("warning", "warn", 20), 0, Qt.AlignmentFlag.AlignTop
         hbox(sign, (label(warning, "label", "warn", wraps=True), 1), spacing=10, margins=0, parent=warns)
@@ -80,7 +81,7 @@ class Question(QDialog):
         asked, foot = (*self.editors.values(), self.missing), hbox(self.back, STRETCH, self.go_on)
         parts: tuple[Part, ...] = (
             label(title, "title_dense"),
-            said,
+            self.said,
             warns,
             *([(inside, 1)] if inside else []),
             *asked,
@@ -97,10 +98,99 @@ class Question(QDialog):
 
     def accept(self) -> None:
         """Go on, unless something is missing."""
+        if self.is_complete():
+            super().accept()
+
+    def is_complete(self) -> bool:
+        """Return whether nothing is missing; what is, is said, and gets the keyboard."""
         for name, sentence in self._needs.items():
             if not self.value(name):
                 self.missing.setText(sentence)
                 self.missing.show()
                 self.editors[name].control.setFocus()
-                return
-        super().accept()
+                return False
+        self.missing.hide()
+        return True
+
+
+class Work(Question):
+    """A question whose answer is worked on: it says how far that is, then leads to what came of it.
+
+    ``begun`` when the work is to begin, ``stop_asked`` when it is to be given up, `stopped` closes the dialog then.
+    ``opened`` when what came of it is to be shown.
+    """
+
+    begun = Signal()
+    stop_asked = Signal()
+    opened = Signal()
+
+    def __init__(self, *words: Any, **more: Any) -> None:
+        self.bar = QProgressBar(textVisible=False)
+        self.bar.setFixedHeight(8)
+        super().__init__(*words, inside=self.bar, **more)
+        self.setModal(True)
+        self.bar.hide()
+        self.working = self.over = False
+
+    def show_progress(self, words: str, share: float | None = None) -> None:
+        """Say what is being done, and which share of it is done (0 to 1), if that is known."""
+        self.said.setText(words)
+        self.bar.setRange(0, 0 if share is None else STEPS)
+        self.bar.setValue(round(STEPS * (share or 0.0)))
+
+    def show_done(self, words: str, opens: str) -> None:
+        """Say what came of it; the button ``opens`` it."""
+        self._end(words)
+        self.over = True
+        self.back.show_action("", "Close")
+        self.go_on.show_action("", opens)
+        self.go_on.setFocus()
+
+    def show_refused(self, sentence: str) -> None:
+        """Say why nothing came of it; what was asked can be changed."""
+        for editor in self.editors.values():
+            editor.show()
+        set_ink(self.said, "bad")
+        self._end(sentence)
+
+    def stopped(self) -> None:
+        """Close: the work was given up."""
+        self.working = False
+        super().reject()
+
+    def accept(self) -> None:
+        """Begin, or lead to what came of it."""
+        if self.over:
+            self.opened.emit()
+        elif not self.working and self.is_complete():
+            self.working = True
+            for part in (*self.editors.values(), self.go_on):
+                part.hide()
+            set_ink(self.said, "text2")
+            self.show_progress("Beginning …")
+            self.bar.show()
+            self._shrink()
+            self.begun.emit()
+
+    def reject(self) -> None:
+        """Close; where something is worked on, have it given up first."""
+        if not self.working:
+            super().reject()
+        elif self.back.isEnabled():
+            self.back.setEnabled(False)
+            self.said.setText("Stopping …")
+            self.stop_asked.emit()
+
+    def _end(self, words: str) -> None:
+        self.working = False
+        self.bar.hide()
+        self.said.setText(words)
+        self.go_on.show()
+        self.back.setEnabled(True)  # it may have come to an end although one asked to stop
+        self._shrink()
+
+    def _shrink(self) -> None:
+        layout = self.layout()
+        if layout is not None:
+            layout.activate()
+        self.adjustSize()

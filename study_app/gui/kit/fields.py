@@ -138,7 +138,8 @@ class Editor(QWidget):
         self.control = self._made()
         self.control.setFont(font("label" if field.unit else "body", tabular=bool(field.unit)))
         if isinstance(self.control, QAbstractButton):
-            vbox(self.control, margins=0, parent=self)
+            vbox(self.control, self.below, spacing=2, margins=0, parent=self)
+            self.show_refusal("")
             return
         self.control.setAccessibleName(f"{field.label} in {field.unit}" if field.unit else field.label)
         named = label(field.label, "label", "text" if field.unit else "text2")

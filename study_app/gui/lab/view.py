@@ -228,9 +228,6 @@ class LabPlace(Place):
         if event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow():
             self.tank.let_go()
 
-    def wants_narrow_rail(self) -> bool:
-        return True
-
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self.setFocus()

@@ -3,23 +3,24 @@
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QDialog, QLineEdit, QScrollArea, QSizePolicy, QWidget
 
-from study_app.gui.kit.fields import Editor, Field
+from study_app.gui.kit.dialogs import Work
+from study_app.gui.kit.fields import Field
 from study_app.gui.results.figures import FiguresPanel, ResultsView, excluded_words, in_figures, kind_of, time_of
 from study_app.gui.sessions.session_facts import Column, SessionFacts, matching, started_words, states_of
 from study_app.gui.sessions.session_page import LeaveOutDialog, SessionPage, take_back_question, unblind_question
 from study_app.gui.sessions.sessions_table import SessionsTable
-from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Bar, Card, Chip, Rule, scrolled
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
-from study_app.gui.widgets.labels import label, set_ink
+from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
 from study_app.number_text import counted
 from study_app.store.exclusions import Exclusion
@@ -37,11 +38,8 @@ class Extra(NamedTuple):
     why_not: str = ""
 
 
-class WriteDialog(QDialog):
-    """Asks for a folder and what to write, then shows how far it is; Cancel leaves nothing behind.
-
-    ``write_asked`` carries the folder and the names of the extras, ``stop_asked`` asks to give up, ``open_asked``
-    carries what is to be opened.
+class WriteDialog(Work):
+    """Asks for a folder and what to write there; Cancel leaves nothing behind.
 
     Parameters
     ----------
@@ -50,117 +48,36 @@ class WriteDialog(QDialog):
     opens : the words on the button that opens what was written
     """
 
-    write_asked = Signal(object, object)
-    stop_asked = Signal()
-    open_asked = Signal(object)
-
     def __init__(
-        self,
-        parent: QWidget,
-        theme: Theme,
-        *,
-        title: str,
-        explanation: str,
-        go_on: str,
-        to: Path,
-        extras: Sequence[Extra] = (),
-        opens: str = "Open the folder",
+        self, *words: Any, go_on: str, to: Path, extras: Sequence[Extra] = (), opens: str = "Open the folder"
     ) -> None:
-        super().__init__(parent)
-        self.setWindowTitle(title)
-        self.setModal(True)
-        self.setMinimumWidth(WIDTH)
+        checks = (Field(extra.name, extra.words, "check", hint=extra.why_not) for extra in extras)
+        folder = Field("to", "Folder", "folder", hint="Existing files will be overwritten.")
+        super().__init__(
+            *words,
+            ActionButton("", go_on, role="primary"),
+            fields=(*checks, folder),
+            needs={"to": "Please choose a folder."},
+            width=WIDTH,
+        )
         self._opens = opens
-        self._result: Path | None = None
-        self._working = False
-        self.extras = {extra.name: Editor(Field(extra.name, extra.words, "check")) for extra in extras}
+        self.result_path: Path | None = None
+        self._extras = [extra.name for extra in extras]
         for extra in extras:
-            self.extras[extra.name].setEnabled(not extra.why_not)
-            self.extras[extra.name].setToolTip(extra.why_not)
-        self.to = Editor(Field("to", "Folder", "folder", hint="Existing files will be overwritten."))
-        self.to.show_value(str(to))
-        self.said = label(explanation, "body", "text2", wraps=True)
-        self.bar = Bar()
-        self.bar.hide()
-        self.cancel = ActionButton("", "Cancel")
-        self.go_on = ActionButton("", go_on, role="primary")
-        self.go_on.setDefault(True)
-        self.cancel.setAutoDefault(False)
-        reasons = [label(extra.why_not, "small", "text2", wraps=True) for extra in extras if extra.why_not]
-        self._form = QWidget()
-        vbox(*self.extras.values(), *reasons, 4, self.to, spacing=6, margins=0, parent=self._form)
-        foot = hbox(self.cancel, STRETCH, self.go_on)
-        parts = label(title, "title_dense"), self.said, self._form, self.bar, 6, foot
-        vbox(*parts, spacing=12, margins=(28, 24, 28, 24), parent=self)
-        apply_theme(self, theme)
-        self.go_on.clicked.connect(self._go_on)
-        self.cancel.clicked.connect(self.reject)
+            self.editors[extra.name].control.setEnabled(not extra.why_not)
+        self.editors["to"].show_value(str(to))
+        self.go_on.setFocus()
 
-    def show_progress(self, what: str, share: float) -> None:
-        self.said.setText(f"{what[:1].upper()}{what[1:]} …")
-        self.bar.show_share(share)
+    @property
+    def asked(self) -> tuple[Path, tuple[str, ...]]:
+        """The folder, and the names of the extras."""
+        return Path(self.value("to")).expanduser(), tuple(name for name in self._extras if self.value(name))
 
     def show_written(self, files: Sequence[Path], opens: Path, warnings: Sequence[str]) -> None:
-        self._working = False
-        self._result = opens
-        self.bar.hide()
+        self.result_path = opens
         more = f" {len(warnings) - WARNED} more." if len(warnings) > WARNED else ""
         warned = "".join(f"\n{line}" for line in warnings[:WARNED])
-        self.said.setText(f"{counted(len(files), 'file')} in {files[0].parent}.{warned}{more}")
-        self.cancel.show_action("", "Close")
-        self.cancel.setEnabled(True)  # it may have been written although one asked to stop
-        self.go_on.show_action("", self._opens)
-        self.go_on.show()
-        self.go_on.setFocus()
-        self._shrink()
-
-    def show_refused(self, sentence: str) -> None:
-        """Say why nothing was written; what was asked can be changed."""
-        self._working = False
-        self.bar.hide()
-        self._form.show()
-        self.said.setText(f"{sentence}.")
-        set_ink(self.said, "bad")
-        self.go_on.show()
-        self.cancel.setEnabled(True)
-        self._shrink()
-
-    def _go_on(self) -> None:
-        if self._result is not None:
-            self.open_asked.emit(self._result)
-            return
-        if not self.to.value:
-            self.to.control.setFocus()
-            return
-        self._working = True
-        self._form.hide()
-        self.go_on.hide()
-        set_ink(self.said, "text2")
-        self.show_progress("beginning", 0.0)
-        self.bar.show()
-        extras = tuple(name for name, check in self.extras.items() if check.value)
-        self._shrink()
-        self.write_asked.emit(Path(self.to.value).expanduser(), extras)
-
-    def _shrink(self) -> None:
-        layout = self.layout()
-        if layout is not None:
-            layout.activate()
-        self.adjustSize()
-
-    def reject(self) -> None:
-        """Close; where something is being written, have it given up first."""
-        if self._working:
-            self.cancel.setEnabled(False)
-            self.said.setText("Stopping …")
-            self.stop_asked.emit()
-            return
-        super().reject()
-
-    def stopped(self) -> None:
-        """Close: it was given up, and nothing was written."""
-        self._working = False
-        super().reject()
+        self.show_done(f"{counted(len(files), 'file')} in {files[0].parent}.{warned}{more}", self._opens)
 
 
 COLUMNS = (
@@ -393,9 +310,6 @@ class ResultsPlace(Place):
     def leave(self) -> None:
         self.left.emit()
 
-    def wants_narrow_rail(self) -> bool:
-        return True
-
     def show_view(self, view: ResultsView) -> None:
         """Show what there is; only what has changed is made anew."""
         before, self.view = self.view, view
@@ -486,36 +400,34 @@ class ResultsPlace(Place):
         dialog = WriteDialog(
             self,
             self.theme,
-            title=f"Export {self._name()}",
-            explanation="Answers, trials and counts of all participants as CSV, with a codebook that explains every "
-            f"column.{self._by_code()}",
+            f"Export {self._name()}",
+            "Answers, trials and counts of all participants as CSV, with a codebook that explains every column."
+            f"{self._by_code()}",
             go_on="Export",
             to=self._handed_to / f"{self._name()}-tables",
             extras=extras,
         )
-        dialog.write_asked.connect(self.tables_asked)
+        dialog.begun.connect(lambda: self.tables_asked.emit(*dialog.asked))
         self._open_writing(dialog)
 
     def _ask_report(self) -> None:
         dialog = WriteDialog(
             self,
             self.theme,
-            title=f"Report of {self._name()}",
-            explanation=(
-                "One page with figures, tests and conclusions, and every number, table and figure as a file. Large "
-                f"studies take some minutes.{self._by_code()}"
-            ),
+            f"Report of {self._name()}",
+            "One page with figures, tests and conclusions, and every number, table and figure as a file. Large studies "
+            f"take some minutes.{self._by_code()}",
             go_on="Write the report",
             to=self._handed_to / f"{self._name()}-report",
             opens="Open the report",
         )
-        dialog.write_asked.connect(self.report_asked)
+        dialog.begun.connect(lambda: self.report_asked.emit(*dialog.asked))
         self._open_writing(dialog)
 
     def _open_writing(self, dialog: WriteDialog) -> None:
         self.writing = dialog
         dialog.stop_asked.connect(self.stop_asked)
-        dialog.open_asked.connect(self.open_asked)
+        dialog.opened.connect(lambda: self.open_asked.emit(dialog.result_path))
         dialog.finished.connect(self._written)
         self._open(dialog)
 

@@ -90,9 +90,6 @@ class Place(Themed, QWidget):
     def leave(self) -> None:
         """React to the place being hidden: release at once every device that acts on the hand."""
 
-    def wants_narrow_rail(self) -> bool:
-        return False
-
 
 def last_focused(part: QWidget) -> QWidget | None:
     """Return what in a part had the keyboard last, if it is shown and enabled."""

@@ -20,14 +20,16 @@ class RehearsalOrder:
     results: Path
 
 
-RehearsalClient: TypeAlias = WorkerClient[RehearsalOrder, str | Path]
-"""Its answers are a line for each participant, then the study folder."""
+RehearsalClient: TypeAlias = WorkerClient[RehearsalOrder, float | str | Path]
+"""Its answers are the share of what is compiled, a line for each participant, then the study folder."""
 
 
 def carry_out(order: RehearsalOrder, send: Send, _stop: Stop) -> Path:
     """Rehearse, and return the study folder (see `study_app.session.simulated.rehearsal.rehearse`)."""
-    from study_app.session.simulated.rehearsal import rehearse  # noqa: PLC0415 - the compiler: only in that process
+    from study_app.haptics.kernels.compiled import following_compilation  # noqa: PLC0415 - only in that process
+    from study_app.session.simulated.rehearsal import rehearse  # noqa: PLC0415 - the compiler, too
 
-    return rehearse(
-        order.protocol, participants=order.participants, seed=order.seed, results=order.results, progress=send
-    )
+    with following_compilation(send):
+        return rehearse(
+            order.protocol, participants=order.participants, seed=order.seed, results=order.results, progress=send
+        )

@@ -35,6 +35,12 @@ def endless(_order: RehearsalOrder, _send: Send, _stop: Stop) -> Path:
     raise AssertionError
 
 
+def compiles(order: RehearsalOrder, send: Send, stop: Stop) -> Path:
+    """Compile a quarter, and wait until the process is ended."""
+    send(0.25)
+    return endless(order, send, stop)
+
+
 def deaf(order: RehearsalOrder, send: Send, stop: Stop) -> Path:
     """Wait until the process is killed."""
     signal.signal(signal.SIGTERM, signal.SIG_IGN)

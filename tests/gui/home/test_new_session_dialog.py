@@ -73,7 +73,7 @@ def test_a_free_id_is_suggested(opened, results):
     use(results, "P001")
     use(results, "P004")
     made = opened()
-    seed, rehearsed = made.editors["seed"], RehearsalDialog(made.facts, results, parent=made).seed
+    seed, rehearsed = made.editors["seed"], RehearsalDialog(made.facts, results, parent=made).editors["seed"]
     assert seed.value in range(1, MAX_SEED + 1)
     for number, permitted in ((0, True), (MAX_SEED, True), (MAX_SEED + 1, False)):
         seed.control.setText(str(number))

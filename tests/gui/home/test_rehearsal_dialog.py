@@ -1,7 +1,6 @@
 """The dialog of a rehearsal: it counts participants, says why it failed, and stops."""
 
 from collections.abc import Callable
-from operator import attrgetter
 from typing import Any
 
 import pytest
@@ -10,6 +9,7 @@ from PySide6.QtCore import Qt
 from study_app.gui.home import dialogs
 from study_app.gui.home.dialogs import RehearsalDialog
 from study_app.gui.home.study_facts import study_facts
+from study_app.gui.kit.dialogs import STEPS
 
 pytestmark = pytest.mark.slow
 
@@ -48,37 +48,35 @@ def test_a_failed_rehearsal_says_why_and_stays(
     if not task:
         monkeypatch.setattr(dialogs, "WorkerClient", none)
     dialog = opened(task)
-    qtbot.mouseClick(dialog.start, LEFT)
-    qtbot.waitUntil(lambda: dialog.cancel.text() == "Close", timeout=20_000)
-    assert dialog.isVisible()
-    assert dialog.said.text() == said
-    qtbot.mouseClick(dialog.cancel, LEFT)
+    qtbot.mouseClick(dialog.go_on, LEFT)
+    qtbot.waitUntil(lambda: dialog.said.text() == said, timeout=20_000)
+    assert dialog.editors["participants"].isVisible(), "it can be tried again"
+    qtbot.mouseClick(dialog.back, LEFT)
     assert not dialog.isVisible()
 
 
 def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot: Any, opened: Any) -> None:
     dialog = opened("two")
-    dialog.participants.show_value(2)
-    qtbot.mouseClick(dialog.start, LEFT)
-    qtbot.waitUntil(lambda: dialog.progress.value() == 1, timeout=20_000)
+    dialog.editors["participants"].show_value(2)
+    qtbot.mouseClick(dialog.go_on, LEFT)
+    qtbot.waitUntil(lambda: dialog.bar.value() == STEPS // 2, timeout=20_000)
     assert dialog.said.text() == "1 of 2: R1: 8 responses (simulated)"
-    assert (dialog.progress.minimum(), dialog.progress.maximum()) == (0, 2)
     dialog.worker.stop()
     qtbot.waitUntil(lambda: dialog.over, timeout=20_000)
-    assert dialog.progress.value() == 2
+    assert dialog.bar.value() == STEPS
     assert dialog.isVisible()
     assert str(dialog.folder) in dialog.said.text()
-    assert dialog.start.text() == "Open results"
+    assert dialog.go_on.text() == "Open results"
     with qtbot.waitSignal(dialog.accepted):
-        qtbot.mouseClick(dialog.start, LEFT)
+        qtbot.mouseClick(dialog.go_on, LEFT)
 
 
-@pytest.mark.parametrize("at", ["participants.control", "seed.control", "start", "dialog"])
+@pytest.mark.parametrize("at", ["participants", "seed", "go_on", "dialog"])
 def test_enter_begins_the_rehearsal_wherever_the_keyboard_is_and_the_end_of_the_program_ends_it(
     qtbot: Any, opened: Any, at: str
 ) -> None:
     dialog = opened()
-    pressed = dialog if at == "dialog" else attrgetter(at)(dialog)
+    pressed = {"dialog": dialog, "go_on": dialog.go_on}.get(at) or dialog.editors[at].control
     pressed.setFocus()
     qtbot.keyClick(pressed, Qt.Key.Key_Return)
     assert dialog.worker.works
@@ -86,17 +84,29 @@ def test_enter_begins_the_rehearsal_wherever_the_keyboard_is_and_the_end_of_the_
     assert dialog.worker.ended
 
 
+def test_the_number_is_selected_and_the_first_compilation_is_explained(qtbot: Any, opened: Any) -> None:
+    dialog = opened("compiles")
+    count = dialog.editors["participants"].control
+    qtbot.waitUntil(lambda: dialog.focusWidget() is count and count.lineEdit().selectedText() == "5")
+    qtbot.keyClicks(count, "3")
+    assert dialog.value("participants") == 3
+    qtbot.keyClick(count, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: dialog.bar.value() == STEPS // 4, timeout=20_000)
+    assert dialog.said.text().startswith("The force model is being compiled. This happens once")
+    dialog.end()
+
+
 def test_cancel_closes_the_dialog_and_stops_a_rehearsal(qtbot: Any, opened: Any) -> None:
     dialog = opened()
-    dialog.cancel.setFocus()
-    qtbot.keyClick(dialog.cancel, Qt.Key.Key_Return)
+    dialog.back.setFocus()
+    qtbot.keyClick(dialog.back, Qt.Key.Key_Return)
     assert not dialog.isVisible()
     assert dialog.worker is None
     dialog = opened()
-    qtbot.mouseClick(dialog.start, LEFT)
+    qtbot.mouseClick(dialog.go_on, LEFT)
     assert dialog.worker.works
     with qtbot.waitSignal(dialog.rejected):
-        qtbot.mouseClick(dialog.cancel, LEFT)
+        qtbot.mouseClick(dialog.back, LEFT)
         assert dialog.isVisible()  # and nobody waits
     assert dialog.worker.ended
     assert not dialog.isVisible()
@@ -105,7 +115,7 @@ def test_cancel_closes_the_dialog_and_stops_a_rehearsal(qtbot: Any, opened: Any)
 def test_a_rehearsal_that_does_not_listen_is_killed(qtbot: Any, opened: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     dialog = opened("deaf")
     monkeypatch.setattr("study_app.workers.client.PATIENCE_S", 0.05)
-    dialog.start.click()
+    dialog.go_on.click()
     qtbot.waitUntil(lambda: dialog.said.text() == "1 of 5: deaf", timeout=20_000)
     with qtbot.waitSignal(dialog.rejected):
         dialog.close()

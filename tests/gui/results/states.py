@@ -69,16 +69,16 @@ def writing(qtbot: Any) -> QWidget:
     window = results(qtbot).main
     window.place("results").export.click()
     made: QWidget = window.place("results").writing
-    made.over = window  # type: ignore[attr-defined]  # or it would be collected here
+    made.below = window  # type: ignore[attr-defined]  # or it would be collected here
     return made
 
 
 WRITING: Actions = {
-    "begun": lambda dialog: (dialog.extras["wide"].control.click(), dialog.go_on.click()),
+    "begun": lambda dialog: (dialog.editors["wide"].control.click(), dialog.go_on.click()),
     "progress": lambda dialog: dialog.show_progress("making the tables", 0.3),
     "refused": lambda dialog: dialog.show_refused("/somewhere cannot be written"),
     "again": lambda dialog: dialog.go_on.click(),
-    "stopping": lambda dialog: dialog.cancel.click(),
+    "stopping": lambda dialog: dialog.back.click(),
     "written": lambda dialog: dialog.show_written(
         [Path("/there/a.csv"), Path("/there/b.csv")], Path("/there"), [f"P00{n} is damaged" for n in range(5)]
     ),

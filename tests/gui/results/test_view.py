@@ -125,6 +125,6 @@ def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_w
         (explanation,) = (text for text in said if "very " in text)
         assert explanation.endswith("Settings appear as codes because the key is sealed.") is sealed
         if button is place.export:
-            assert not place.writing.extras["sav"].isEnabled()
+            assert not place.writing.editors["sav"].control.isEnabled()
             assert "It needs pyreadstat." in said
         place.writing.reject()
