@@ -237,7 +237,8 @@ class _Showing:
         shown = []
         for trial in (step for step in schedule.steps if isinstance(step, Trial)):
             delay_s = self._protocol.delay_s(store.key.codes[trial.block][trial.code])
-            frames = read_frames(store.folder.recordings / f"trial-{trial.number:03d}_frames.parquet")
+            path = store.folder.recordings / f"trial-{trial.number:03d}_frames.parquet"
+            frames = read_frames(path, store.key.nonce)
             shown.append(
                 Shown(screen, paced, self._load, refresh_hz, delay_s, frames["painted_ns"], frames["sample_ns"])
             )

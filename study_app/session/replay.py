@@ -233,7 +233,7 @@ def replay(session_folder: Path) -> Replayed:
         interval = which[-1]
         scene = scene_presented(protocol, key, started, interval, seed)
         steps = steps_of(protocol, key, started, interval, lines)
-        recorded, checks = recordings.read_samples(path), recordings.read_checks(path)
+        recorded, checks = recordings.read_samples(path, key.nonce), recordings.read_checks(path, key.nonce)
         start = time.perf_counter()
         samples = as_one_scene(recorded, steps)
         try:

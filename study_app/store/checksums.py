@@ -9,7 +9,7 @@ ended; a copy of it that is kept elsewhere proves that none of them was changed,
 import base64
 import hashlib
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 
@@ -26,22 +26,20 @@ from study_app.store.atomic import (
     write_file,
 )
 from study_app.store.folders import REBUILT, SessionFolder, StudyFolder
+from study_app.store.journals.journal_events import Event, Recorded
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _FINGERPRINT = re.compile(r"([a-z2-7]{4}-[a-z2-7]{4}-[a-z2-7]{4})\s+(data/sub-[A-Za-z0-9]{1,32}/ses-[0-9]{2})\s*")
 
 
-def write_checksums(session: SessionFolder, known: Mapping[str, str]) -> dict[str, str]:
-    """Write the SHA-256 of every file of the session, and return them by path in its folder.
-
-    Those of ``known`` are taken as they are.
-    """
-    sums = {name: known.get(name) or hashed(session, name) for name in files(session)}
+def write_checksums(session: SessionFolder) -> dict[str, str]:
+    """Write the SHA-256 of every file of the session, and return them by path in its folder."""
+    sums = {name: hashed(session, name) for name in files(session)}
     write_file(session.checksums, checksum_bytes(sums))
     return sums
 
 
-def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: Mapping[str, str]) -> bool:
+def renew_checksums(session: SessionFolder, rewritten: Collection[Path]) -> bool:
     """Bring the list up to date with files that were ``rewritten``; return whether it changed.
 
     Other entries stay, so that the list only covers files as they were when the session ended; a missing or invalid
@@ -52,7 +50,7 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: 
     except StoreError:
         gone = "was damaged" if session.checksums.exists() else "was missing"
         note_rebuilt(session, f"the list of checksums {gone} and was made from the files that were there")
-        write_checksums(session, known)
+        write_checksums(session)
         return True
     ours = [path.relative_to(session.path).as_posix() for path in rewritten if path.is_relative_to(session.path)]
     if not (changed := [name for name in ours if hashed(session, name) != listed.get(name)]):
@@ -63,18 +61,14 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: 
     return True
 
 
-def replace_checksums(session: SessionFolder, contents: Mapping[str, tuple[bytes, bytes]]) -> None:
+def replace_checksums(session: SessionFolder, changes: Mapping[str, tuple[str, str]]) -> None:
     """Replace the SHA-256 of files by that of their new contents, if the list has that of the old.
 
-    ``contents`` are the old and the new by path in the session's folder. A file with another SHA-256 in the list was
+    ``changes`` are the old and the new by path in the session's folder. A file with another SHA-256 in the list was
     changed since the session ended, which must stay visible.
     """
     listed = read_checksums(session)
-    new = {
-        name: hashlib.sha256(after).hexdigest()
-        for name, (before, after) in contents.items()
-        if listed.get(name) == hashlib.sha256(before).hexdigest()
-    }
+    new = {name: after for name, (before, after) in changes.items() if listed.get(name) == before}
     if new:
         write_file(session.checksums, checksum_bytes(listed | new))
 
@@ -140,12 +134,19 @@ def sha256(path: Path) -> str:
         raise cannot_read(path, error) from error
 
 
-def fingerprint(sums: Mapping[str, str]) -> str:
-    """Return the fingerprint of a session whose files (by path in its folder) have these SHA-256.
+def fingerprint(sums: Mapping[str, str], lines: Iterable[Event]) -> str:
+    """Return the fingerprint of a session with these ``lines`` whose files (by path in its folder) have these SHA-256.
 
     60 bits of the SHA-256 of their list, without tables and the note of `rebuild`, in the letters and digits of base32.
+    Recordings that were sealed are left out: the journal has their SHA-256, before and after they are opened.
     """
-    proved = {name: sums[name] for name in sums if not name.endswith("_data.csv") and name != REBUILT}
+    sealed = {
+        name
+        for line in lines
+        if isinstance(line, Recorded) and line.sealed is not None
+        for name in (line.recording, line.recording_frames)
+    }
+    proved = {name: sums[name] for name in sums if not name.endswith("_data.csv") and name not in {REBUILT, *sealed}}
     letters = base64.b32encode(hashlib.sha256(checksum_bytes(proved)).digest()).decode().lower()
     return "-".join(letters[at : at + 4] for at in (0, 4, 8))
 

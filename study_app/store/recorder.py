@@ -13,18 +13,19 @@ import threading
 import time
 from array import array
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from study_app.errors import StoreError
 from study_app.store.atomic import cause, sync_folder
-from study_app.store.journals.journal_events import Event, Recorded, RecordingLost, Which
+from study_app.store.journals.journal_events import Recorded, RecordingLost, Which
 
 if TYPE_CHECKING:
-    from study_app.store.recordings import SamplesFile, Written
+    from study_app.store.recordings import Written
     from study_app.video.frames import VideoFrame
 
 ROOM = 120_000  # capacity of the queue in samples: two minutes at 1 kHz, 37 MB
@@ -58,7 +59,9 @@ class Recorder:
     folder : Path
         Where the files go; made when the first is written.
     facts : mapping
-        Metadata of every file, which must not reveal a condition.
+        Metadata of every file.
+    secret : bytes, optional
+        What the files are sealed with until the study is unblinded; None: they are not sealed.
     waits : bool
         Whether `append` waits for room instead of dropping: for rehearsals.
     room : int
@@ -72,13 +75,22 @@ class Recorder:
         Notified when a recording was kept or lost.
     """
 
-    def __init__(self, folder: Path, facts: Mapping[str, Any], *, waits: bool = False, room: int = ROOM) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        facts: Mapping[str, Any],
+        *,
+        secret: bytes | None = None,
+        waits: bool = False,
+        room: int = ROOM,
+    ) -> None:
         # The Parquet library takes a while to load: now, before a participant sits down, and only where it is needed.
         from study_app.store import recordings  # noqa: PLC0415
 
         self._files = recordings
         self._folder = folder
         self._facts = dict(facts)
+        self._secret = secret
         self._waits = waits
         self._room = room
         self.thread: threading.Thread | None = None
@@ -237,28 +249,26 @@ class Recorder:
         facts = {**self._facts, "trial": trial, "attempt": attempt}
         if interval is not None:
             facts["interval"] = interval
-        file: SamplesFile | None = None
         shown: Written | None = None
         end: _End | None = None
         try:
             if not self._folder.is_dir():
                 self._folder.mkdir()
                 sync_folder(self._folder.parent)  # so that it survives a power cut
-            file = self._files.SamplesFile(samples_path, facts, begin.rate_hz)
+            file = self._files.SamplesFile(samples_path, facts, begin.rate_hz, self._secret)
             end = self._give_samples(file.write)
             frames = np.frombuffer(end.frames, np.int64).reshape(-1, 5)
-            shown = self._files.write_frames(frames_path, frames, facts)
+            seconds = (file.taken + end.dropped) / begin.rate_hz
+            shown = self._files.write_frames(frames_path, frames, facts, seconds, self._secret)
             return recorded(begin.which, file.finish(end.dropped), shown, end.dropped)
         except Exception as error:  # noqa: BLE001 - whatever it is, the next trial's recording is still to be written
             with contextlib.suppress(Exception):  # a check of the folder reports files that cannot be removed either
-                if file is not None:
-                    file.abandon()
-            with contextlib.suppress(Exception):
                 if shown is not None:
                     shown.path.unlink(missing_ok=True)
             if end is None:
                 self._give_samples(lambda _: None)
-            reason = cause(error) if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
+            failed = error.__cause__ if isinstance(error, StoreError) else error
+            reason = cause(failed) if isinstance(failed, OSError) else f"{type(error).__name__}: {error}"
             return lost(begin.which, reason)
 
     def _give_samples(self, take: Callable[[Any], object]) -> _End:
@@ -297,6 +307,8 @@ def recorded(which: Which, samples: Written, frames: Written, dropped: int) -> R
         frames_recorded=frames.rows,
         sha256=samples.sha256,
         frames_sha256=frames.sha256,
+        opened_sha256=samples.opened_sha256,
+        opened_frames_sha256=frames.opened_sha256,
     )
 
 
@@ -304,12 +316,6 @@ def lost(which: Which, reason: str) -> RecordingLost:
     """Return the journal's line about a recording that could not be stored."""
     trial, attempt, interval = which
     return RecordingLost(trial=trial, attempt=attempt, interval=interval, reason=reason)
-
-
-def hashes_of(lines: Sequence[Event]) -> dict[str, str]:
-    """Return path in the session's folder → SHA-256 of every recording in the journal."""
-    kept = [line for line in lines if isinstance(line, Recorded)]
-    return {line.recording: line.sha256 for line in kept} | {line.recording_frames: line.frames_sha256 for line in kept}
 
 
 def recording_files(folder: Path, trial: int, attempt: int, interval: int | None = None) -> tuple[Path, Path]:

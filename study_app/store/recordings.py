@@ -6,17 +6,19 @@ takes 30 to 56 MB; a measured velocity adds 43 MB at most. A CRC-32 of the exact
 them.
 
 Positions, velocities and forces are in the frames of ``haptics.model.layout.SAMPLE``. Any Parquet reader can read the
-columns, with unit and meaning in each column's metadata.
+columns, with unit and meaning in each column's metadata. Until the study is unblinded the files are sealed as a whole
+(see `blinded.sealing`), and whoever reads them needs the secret of the study's key.
 """
 
+import contextlib
 import hashlib
+import io
 import json
-import os
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
@@ -25,7 +27,8 @@ from pyarrow import parquet
 
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import SAMPLE, SAMPLE_FIELDS, SampleField, records
-from study_app.store.atomic import cannot_read, parse_json, sync_folder, temporary_path
+from study_app.store.atomic import cannot_read, parse_json, read_regular, write_file
+from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, MARK, SAMPLE_BYTES, open_file, seal_file, sealed_bytes
 from study_app.store.journals.journal_events import plain
 from study_app.store.tables.csv_files import Column, Kind
 
@@ -83,11 +86,16 @@ _STORED = {
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A file that is complete on the disk."""
+    """A file that is complete on the disk, and of a sealed one the SHA-256 that it has once it is opened."""
 
     path: Path
     rows: int
     sha256: str
+    opened_sha256: str | None = None
+
+
+class SealedRecording(StoreError):
+    """A recording that nobody can read before the study is unblinded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +107,10 @@ class Checks:
     effect_force: tuple[int, ...]
 
 
-def read_samples(path: Path) -> Any:
+def read_samples(path: Path, secret: bytes | None = None) -> Any:
     """Return the samples (n,) as a recarray of ``SAMPLE``; ``busy_ns``, which is not recorded, is 0.
+
+    A sealed recording is read with the ``secret`` of the study's key.
 
     The first sample's force on the hand, from which the next one moves, is exact. Recordings of format 1 assume that
     every device sends the commanded force one tick late; until format 2 no device measured its velocity.
@@ -108,9 +118,9 @@ def read_samples(path: Path) -> Any:
     Raises
     ------
     StoreError
-        It cannot be read, or is not a recording of samples.
+        It cannot be read, is not a recording of samples, or is sealed.
     """
-    columns, facts = _read(path, "samples")
+    columns, facts = _read(path, "samples", secret)
     samples = records(SAMPLE, len(columns["tick"]))
     for field in RECORDED:
         values: Any = field.before
@@ -127,33 +137,36 @@ def read_samples(path: Path) -> Any:
     return samples
 
 
-def read_frames(path: Path) -> Any:
+def read_frames(path: Path, secret: bytes | None = None) -> Any:
     """Return the frames (n,) as a recarray of `FRAME`: when painted, of which moment, and what of a video [ns].
 
     Raises
     ------
     StoreError
-        It cannot be read, or is not a recording of frames.
+        It cannot be read, is not a recording of frames, or is sealed.
     """
-    columns, _ = _read(path, "frames")
+    columns, _ = _read(path, "frames", secret)
     frames = records(FRAME, len(columns["painted_ns"]))
     for name in FRAME.names or ():
         frames[name] = columns.get(name, NO_VIDEO.get(name, 0))
     return frames
 
 
-def read_facts(path: Path) -> dict[str, Any]:
+def read_facts(path: Path, secret: bytes | None = None) -> dict[str, Any]:
     """Return the file's metadata, without reading its rows: facts, ``kind``, ``rows``."""
-    try:
-        metadata = parquet.read_metadata(path)
-    except OSError as error:
-        raise cannot_read(path, error) from error
-    except (pa.ArrowException, UnicodeDecodeError) as error:
-        raise _damaged(path, error) from error
-    return _facts(path, metadata)
+    with _opened(path, secret) as file:
+        return _facts(path, file.metadata)
 
 
-def read_checks(path: Path) -> Checks:
+def read_written(path: Path, secret: bytes | None = None) -> Written:
+    """Return what the journal tells of a recording that is on the disk."""
+    rows = read_facts(path, secret)["rows"]
+    content = read_regular(path)
+    found, opened = (hashlib.sha256(it).hexdigest() for it in (content, opened_content(path, content, secret)))
+    return Written(path, rows, found, None if opened == found else opened)
+
+
+def read_checks(path: Path, secret: bytes | None = None) -> Checks:
     """Return the CRCs of a recording of samples.
 
     Raises
@@ -161,7 +174,7 @@ def read_checks(path: Path) -> Checks:
     StoreError
         It cannot be read, or has none.
     """
-    facts = read_facts(path)
+    facts = read_facts(path, secret)
     if facts["kind"] != "samples":
         raise StoreError(f"{path} holds {facts['kind']}, not samples: name the recording itself")
     checks = facts["crc32"]
@@ -174,17 +187,35 @@ def crcs(forces: NDArray[np.float64], rows: int) -> list[int]:
     return [zlib.crc32(exact[first : first + rows].tobytes()) for first in range(0, len(exact), rows)]
 
 
-def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+def opened_content(path: Path, content: bytes, secret: bytes | None) -> bytes:
+    """Return the content of a recording; a sealed one is opened with the secret of the key (else StoreError)."""
+    if not content.startswith(MARK):
+        return content
+    if secret is None:
+        raise SealedRecording(f"{path} is sealed until the study is unblinded: liquid-study unblind RESULTS opens it")
+    if (opened := open_file(content, secret)) is None:
+        raise StoreError(f"{path} cannot be decrypted with the study's key: it was changed; restore it from a copy")
+    return opened
+
+
+@contextlib.contextmanager
+def _opened(path: Path, secret: bytes | None) -> Iterator[Any]:
+    """Open a recording as Parquet; errors of reading it are StoreErrors."""
     try:
-        with parquet.ParquetFile(path) as file:
-            facts = _facts(path, file.metadata)
-            if facts["kind"] != kind:
-                raise StoreError(f"{path} holds {facts['kind']}, not {kind}: name the other file of the trial")
-            table = file.read().combine_chunks()
+        with parquet.ParquetFile(pa.BufferReader(opened_content(path, read_regular(path), secret))) as file:
+            yield file
     except OSError as error:
         raise cannot_read(path, error) from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
         raise _damaged(path, error) from error
+
+
+def _read(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    with _opened(path, secret) as file:
+        facts = _facts(path, file.metadata)
+        if facts["kind"] != kind:
+            raise StoreError(f"{path} holds {facts['kind']}, not {kind}: name the other file of the trial")
+        table = file.read().combine_chunks()
     held = facts["format"]
     if kind == "frames":
         columns = [column.name for column in FRAMES if held >= _VIDEO_SINCE or column.name not in NO_VIDEO]
@@ -252,10 +283,12 @@ def _damaged(path: Path, error: Exception) -> StoreError:
 
 
 class SamplesFile:
-    """A recording being written: not there under its name until ``finish``."""
+    """A recording being written: in memory until ``finish``, and sealed with a ``secret`` then."""
 
-    def __init__(self, path: Path, facts: Mapping[str, Any], rate_hz: float) -> None:
+    def __init__(self, path: Path, facts: Mapping[str, Any], rate_hz: float, secret: bytes | None = None) -> None:
         self.path = path
+        self.taken = 0
+        self._secret = secret
         self.check_rows = max(1, round(rate_hz))
         self.group_rows = self.check_rows * GROUP_SECONDS
         self.rows = 0
@@ -269,6 +302,7 @@ class SamplesFile:
     def write(self, samples: Any) -> None:
         """Add the next samples (array of ``SAMPLE``); whole groups of them are written."""
         self._held.append(samples)
+        self.taken += len(samples)
         self._count += len(samples)
         while self._count >= self.group_rows:
             together = np.concatenate(self._held)
@@ -290,24 +324,24 @@ class SamplesFile:
             self._write_group(np.concatenate(self._held))
         checks = {"rows": self.check_rows, "device_force": self._device, "effect_force": self._effect}
         facts = {"format": FORMAT, "kind": "samples", **self._facts, "dropped": dropped, "crc32": checks}
-        return self._half.finish(facts, self.rows)
-
-    def abandon(self) -> None:
-        """Remove what was written."""
-        self._half.abandon()
+        rate_hz = self._facts["rate_hz"]
+        size = sealed_bytes((self.rows + dropped) / rate_hz, SAMPLE_BYTES * rate_hz)
+        return self._half.finish(facts, self.rows, size, self._secret)
 
 
-def write_frames(path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any]) -> Written:
-    """Write what was shown (n, 5): when painted, of which moment, and number, time and age of a video's frame [ns]."""
+def write_frames(
+    path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any], seconds: float = 0.0, secret: bytes | None = None
+) -> Written:
+    """Write what was shown (n, 5): when painted, of which moment, and number, time and age of a video's frame [ns].
+
+    With a ``secret`` they are sealed, into a size that follows from the ``seconds`` of the recording.
+    """
     half = _Half(path, FRAMES)
-    try:
-        painted, shown, *video = frames.T
-        columns = {"painted_ns": painted, "sample_ns": shown, "age_ns": painted - shown}
-        half.write({**columns, **dict(zip(NO_VIDEO, video, strict=True))})
-        return half.finish({"format": FORMAT, "kind": "frames", **facts}, len(frames))
-    except OSError:
-        half.abandon()
-        raise
+    painted, shown, *video = frames.T
+    columns = {"painted_ns": painted, "sample_ns": shown, "age_ns": painted - shown}
+    half.write({**columns, **dict(zip(NO_VIDEO, video, strict=True))})
+    size = sealed_bytes(seconds, FRAMES_BYTES_PER_S)
+    return half.finish({"format": FORMAT, "kind": "frames", **facts}, len(frames), size, secret)
 
 
 def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
@@ -335,13 +369,12 @@ def _rounded(values: NDArray[Any], step: float) -> NDArray[Any]:
 
 
 class _Half:
-    """A Parquet file under a temporary name, until it is whole."""
+    """A Parquet file in memory, until it is whole: half an hour takes 60 MB."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         self._path = path
-        self._temporary = temporary_path(path)
         self._schema = _schema(columns)
-        self._file: BinaryIO = self._temporary.open("xb")
+        self._file = io.BytesIO()
         self._writer = parquet.ParquetWriter(
             self._file,
             self._schema,
@@ -361,25 +394,18 @@ class _Half:
             arrays.append(pa.Array.from_buffers(field.type, len(values), [None, pa.py_buffer(kept)]))
         self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
 
-    def finish(self, facts: Mapping[str, Any], rows: int) -> Written:
+    def finish(self, facts: Mapping[str, Any], rows: int, size: int, secret: bytes | None) -> Written:
+        """Write the file in one step; with a ``secret`` sealed, so that no opened file ever is on the disk."""
         self._writer.add_key_value_metadata({FACTS_KEY: json.dumps(facts, ensure_ascii=False)})
         self._writer.close()
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._file.close()
-        with self._temporary.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-        self._temporary.replace(self._path)
-        sync_folder(self._path.parent)
-        return Written(self._path, rows, digest)
-
-    def abandon(self) -> None:
-        for end in (self._writer.close, self._file.close):
-            try:
-                end()
-            except OSError:  # a file that could not be written is not needed
-                continue
-        self._temporary.unlink(missing_ok=True)
+        content = self._file.getvalue()
+        opened_hash = hashlib.sha256(content).hexdigest()
+        if secret is None:
+            write_file(self._path, content)
+            return Written(self._path, rows, opened_hash)
+        sealed = seal_file(content, size, secret)
+        write_file(self._path, sealed)
+        return Written(self._path, rows, hashlib.sha256(sealed).hexdigest(), opened_hash)
 
 
 def _schema(columns: Sequence[Column]) -> pa.Schema:

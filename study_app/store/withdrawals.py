@@ -32,6 +32,7 @@ from study_app.store.atomic import (
 from study_app.store.checksums import fingerprint, place_of, read_checksums, sha256
 from study_app.store.exclusions import exclusion_bytes, exclusions
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, readable
+from study_app.store.journals import journal
 from study_app.store.journals.journal_events import holds
 from study_app.store.output_files import Output, erase_outputs
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
@@ -180,7 +181,8 @@ def describe_session(session: SessionFolder) -> ErasedSession:
     except OSError:
         begun = ""
     try:
-        proof, checksums = fingerprint(read_checksums(session)), sha256(session.checksums)
+        lines = journal.scan(session.journal).lines
+        proof, checksums = fingerprint(read_checksums(session), lines), sha256(session.checksums)
     except StoreError:
         proof = checksums = ""
     return ErasedSession(session.number, begun, checksums, proof)

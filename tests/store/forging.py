@@ -1,6 +1,7 @@
 """What a person does who changes results by hand and computes anew whatever a program computed."""
 
 import hashlib
+import io
 import json
 import shutil
 from collections.abc import Callable
@@ -11,11 +12,22 @@ from study_app.store.blinded.blinding import opened, read_key, sealed
 from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import line_bytes, read
+from study_app.store.recordings import opened_content
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.study_files import write_participants
 from tests.journal_lines import event_from, raw
 
 Lines = list[dict[str, Any]]
+
+
+def secret_of(recording: Path) -> bytes:
+    """Return what a recording is sealed with."""
+    return read_key(recording.parents[4]).nonce
+
+
+def parquet_of(recording: Path) -> io.BytesIO:
+    """Return a recording as the Parquet file that it is once it is opened."""
+    return io.BytesIO(opened_content(recording, recording.read_bytes(), secret_of(recording)))
 
 
 def forge(journal: Path, change: Callable[[Lines], object], *, chained: bool = True) -> None:
@@ -43,7 +55,7 @@ def cover_up(study: Path) -> None:
             path.write_bytes(content)
         session.checksums.unlink(missing_ok=True)
         if lines[-1].event == "session_ended":
-            note_fingerprint(folder, session, fingerprint(write_checksums(session, {})))
+            note_fingerprint(folder, session, fingerprint(write_checksums(session), lines))
         write_participants(folder, name)
 
 

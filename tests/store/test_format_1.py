@@ -17,7 +17,7 @@ from study_app.store.tables.columns import TABLES
 from tests.journal_lines import event_from, raw
 
 RECORDED: dict[str, dict[str, Any]] = json.loads((Path(__file__).parent / "format_1.json").read_text())
-UNEQUAL = ("at", "previous", "version", "sha256", "frames_sha256")
+UNEQUAL = ("at", "previous", "version", "sha256", "frames_sha256", "opened_sha256", "opened_frames_sha256")
 """Fields of the journal that differ from run to run or with the program's version."""
 
 ADDED = ("text_sha256", "study_version", "limiter_saturated")
@@ -40,7 +40,7 @@ def journal(path: Path, key: Key) -> list[dict[str, Any]]:
         {name: value for name, value in line.items() if name not in UNEQUAL + ADDED and not MEASURED.match(name)}
         for line in lines
     )
-    kept = [sealed_again(lines[0], one, key) for one in fields]
+    kept = [one if one["event"] == "recorded" else sealed_again(lines[0], one, key) for one in fields]
     told = [line for line in kept if line["event"] != "recorded"]
     saved = [{**line, "t_s": None} for line in kept if line["event"] == "recorded"]
     saved.sort(key=lambda line: (line["trial"], line["attempt"]))
@@ -62,8 +62,15 @@ def measured(path: Path, key: Key) -> list[float]:
     ]
 
 
-def table(path: Path) -> list[list[str]]:
+def table(path: Path, key: Key) -> list[list[str]]:
+    """Return the cells; numbers of samples, which later versions seal, as they are once they are opened."""
     header, *rows = csv.reader(io.StringIO(path.read_text(encoding="utf-8"), newline=""))
+    if "samples_recorded" in header:
+        text = (path.parent / "journal.jsonl").read_text(encoding="utf-8")
+        lines = raw(opened([event_from(json.loads(line)) for line in text.splitlines()], key))
+        counts = {line["recording"]: str(line["samples_recorded"]) for line in lines if line["event"] == "recorded"}
+        for row in rows:
+            row[header.index("samples_recorded")] = counts[row[header.index("recording")]]
     blank = [name in WALL_CLOCK for name in header]
     return [header, *(["" if hidden else cell for hidden, cell in zip(blank, row, strict=True)] for row in rows)]
 
@@ -71,7 +78,7 @@ def table(path: Path) -> list[list[str]]:
 def recorded(folder: StudyFolder) -> Iterator[tuple[str, Any]]:
     yield "key", hashlib.sha256(folder.key.read_bytes()).hexdigest()
     for path in sorted(folder.path.rglob("*_data.csv")):
-        yield path.relative_to(folder.path).as_posix(), sha256(table(path))
+        yield path.relative_to(folder.path).as_posix(), sha256(table(path, read_key(folder.path)))
     for session in folder.sessions():
         place = session.path.relative_to(folder.path).as_posix()
         yield f"{place}/journal", sha256(journal(session.journal, read_key(folder.path)))

@@ -214,7 +214,7 @@ def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None
 
 def test_frames_that_do_not_fit_leave_nothing(tmp_path: Path, files_up_to: FullDisk) -> None:
     shown = np.random.default_rng(1).integers(0, 2**60, (50_000, 5))
-    with files_up_to(10_000), pytest.raises(OSError, match="File too large"):
+    with files_up_to(10_000), pytest.raises(StoreError, match="File too large"):
         write_frames(tmp_path / "frames.parquet", shown, FACTS)
     assert list(tmp_path.iterdir()) == []
 

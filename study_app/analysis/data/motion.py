@@ -21,7 +21,7 @@ from study_app.analysis.data.measures import Array, quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_GLITCH
-from study_app.store.recordings import read_samples
+from study_app.store.recordings import SealedRecording, read_samples
 from study_app.store.sites.merged import session_in
 
 CUTOFF_HZ: Final = 10.0
@@ -254,6 +254,8 @@ def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached 
         return reason
     try:
         samples = read_samples(_file(folder, row))
+    except SealedRecording:
+        return "recording is sealed (liquid-study unblind opens it)"
     except StoreError:
         return "recording is damaged (liquid-study verify says which)"
     if len(samples):

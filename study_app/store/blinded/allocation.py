@@ -24,7 +24,8 @@ from study_app.store.atomic import (
     sync_folder,
     write_through,
 )
-from study_app.store.blinded.blinding import Key, open_text, read_key, seal
+from study_app.store.blinded.blinding import Key, read_key
+from study_app.store.blinded.sealing import open_text, seal
 from study_app.store.folders import StudyFolder
 
 
@@ -128,7 +129,7 @@ def claims(study: StudyFolder) -> list[Claim]:
 
 def group_in(claim: Claim, key: Key) -> str | None:
     """Return the group sealed in an entry's file; None if the file was changed."""
-    opened = open_text(_whose(claim.entry, claim.participant), claim.sealed, key, frozenset({"group"}))
+    opened = open_text(_whose(claim.entry, claim.participant), claim.sealed, key.nonce, frozenset({"group"}))
     return None if opened is None else opened.get("group")
 
 
@@ -160,7 +161,7 @@ def _claim(study: StudyFolder, path: Path) -> Claim:
 
 def _allocation(key: Key, entry: int, participant: str) -> Allocation:
     group = group_of(key.groups, key.nonce, entry)
-    return Allocation(entry, group, seal(_whose(entry, participant), {"group": group}, key))
+    return Allocation(entry, group, seal(_whose(entry, participant), {"group": group}, key.nonce))
 
 
 def _whose(entry: int, participant: str) -> list[object]:

@@ -6,12 +6,9 @@ accidental reading, and its SHA-256 in every receipt proves that it is unchanged
 nonce prevents guessing the key from the hash among few possible keys. A real study's key comes from the operating
 system's randomness, a rehearsal's from its seed, and a folder holds one or the other.
 
-Measures of a trial that can reveal its condition are encrypted with the nonce: a line ``trial_ended`` or
-``interval_ended`` of a journal holds these columns, a line ``trial_started`` of a trial with a design what it presents,
-as one text, ``sealed``: in hexadecimal digits a tag, and their JSON encrypted. The tag is the HMAC-SHA256 of session,
-trial and JSON; the JSON is combined with SHAKE-256 of nonce and tag by exclusive or. So equal numbers of two trials
-look different, and a changed or moved text is detected (a synthetic initialisation vector as in RFC 5297, with the
-standard library's hashes). Spaces make all texts equally long.
+What can reveal a condition is encrypted with the nonce (see `sealing`): measures of a trial in the lines
+``trial_ended`` and ``interval_ended`` of a journal, what a trial with a design presents in its ``trial_started``, the
+numbers of samples and frames in ``recorded``, each as one text, ``sealed``; and the files of recordings.
 
 A file may leave the choice of effects and laws to the program (``effects = "auto"``) and its estimator to the format's
 default; another version may choose otherwise. So a receipt's protocol names the estimator, and effects and laws of each
@@ -21,10 +18,9 @@ liquid, which reveal a condition, as one encrypted text, ``resolved``: resume an
 import base64
 import contextlib
 import hashlib
-import hmac
 import json
 import secrets
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
@@ -39,6 +35,7 @@ from study_app.protocol.orders.schedule import block_codes, draw_key
 from study_app.protocol.streams import draw_secret, group_of
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
+from study_app.store.blinded.sealing import open_text, seal
 from study_app.store.folders import SessionFolder, StudyFolder, readable
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
@@ -55,11 +52,10 @@ _SEALED_IN: Final[Mapping[type[events.Event], frozenset[str]]] = {
     events.TrialStarted: frozenset({"level", "standard", "arrangement", "catch"}),
     events.IntervalEnded: SEALED,
     events.Allocated: frozenset({"group"}),
+    events.Recorded: frozenset({"samples_recorded", "frames_recorded", "opened_sha256", "opened_frames_sha256"}),
     events.TrialEnded: SEALED,
 }
 """The fields that each event's lines hold sealed."""
-_TAG_BYTES = 16
-_BLOCK_BYTES = 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -403,26 +399,7 @@ def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> event
     if not start.measures_sealed or not measured:
         return event
     rest = {name: value for name, value in line.items() if name not in names}
-    return events.read_event({**rest, "sealed": seal(_whose(start, event), measured, key)})
-
-
-def seal(whose: Sequence[object], values: Mapping[str, Any], key: Key) -> str:
-    """Return values as a sealed text; ``whose`` identifies their owner, and is needed to open it."""
-    said = json.dumps(events.plain(values), allow_nan=False, separators=(",", ":")).encode()
-    said = said.ljust(-(-len(said) // _BLOCK_BYTES) * _BLOCK_BYTES)
-    tag = _tag(whose, said, key)
-    return (tag + _combined(said, tag, key)).hex()
-
-
-def open_text(whose: Sequence[object], text: str, key: Key, names: frozenset[str]) -> dict[str, Any] | None:
-    """Return the values of these names from `seal`; None if the text was changed, or has another owner or key."""
-    try:
-        content = bytes.fromhex(text)
-    except ValueError:
-        content = b""
-    tag = content[:_TAG_BYTES]
-    said = _combined(content[_TAG_BYTES:], tag, key)
-    return _measured(said, names) if hmac.compare_digest(tag, _tag(whose, said, key)) else None
+    return events.read_event({**rest, "sealed": seal(_whose(start, event), measured, key.nonce)})
 
 
 def opened(lines: Iterable[events.Event], key: Key | None) -> list[events.Event]:
@@ -457,23 +434,13 @@ def _opened(start: events.SessionStarted, line: events.Event, key: Key) -> event
     text = getattr(line, "sealed", None)
     if text is None:
         return line
-    measured = open_text(_whose(start, line), text, key, _SEALED_IN.get(type(line), frozenset()))
+    measured = open_text(_whose(start, line), text, key.nonce, _SEALED_IN.get(type(line), frozenset()))
     if measured is None:
         raise StoreError(
             f"line {line.n} of the journal cannot be decrypted with the study's key: it was changed; restore it "
             "from a copy"
         )
     return events.read_event({**line.line(), **measured, "sealed": None})
-
-
-def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
-    """Return the columns in a text with a valid tag, without any that a holder of the key has forged."""
-    try:
-        measured = parse_json(said)
-    except ValueError:
-        return {}
-    items = measured.items() if isinstance(measured, dict) else ()
-    return {name: value for name, value in items if name in names and events.holds(name, value)}
 
 
 def _whose(start: events.SessionStarted, line: Any) -> list[object]:
@@ -485,18 +452,9 @@ def _whose(start: events.SessionStarted, line: Any) -> list[object]:
     return whose if isinstance(line, events.TrialEnded) else [*whose, line.event, interval]
 
 
-def _tag(whose: Sequence[object], said: bytes, key: Key) -> bytes:
-    return hmac.digest(key.nonce, json.dumps(whose).encode() + said, "sha256")[:_TAG_BYTES]
-
-
-def _combined(text: bytes, tag: bytes, key: Key) -> bytes:
-    stream = hashlib.shake_256(key.nonce + tag).digest(len(text))
-    return (int.from_bytes(text) ^ int.from_bytes(stream)).to_bytes(len(text))
-
-
 def sealed_model(protocol: Protocol, participant: str, session: int, key: Key) -> str:
     """Return effects and chosen laws of each liquid, sealed for one session."""
-    return seal(_session_owner(participant, session), {"liquids": _resolved(protocol)}, key)
+    return seal(_session_owner(participant, session), {"liquids": _resolved(protocol)}, key.nonce)
 
 
 def as_recorded(protocol: Protocol, receipt: Mapping[str, Any], key: Key) -> Protocol:
@@ -512,7 +470,7 @@ def as_recorded(protocol: Protocol, receipt: Mapping[str, Any], key: Key) -> Pro
     recorded: dict[str, Any] = {}
     if (text := receipt.get("resolved")) is not None:
         whose = _session_owner(receipt["participant"], receipt["session"])
-        opened = open_text(whose, str(text), key, frozenset({"liquids"}))
+        opened = open_text(whose, str(text), key.nonce, frozenset({"liquids"}))
         if not opened:
             raise StoreError(
                 f"the receipt of {receipt['participant']} cannot be decrypted with the study's key (resolved): it was "

@@ -6,6 +6,7 @@ again completes it. In a merged study the key of each site is opened, every one 
 """
 
 import contextlib
+import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,13 +15,13 @@ from typing import Final
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.store import receipt
-from study_app.store.atomic import is_there, write_file
+from study_app.store.atomic import is_there, read_own, study_root, sweep, write_file
 from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol
 from study_app.store.checksums import replace_checksums
 from study_app.store.exclusions import Exclusion, exclude, exclusions, reversals
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.journals.journal_events import Event, TrialStarted, start_of
+from study_app.store.journals.journal_events import Event, Recorded, TrialStarted, start_of
 from study_app.store.progress import trial_results
 from study_app.store.sessions.folder_lock import is_open, open_alone
 from study_app.store.sessions.open_session import Place, table_files
@@ -178,13 +179,14 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
     if not lines or not start_of(lines).measures_sealed:
         return []
     with open_alone(session.path):
+        sweep(session.recordings)
         return list(_rewrite(Place(study, session, start_of(lines).study), lines, key))
 
 
 def _rewrite(place: Place, lines: list[Event], key: Key) -> list[str]:
-    """Write the sealed columns; a table of an earlier version stays without columns unknown to it."""
+    """Write the sealed columns and open the recordings; a table stays without columns unknown to its version."""
     left: list[str] = []
-    ours: dict[str, tuple[bytes, bytes]] = {}
+    ours: dict[str, tuple[str, str]] = {}
     before, after = (dict(table_files(place, lines, one)) for one in (None, key))
     for path, columns in zip(after, table_columns(lines, opened=True).values(), strict=True):
         held = path.read_bytes() if is_there(path) else b""
@@ -198,10 +200,36 @@ def _rewrite(place: Place, lines: list[Event], key: Key) -> list[str]:
             continue
         if held != content:
             write_file(path, content)
-        ours[path.name] = sealed, content
+        ours[path.name] = hashlib.sha256(sealed).hexdigest(), hashlib.sha256(content).hexdigest()
+    for path, hashes in _recordings(place, lines, key):
+        try:
+            _open_recording(path, hashes, key)
+            ours[path.relative_to(place.folder.path).as_posix()] = hashes
+        except StoreError as error:
+            left.append(f"{error}; then unblind again")
     if is_there(place.folder.checksums):
         replace_checksums(place.folder, ours)
     return left
+
+
+def _recordings(place: Place, lines: list[Event], key: Key) -> Iterator[tuple[Path, tuple[str, str]]]:
+    """Yield each file that was sealed when it was recorded, with its SHA-256 sealed and opened."""
+    for line in opened(lines, key):
+        if isinstance(line, Recorded) and line.opened_sha256 and line.opened_frames_sha256:
+            yield place.folder.path / line.recording, (line.sha256, line.opened_sha256)
+            yield place.folder.path / line.recording_frames, (line.frames_sha256, line.opened_frames_sha256)
+
+
+def _open_recording(path: Path, hashes: tuple[str, str], key: Key) -> None:
+    """Replace a sealed recording by the opened one; one that is opened already stays."""
+    from study_app.store.recordings import opened_content  # noqa: PLC0415 - loads the Parquet library
+
+    content = read_own(path, study_root(path.parent))
+    found = hashlib.sha256(content).hexdigest()
+    if found not in hashes:
+        raise StoreError(f"{path} has changed since it was recorded, so it was not opened: restore it from a copy")
+    if found == hashes[0]:
+        write_file(path, opened_content(path, content, key.nonce))
 
 
 def _open_study(study: StudyFolder) -> None:

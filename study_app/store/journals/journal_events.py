@@ -407,16 +407,23 @@ class TrialEnded(EndOfTask):
 
 
 class Recorded(OfAttempt):
-    """The trial's recording is complete on the disk, with these names and checksums."""
+    """The trial's recording is complete on the disk, with these names and checksums.
 
+    `sealed` contains the numbers of samples and frames, and the checksums of the opened files, encrypted.
+    """
+
+    one_of = ("samples_recorded", "sealed")
     interval: Integer | None = None
     recording: RecordingName
     recording_frames: RecordingName
-    samples_recorded: Integer
+    samples_recorded: Integer | None = None
     samples_unrecorded: Integer
-    frames_recorded: Integer
+    frames_recorded: Integer | None = None
     sha256: Text
     frames_sha256: Text
+    opened_sha256: Text | None = None
+    opened_frames_sha256: Text | None = None
+    sealed: Text | None = None
 
 
 class RecordingLost(OfAttempt):

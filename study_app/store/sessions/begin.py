@@ -207,14 +207,15 @@ def note_allocation(store: SessionStore) -> None:
         store.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))
 
 
-def make_recorder(place: Place, start: SessionStarted, clock: SessionClock) -> Recorder | None:
+def make_recorder(place: Place, start: SessionStarted, clock: SessionClock, key: Key) -> Recorder | None:
     """Return the recorder of a session as its first line says, or None where it keeps no recordings."""
     if not start.recordings:
         return None
     fields = {
         name: getattr(start, name) for name in ("study", "participant", "session", "simulated", "pilot", "version")
     }
-    return Recorder(place.folder.recordings, {**fields, "origin_ns": clock.origin_ns}, waits=start.simulated)
+    facts, secret = {**fields, "origin_ns": clock.origin_ns}, key.nonce if start.measures_sealed else None
+    return Recorder(place.folder.recordings, facts, secret=secret, waits=start.simulated)
 
 
 def surroundings(
@@ -398,7 +399,7 @@ def _open(
             sync_folder(above)
     except OSError as error:
         raise cannot_write(path, error) from error
-    recorder = make_recorder(place, started, clock)
+    recorder = make_recorder(place, started, clock, key)
     receipt.write(place.folder.receipt, session_receipt)
     journal = Journal.create(place.folder.journal, clock)
     store = SessionStore(place, journal, key, session_receipt, opening, recorder=recorder)

@@ -25,7 +25,7 @@ from study_app.store.checksums import fingerprint, note_fingerprint, write_check
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Journal
-from study_app.store.recorder import LEAVING_S, Kept, Recorder, hashes_of
+from study_app.store.recorder import LEAVING_S, Kept, Recorder
 from study_app.store.sessions.folder_lock import Opening
 from study_app.store.tables import csv_files, session_tables
 from study_app.store.tables.study_files import write_participants
@@ -231,7 +231,7 @@ class SessionStore:
         receipt.write(self.folder.receipt, self._receipt)
 
     def _write_checksums(self) -> None:
-        found = fingerprint(write_checksums(self.folder, hashes_of(self._lines)))
+        found = fingerprint(write_checksums(self.folder), self._lines)
         if not self.fingerprint:
             note_fingerprint(self.place.study_folder, self.folder, found)
         self.fingerprint = found

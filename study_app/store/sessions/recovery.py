@@ -32,14 +32,13 @@ from study_app.store.checksums import (
     place_of,
     read_checksums,
     renew_checksums,
-    sha256,
 )
 from study_app.store.folders import RECORDING_NAME, SessionFolder, StudyFolder, locate
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Contents, Journal, SessionClock
 from study_app.store.progress import Progress, progress_of, recordable
-from study_app.store.recorder import hashes_of, lost, recorded, recording_files
+from study_app.store.recorder import lost, recorded, recording_files
 from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, surroundings
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
 from study_app.store.sessions.open_session import Place, SessionStore, table_files
@@ -126,7 +125,7 @@ def reopen(
         left = _left(study_folder, folder, protocol, source)
         contents = left.contents
         gap_s, clock = _go_on(contents.lines, now_ns, now)
-        recorder = make_recorder(left.place, left.start, clock)
+        recorder = make_recorder(left.place, left.start, clock, left.key)
         opened = Journal.reopen(folder.journal, contents, clock)
     except BaseException:
         opening.release()
@@ -144,7 +143,7 @@ def reopen(
         sweep(folder.path)
         if is_there(folder.recordings):
             sweep(folder.recordings)
-        for event in _recordings_found(folder, contents.lines) if left.start.recordings else ():
+        for event in _recordings_found(folder, contents.lines, left.key) if left.start.recordings else ():
             store.append(event)
         around = surroundings(device, screens, clock, motors_masked, outlets, video)
         store.note_resumed({"at": clock.at(at_s), **gap, **around})
@@ -353,7 +352,7 @@ def _go_on(
     return (round(gap_s, 3) if known else None), clock
 
 
-def _recordings_found(folder: SessionFolder, lines: list[events.Event]) -> Iterator[events.Event]:
+def _recordings_found(folder: SessionFolder, lines: list[events.Event], key: Key) -> Iterator[events.Event]:
     """Yield the lines about recordings that the ended program did not write: complete or lost."""
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
@@ -363,9 +362,9 @@ def _recordings_found(folder: SessionFolder, lines: list[events.Event]) -> Itera
             continue
         samples, frames = recording_files(folder.recordings, *which)
         try:
-            facts = recordings.read_facts(samples)
-            shown = recordings.Written(frames, recordings.read_facts(frames)["rows"], sha256(frames))
-            yield recorded(which, recordings.Written(samples, facts["rows"], sha256(samples)), shown, facts["dropped"])
+            dropped = recordings.read_facts(samples, key.nonce)["dropped"]
+            kept, shown = (recordings.read_written(path, key.nonce) for path in (samples, frames))
+            yield recorded(which, kept, shown, dropped)
         except StoreError:
             if not is_there(samples):  # frames are put in their place first, and are no recording alone
                 with contextlib.suppress(OSError):
@@ -397,10 +396,10 @@ def _renew_proof(place: Place, lines: list[events.Event], rewritten: list[Path])
     noted = [folder.rebuilt] if has_none else []
     if has_none:
         note_rebuilt(folder, f"{study.fingerprints.name} had no fingerprint of the session")
-    if not renew_checksums(folder, [*rewritten, *noted], hashes_of(lines)):
+    if not renew_checksums(folder, [*rewritten, *noted]):
         return []
     if has_none:
-        note_fingerprint(study, folder, fingerprint(read_checksums(folder)))
+        note_fingerprint(study, folder, fingerprint(read_checksums(folder), lines))
         return [folder.checksums, folder.rebuilt, study.fingerprints]
     return [folder.checksums, folder.rebuilt]
 

@@ -127,7 +127,7 @@ class SimulatedStudy:
             raise cannot_write(path, error) from error
         if not create_folder(path, {**files, place.folder.checksums.name: checksum_bytes(sums)}, waits=False):
             raise used_ids(self.folder).refusal(place.folder.participant, place.folder.number)
-        note_fingerprint(self.folder, place.folder, fingerprint(sums), waits=False)
+        note_fingerprint(self.folder, place.folder, fingerprint(sums, lines), waits=False)
 
     def __enter__(self) -> Self:
         """Write the study's description, which identifies its folder from the first session on."""

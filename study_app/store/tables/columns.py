@@ -248,7 +248,7 @@ TRIALS: tuple[Column, ...] = (
     ),
     optional("recording", "text", "File of the trial's samples, in the session's folder; n/a if none was stored."),
     optional("recording_frames", "text", "File of the frames shown, in the session's folder; n/a if none was stored."),
-    _count("samples_recorded", "Number of samples in the recording."),
+    _count("samples_recorded", "Number of samples in the recording; n/a until unblinding."),
     _count("samples_unrecorded", "Number of samples missing from the recording because the disk was too slow."),
     optional(
         "recording_lost",

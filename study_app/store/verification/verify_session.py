@@ -154,8 +154,9 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
     for name, value in expected.items():
         if (told := getattr(start, name)) != value:
             found.error(folder.journal, f"is of {name} {told!r}, but is stored with those of {value!r}")
+    told = lines
     with found.reading(folder.journal):
-        opened(lines, key)
+        told = opened(lines, key)
     for wrong in wrong_responses(lines):
         found.error(folder.journal, wrong)
     ended = isinstance(lines[-1], events.SessionEnded)
@@ -165,9 +166,9 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
     if not running:
         _tables(place, lines, found, ended=ended)
         if ended:
-            _checksums(folder, hashes, found, recordings=recordings)
+            _checksums(folder, told, hashes, found, recordings=recordings)
         if recordings:
-            _recordings(folder, lines, hashes, found, ended=ended)
+            _recordings(folder, told, key, hashes, found, ended=ended)
     if is_there(folder.rebuilt):
         with found.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
@@ -179,7 +180,7 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
         chained=lines[-1].previous is not None,
         row=row_from(folder, contents, opened_or_none(place.study_folder)),
         trials=frozenset(progress_of(lines).presented),
-        fingerprint=fingerprint(hashes) if ended and recordings else "",
+        fingerprint=fingerprint(hashes, lines) if ended and recordings else "",
     )
 
 
@@ -333,7 +334,17 @@ def _hash(folder: SessionFolder, name: str) -> str:
         return ""
 
 
-def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Findings, *, recordings: bool) -> None:
+def _checksums(
+    folder: SessionFolder,
+    lines: Sequence[events.Event],
+    hashes: Mapping[str, str],
+    found: Findings,
+    *,
+    recordings: bool,
+) -> None:
+    kept = [line for line in lines if isinstance(line, events.Recorded)]
+    opened_hashes = {line.sha256: line.opened_sha256 for line in kept}
+    opened_hashes |= {line.frames_sha256: line.opened_frames_sha256 for line in kept}
     if not is_there(folder.checksums):
         found.error(
             folder.checksums, "is missing: was the program killed at the end of the session? rebuild creates it"
@@ -351,12 +362,20 @@ def _checksums(folder: SessionFolder, hashes: Mapping[str, str], found: Findings
                 found.error(path, "was added after the session ended")
             elif not hashes[name]:
                 found.error(path, "cannot be read")
+            elif hashes[name] == opened_hashes.get(listed[name]):
+                found.warning(path, "was opened by an unblinding that did not finish: unblind again")
             elif hashes[name] != listed[name]:
                 found.error(path, CHANGED)
 
 
 def _recordings(
-    folder: SessionFolder, lines: list[events.Event], hashes: Mapping[str, str], found: Findings, *, ended: bool
+    folder: SessionFolder,
+    lines: list[events.Event],
+    key: Key | None,
+    hashes: Mapping[str, str],
+    found: Findings,
+    *,
+    ended: bool,
 ) -> None:
     """Check that every recording the journal tells of is there, whole and of this trial, and no other."""
     listed: set[str] = set()
@@ -369,17 +388,18 @@ def _recordings(
         which = named(*line.which)
         if line.samples_unrecorded:
             found.warning(folder.path / line.recording, f"lacks {line.samples_unrecorded} samples")
-        for kind, name, rows, digest in (
-            ("samples", line.recording, line.samples_recorded, line.sha256),
-            ("frames", line.recording_frames, line.frames_recorded, line.frames_sha256),
+        for kind, name, rows, digests in (
+            ("samples", line.recording, line.samples_recorded, (line.sha256, line.opened_sha256)),
+            ("frames", line.recording_frames, line.frames_recorded, (line.frames_sha256, line.opened_frames_sha256)),
         ):
             listed.add(name)
             if name not in hashes:
                 found.error(folder.path / name, f"is missing, but the journal mentions it ({which})")
                 continue
-            if hashes[name] != digest:
+            if hashes[name] not in digests:
                 found.error(folder.path / name, f"has changed since it was recorded ({which})")
-            _facts(folder, line, kind, name, rows, found)
+            if rows is not None:  # else what is sealed cannot be read, as was said
+                _facts(folder, line, kind, name, rows, key, found)
     if events.start_of(lines).recordings:
         for planned in recordable(lines)[: None if ended else -1]:
             if planned not in known:
@@ -397,14 +417,16 @@ def _recordings(
             found.warning(folder.path / name, f"is in no line of the journal{then}")
 
 
-def _facts(folder: SessionFolder, line: events.Recorded, kind: str, name: str, rows: int, found: Findings) -> None:
+def _facts(
+    folder: SessionFolder, line: events.Recorded, kind: str, name: str, rows: int, key: Key | None, found: Findings
+) -> None:
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
     path = folder.path / name
     expected = {"participant": folder.participant, "session": folder.number, "kind": kind, "rows": rows}
     expected |= {"trial": line.trial, "attempt": line.attempt, "interval": line.interval}
     with found.reading(path):
-        facts: dict[str, Any] = recordings.read_facts(path)
+        facts: dict[str, Any] = recordings.read_facts(path, key.nonce if key else None)
         for fact, value in expected.items():
             if facts.get(fact) != value:
                 found.error(path, f"holds {fact} {facts.get(fact)!r}, the journal says {value!r}")

@@ -175,8 +175,9 @@ def test_a_circle_has_the_length_of_its_circumference() -> None:
 @needs_servo
 def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_told(tmp_path: Path) -> None:
     folder = rehearse("rek2024", participants=1, seed=3, results=tmp_path / "rek2024")
-    unblind(folder, by="AB", reason="a test")
     (session,) = StudyFolder(folder).sessions()
+    sealed = (session.path / "recordings" / "trial-008.parquet").read_bytes()
+    unblind(folder, by="AB", reason="a test")
     lines = [json.loads(text) for text in session.journal.read_text().splitlines()]
     study = load_study(folder)
     told: list[tuple[int, int]] = []
@@ -193,9 +194,11 @@ def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_to
 
     (session.path / "recordings" / "trial-006.parquet").unlink()
     (session.path / "recordings" / "trial-007.parquet").write_bytes(b"PAR1")
+    (session.path / "recordings" / "trial-008.parquet").write_bytes(sealed)
     less = performance(load_study(folder))
-    assert (less.trials, less.recorded) == (7, 5)
+    assert (less.trials, less.recorded) == (7, 4)
     assert less.unread == (
+        "1 × recording is sealed (liquid-study unblind opens it)",
         "1 × recording is not in the folder",
         "1 × recording is damaged (liquid-study verify says which)",
     )

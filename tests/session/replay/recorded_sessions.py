@@ -32,6 +32,7 @@ from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from tests.session import small
+from tests.store.forging import parquet_of
 
 STRESSED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "honey": (
@@ -172,8 +173,8 @@ def copied(results: Path, to: Path) -> Path:
 
 def rewrite(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
     """Change the columns of a recording and keep its checks, as a mistake or a forger would."""
-    facts = parquet.read_metadata(path).metadata[b"liquid_study"]
-    table = parquet.read_table(path)
+    facts = parquet.read_metadata(parquet_of(path)).metadata[b"liquid_study"]
+    table = parquet.read_table(parquet_of(path))
     columns = {name: table.column(name).to_numpy().copy() for name in table.column_names}
     change(columns)
     with parquet.ParquetWriter(path, table.schema) as writer:

@@ -31,6 +31,7 @@ from tests.faults.support import short
 from tests.journal_lines import raw
 from tests.session import small
 from tests.session.replay.recorded_sessions import STRESSED, begun, held, rewrite, session, stressed, troubled
+from tests.store.forging import secret_of
 
 pytestmark = [needs_servo, pytest.mark.slow]
 
@@ -105,7 +106,7 @@ def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
     found = comes_out(session(rehearsed), 4)
     assert found.lasted_s > 3
     assert found.seconds == sum(
-        len(recordings.read_checks(path).device_force)
+        len(recordings.read_checks(path, secret_of(path)).device_force)
         for path in session(rehearsed).glob("recordings/trial-00?.parquet")
     )
     assert 0 < found.computed_s < found.took_s
@@ -151,7 +152,8 @@ def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path)
 @pytest.mark.parametrize("liquid", STRESSED)
 def test_forces_that_limits_change_come_out_to_the_last_bit(tmp_path: Path, liquid: str) -> None:
     place = stressed(tmp_path / "results", liquid)
-    limiters = recordings.read_samples(place / "recordings" / "trial-001.parquet").limiters
+    recording = place / "recordings" / "trial-001.parquet"
+    limiters = recordings.read_samples(recording, secret_of(recording)).limiters
     assert all((limiters & bit).any() for bit in (LIMITER_SLOPE, LIMITER_ENERGY, LIMITER_SLEW))
     comes_out(place, 1)
 

@@ -10,11 +10,8 @@ from scipy.stats import binomtest
 from study_app.store.folders import SessionFolder
 
 ABOUT_ANSWERS = frozenset({"item_shown", "choice", "responses"})
-ABOUT_RECORDINGS = frozenset({"samples_recorded", "samples_unrecorded", "frames_recorded"})
 TIMES_OF_ACTIONS = frozenset({"t_s", "t_task_s", "trial_started_s", "interval_started_s", "gap_s"})
-PASSED_OVER = (
-    TIMES_OF_ACTIONS | ABOUT_RECORDINGS | {"n", "trial", "attempt", "index", "of", "part", "session", "interval"}
-)
+PASSED_OVER = TIMES_OF_ACTIONS | {"n", "trial", "attempt", "index", "of", "part", "session", "interval"}
 
 Numbers: TypeAlias = dict[str, float]
 Trials: TypeAlias = dict[tuple[str, int], tuple[str, Numbers]]
@@ -27,7 +24,7 @@ def every_number(
     lines: Iterable[dict[str, Any]],
     presented: Callable[[dict[str, Any]], str | None],
 ) -> Trials:
-    """Return what a session's files hold about each trial beside answers, times of actions, recordings.
+    """Return what a session's files hold about each trial, but answers and times of actions, and sizes of files.
 
     Parameters
     ----------
@@ -47,6 +44,9 @@ def every_number(
         trial = (session.participant, line.get("trial"))
         if trial in found and line["event"] not in ABOUT_ANSWERS:
             found[trial][1].update(numbers(line, f"{line['event']} {line.get('interval', '')} "))
+        if trial in found and line["event"] == "recorded":
+            paths = [session.path / line[name] for name in ("recording", "recording_frames")]
+            found[trial][1].update((f"size {number}", path.stat().st_size) for number, path in enumerate(paths))
     for name in ("trials", "intervals"):
         if not session.table(study, name).exists():
             continue

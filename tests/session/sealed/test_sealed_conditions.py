@@ -58,7 +58,7 @@ def rehearsed(tmp_path_factory: pytest.TempPathFactory) -> Path:
         assert changed == 1, pattern
     protocol = folder / "short.toml"
     protocol.write_text(text + MORE, encoding="utf-8")
-    return rehearse(protocol, participants=SESSIONS, seed=5, results=folder / "results", recordings=False)
+    return rehearse(protocol, participants=SESSIONS, seed=5, results=folder / "results")
 
 
 @pytest.mark.parametrize("block", ["liquids", "delays"])

@@ -12,10 +12,9 @@ import pytest
 from study_app.gui.operator.operator_view import Session, operator_view, stages
 from study_app.gui.operator.servo_health import Vitals
 from study_app.protocol.load import load
-from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.simulated import Comparison
 from study_app.protocol.streams import stream
-from study_app.protocol.trials.tracks import design_of
 from study_app.session.simulated import participant
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded import blinding
@@ -23,6 +22,7 @@ from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
+from study_app.store.journals.journal_events import IntervalEnded, Recorded
 from study_app.store.progress import Progress
 from study_app.store.tables.columns import SEALED
 from tests.compiled import needs_servo
@@ -35,7 +35,7 @@ from tests.session.sealed.numbers_written import Trials, every_number, told
 pytestmark = [pytest.mark.nightly, pytest.mark.slow, needs_servo]
 
 SESSIONS = 12
-HIDDEN = {"sealed", "resolved", "key_hash", "at", "previous", "fingerprint"}
+HIDDEN = {"sealed", "resolved", "key_hash", "at", "previous", "fingerprint", "sha256", "frames_sha256"}
 """What may differ: sealed fields, hashes, and the time of day."""
 
 Said: TypeAlias = dict[str, Any]
@@ -48,11 +48,9 @@ def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def answer_blindly(
-    study: Protocol, block: Any, item: Any, sensed: Any, before: Any, draw: Callable[[], float], *_: Any
-) -> Any:
+def answer_blindly(_self: object, _study: object, design: Any, _s: Any, _b: Any, draw: Callable[[], float]) -> Any:
     """Answer by the draw alone, whatever was felt."""
-    design, share = design_of(study, block), draw()
+    share = draw()
     if design.reply == "choice":
         return design.answers[int(share * len(design.answers))]
     return 1 + int(share * 3) if design.reply == "rating" else round(1 + 9 * share, 2)
@@ -73,7 +71,7 @@ def run(protocol: Path, folder: Path, secret: int) -> Path:
     folder.mkdir(parents=True)
     open_or_draw_key(folder, load(str(protocol)), stream(secret, "blinding").random)
     with collecting() as markers:
-        rehearse(protocol, participants=1, seed=4, results=folder, recordings=False)
+        rehearse(protocol, participants=1, seed=4, results=folder)
     (folder / "markers.jsonl").write_text("".join(f"{one.text}\n" for one in markers.markers), encoding="utf-8")
     return folder
 
@@ -81,7 +79,7 @@ def run(protocol: Path, folder: Path, secret: int) -> Path:
 @pytest.fixture(scope="module")
 def blindly() -> Any:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(participant, "answer", answer_blindly)
+        patch.setattr(Comparison, "answer", answer_blindly)
         patch.setattr(participant, "AdjustingObserver", BlindSetting)
         yield patch
 
@@ -109,10 +107,16 @@ def said_in(folder: Path) -> Said:
                     {column: cell for column, cell in row.items() if not column.endswith("_at")}
                     for row in csv.DictReader(file)
                 ]
+        elif path.suffix == ".parquet":
+            found[name] = path.stat().st_size
         else:
             text = path.read_text(encoding="utf-8")
             parts = text.splitlines() if path.suffix == ".jsonl" else [text]
             found[name] = [shown(json.loads(part)) for part in parts] if path.suffix.startswith(".json") else text
+            if path.name == "journal.jsonl":  # the recorder writes its own lines whenever it is done
+                rest = [{**line, "n": 0} for line in found[name] if line["event"] != "recorded"]
+                saved = [{**line, "n": 0, "t_s": 0} for line in found[name] if line["event"] == "recorded"]
+                found[name] = rest + sorted(saved, key=lambda line: str(line["recording"]))
     return found
 
 
@@ -130,9 +134,11 @@ def operator_views(folder: Path, protocol: Path) -> list[Any]:
     progress = Progress()
     views = []
     (place,) = StudyFolder(folder).sessions()
-    for line in raw(journal.read(place.journal)):
+    for line in journal.read(place.journal):
+        if isinstance(line, Recorded):  # whenever the recorder is done
+            continue
         progress.take(line)
-        views.append(operator_view(session, progress, Vitals(), now_s=line["t_s"], force_on=True))
+        views.append(operator_view(session, progress, Vitals(), now_s=line.t_s, force_on=True))
     return views
 
 
@@ -156,7 +162,7 @@ def test_sessions_under_two_keys_write_the_same_but_for_sealed_fields(first: Pat
 def test_a_planted_leak_makes_them_differ(first: Path, protocol: Path, blindly: Any, tmp_path: Path) -> None:
     """One measure of one event is not sealed."""
     with blindly.context() as patch:
-        left = {**blinding._SEALED_IN, "interval_ended": SEALED - {"force_peak_n"}}
+        left = {**blinding._SEALED_IN, IntervalEnded: SEALED - {"force_peak_n"}}
         patch.setattr(blinding, "_SEALED_IN", left)
         other = said_in(run(protocol, tmp_path / "planted", 2))
     one = said_in(first)
@@ -183,9 +189,9 @@ def numbers_of(folder: Path, what: str) -> Trials:
     key = read_key(folder)
     found: Trials = {}
     for session in StudyFolder(folder).sessions():
-        lines = raw(journal.read(session.journal))
+        lines = journal.read(session.journal)
         presented = {line["n"]: line for line in raw(blinding.opened(lines, key))}
-        found |= every_number(session, "levels", lines, lambda line, of=presented: str(of[line["n"]][what]))
+        found |= every_number(session, "levels", raw(lines), lambda line, of=presented: str(of[line["n"]][what]))
     return found
 
 

@@ -15,6 +15,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.recordings import read_samples
 from tests.compiled import needs_servo
 from tests.protocol.edited_studies import text_of
+from tests.store.forging import secret_of
 
 pytestmark = [pytest.mark.slow, needs_servo]
 
@@ -49,7 +50,7 @@ def test_the_hand_keeps_the_pace_and_feels_a_damper_faded_in_over_300_ms(study_f
     for session in StudyFolder(results).sessions():
         # The first trial begins within the fade of the start.
         for path in sorted(session.path.glob("recordings/trial-00[2-4].parquet")):
-            samples = read_samples(path)
+            samples = read_samples(path, secret_of(path))
             samples = samples[samples.scene != 0]
             since_s = (samples.time_ns - samples.time_ns[0]) * 1e-9
             force_n, velocity_mps = samples.force_n, samples.velocity_mps / protocol.scene.scale

@@ -70,8 +70,8 @@ def test_recordings_are_kept_beside_the_journal_and_linked_from_the_trials_row(
     rows_written = rows_of(store, "trials")
     links = [(row["recording"], row["recording_frames"], row["samples_recorded"]) for row in rows_written]
     assert links == [
-        ("recordings/trial-003.parquet", "recordings/trial-003_frames.parquet", "300"),
-        ("recordings/trial-003_attempt-2.parquet", "recordings/trial-003_attempt-2_frames.parquet", "70000"),
+        ("recordings/trial-003.parquet", "recordings/trial-003_frames.parquet", "n/a"),
+        ("recordings/trial-003_attempt-2.parquet", "recordings/trial-003_attempt-2_frames.parquet", "n/a"),
     ]
     assert [row["samples_unrecorded"] for row in rows_written] == ["0", "0"]
     lines = [line for line in journal.read(store.folder.journal) if line.event == "recorded"]
@@ -80,7 +80,7 @@ def test_recordings_are_kept_beside_the_journal_and_linked_from_the_trials_row(
             assert hashlib.sha256((store.folder.path / getattr(line, name)).read_bytes()).hexdigest() == getattr(
                 line, digest
             )
-    facts = read_facts(store.folder.path / lines[0].recording)
+    facts = read_facts(store.folder.path / lines[0].recording, store.key.nonce)
     assert (facts["participant"], facts["origin_ns"]) == ("P007", 5_000_000_000)
 
 

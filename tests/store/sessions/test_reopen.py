@@ -18,6 +18,7 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store import receipt
+from study_app.store.blinded.blinding import opened
 from study_app.store.journals import journal, journal_events
 from study_app.store.recorder import recording_files
 from study_app.store.recordings import read_samples, write_frames
@@ -256,8 +257,8 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
             ("recorded", 2),
             ("recording_lost", 3),
         ]
-        assert told_of[1].samples_recorded == 200
-        assert len(read_samples(resumed.folder.path / told_of[1].recording)) == 200
+        assert opened(resumed.lines, resumed.key)[told_of[1].n - 1].samples_recorded == 200
+        assert len(read_samples(resumed.folder.path / told_of[1].recording, resumed.key.nonce)) == 200
         assert told_of[2].reason == "the program ended before it was complete"
         recorder = resumed.recorder
         assert recorder is not None

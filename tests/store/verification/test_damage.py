@@ -15,6 +15,7 @@ from study_app.gui.sessions.session_facts import sessions
 from study_app.protocol.model import Protocol
 from study_app.store import recordings
 from study_app.store.blinded import blinding
+from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal import scan
@@ -24,6 +25,7 @@ from study_app.store.verification.verify_study import verify
 from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting
 from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Attend, Make, Start
+from tests.store.forging import secret_of
 
 pytestmark = pytest.mark.slow
 
@@ -139,15 +141,18 @@ READERS = (recordings.read_samples, recordings.read_frames, recordings.read_chec
 @pytest.mark.parametrize("footer", [False, True], ids=["anywhere", "footer"])
 @pytest.mark.parametrize("name", ["trial-001.parquet", "trial-001_frames.parquet"])
 def test_a_changed_bit_of_a_recording_is_an_error_and_never_a_traceback(session: Path, name: str, footer: bool) -> None:
+    """Footers are those of opened recordings."""
     path = session / "recordings" / name
-    content = path.read_bytes()
+    if footer:
+        unblind(session.parents[2], "AB", "done")
+    content, secret = path.read_bytes(), secret_of(path)
     chance = random.Random(f"{SEED} {name} {footer}")  # noqa: S311 - a fixed choice of damage
     changes = flipped(content, chance, footer=footer)
     for number in range(CASES * 20):
         path.write_bytes(next(changes))
         for read in READERS:
             with contextlib.suppress(StudyError):
-                read(path)
+                read(path, secret)
         if number % 20 == 0:
             findings = verify(session.parents[2])
             assert any(name in str(error) for error in findings.errors)

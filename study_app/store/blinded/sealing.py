@@ -1,0 +1,101 @@
+"""Texts and files that are encrypted with the secret of a study's key until the study is unblinded.
+
+A sealed text has, in hexadecimal digits, a tag and the JSON of values, encrypted. The tag is the HMAC-SHA256 of owner
+and JSON; the JSON is combined with SHAKE-256 of secret and tag by exclusive or. So equal values of two owners look
+different, and a changed or moved text is detected (a synthetic initialisation vector as in RFC 5297, with the standard
+library's hashes). Spaces make all texts equally long.
+
+A sealed file is encrypted in the same way, piece by piece, after `MARK`, and filled up to a size that does not depend
+on its content: of a recording it tells the trial's time to a factor of 2, and journals tell that time anyway.
+"""
+
+import hashlib
+import hmac
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from study_app.store.atomic import parse_json
+from study_app.store.journals import journal_events as events
+
+MARK: Final = b"This file is sealed until the study is unblinded: liquid-study unblind RESULTS\n"
+SAMPLE_BYTES: Final = 64
+"""Of a sealed recording per sample: more than the samples of any device take."""
+FRAMES_BYTES_PER_S: Final = 4_000
+"""Of the sealed frames of a recording: more than 240 frames per second take."""
+_FACTS_BYTES: Final = 16_384  # of a recording without rows
+_TAG_BYTES = 16
+_BLOCK_BYTES = 1024
+_PIECE_BYTES = 65_536  # encrypted at once: other threads wait for so long
+_LENGTH_BYTES = 8
+
+
+def seal(whose: Sequence[object], values: Mapping[str, Any], secret: bytes) -> str:
+    """Return values as a sealed text; ``whose`` identifies their owner, and is needed to open it."""
+    said = json.dumps(events.plain(values), allow_nan=False, separators=(",", ":")).encode()
+    said = said.ljust(-(-len(said) // _BLOCK_BYTES) * _BLOCK_BYTES)
+    tag = _tag(json.dumps(whose).encode(), said, secret)
+    return (tag + _combined(said, tag, secret)).hex()
+
+
+def open_text(whose: Sequence[object], text: str, secret: bytes, names: frozenset[str]) -> dict[str, Any] | None:
+    """Return the values of these names from `seal`; None if the text was changed, or has another owner or secret."""
+    try:
+        content = bytes.fromhex(text)
+    except ValueError:
+        content = b""
+    tag = content[:_TAG_BYTES]
+    said = _combined(content[_TAG_BYTES:], tag, secret)
+    return _measured(said, names) if hmac.compare_digest(tag, _tag(json.dumps(whose).encode(), said, secret)) else None
+
+
+def sealed_bytes(seconds: float, bytes_per_s: float) -> int:
+    """Return the size of what a recording of so many seconds is sealed into: the same for up to twice the time."""
+    return _FACTS_BYTES + round(bytes_per_s * 2.0 ** math.ceil(math.log2(max(seconds, 1.0))))
+
+
+def seal_file(content: bytes, size: int, secret: bytes) -> bytes:
+    """Return the content of a file, sealed into ``size`` bytes, doubled where they are too few."""
+    said = len(content).to_bytes(_LENGTH_BYTES) + content
+    while size < len(said):
+        size *= 2
+    said = said.ljust(size, b"\0")
+    tag = _tag(MARK, said, secret)
+    return MARK + tag + _in_pieces(said, tag, secret)
+
+
+def open_file(sealed: bytes, secret: bytes) -> bytes | None:
+    """Return the content that `seal_file` sealed; None if it was changed, or was sealed with another secret."""
+    start = len(MARK) + _TAG_BYTES
+    tag = sealed[len(MARK) : start]
+    said = _in_pieces(sealed[start:], tag, secret)
+    if not hmac.compare_digest(tag, _tag(MARK, said, secret)):
+        return None
+    return said[_LENGTH_BYTES:][: int.from_bytes(said[:_LENGTH_BYTES])]
+
+
+def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
+    """Return the columns in a text with a valid tag, without any that a holder of the key has forged."""
+    try:
+        measured = parse_json(said)
+    except ValueError:
+        return {}
+    items = measured.items() if isinstance(measured, dict) else ()
+    return {name: value for name, value in items if name in names and events.holds(name, value)}
+
+
+def _tag(whose: bytes, said: bytes, secret: bytes) -> bytes:
+    tag = hmac.new(secret, whose, "sha256")
+    tag.update(said)  # other threads run meanwhile
+    return tag.digest()[:_TAG_BYTES]
+
+
+def _in_pieces(text: bytes, tag: bytes, secret: bytes) -> bytes:
+    pieces = range(0, len(text), _PIECE_BYTES)
+    return b"".join(_combined(text[at : at + _PIECE_BYTES], tag + at.to_bytes(8), secret) for at in pieces)
+
+
+def _combined(text: bytes, tag: bytes, secret: bytes) -> bytes:
+    stream = hashlib.shake_256(secret + tag).digest(len(text))
+    return (int.from_bytes(text) ^ int.from_bytes(stream)).to_bytes(len(text))
