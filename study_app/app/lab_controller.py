@@ -629,11 +629,18 @@ class LabController(QObject):
             }
         if not bench.blind:  # the ball's size would tell one from the other
             shown["body_radius_m"] = scene.body.diameter_m / 2 / scene.scale
-        pointer = descriptor_of(self.device).pointer
+        described = descriptor_of(self.device)
         return LabView(
             workbench=bench,
             liquids=self.liquids,
-            device=DeviceShown(device_choices(), self.device, state, live is not None and not fault, pointer),
+            device=DeviceShown(
+                device_choices(),
+                self.device,
+                state,
+                ready=live is not None and not fault,
+                pointer=described.pointer,
+                diagnosable=described.doctor is not None,
+            ),
             paths=tuple(TITLES.items()),
             cost=() if costs is None else cost_rows(costs),
             tick_ns=None if costs is None else costs.tick_ns,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Sequence
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,8 +16,8 @@ from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, en
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.session.timing import collecting_here
 from study_app.devices.descriptor import Backend
-from study_app.devices.registry import backends
-from study_app.errors import StoreError
+from study_app.devices.registry import backends, descriptor_of
+from study_app.errors import DeviceError, StoreError
 from study_app.gui.application import application_here, open_here
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog, diagnosis
 from study_app.gui.devices.view import DevicesPlace
@@ -209,13 +210,14 @@ class DevicesController(QObject):
         self._ended = True
         self.looking.wait(min(patience_s, PATIENCE_S))
 
-    def diagnose(self, name: str) -> None:
-        """Open the diagnosis of a device; a serial number that is preferred is taken along."""
+    def diagnose(self, name: str, window: MainWindow | None = None) -> None:
+        """Open the diagnosis of a device over a window, by default the place's; the preferred serial number counts."""
         settings = self._workstation.settings
         asked = settings.device if settings.device.partition(":")[0] == name else name
-        assert self.place is not None  # noqa: S101 - it has just asked
+        over = window or self.place
+        assert over is not None  # noqa: S101 - the place has just asked
         self.end_diagnosis()
-        self.dialog = diagnosis(self.place.window(), self.place.theme, asked, settings)
+        self.dialog = diagnosis(over.window(), over.theme, asked, settings)
         self.dialog.finished.connect(self._forget_dialog)
         self.dialog.show()
 
@@ -415,7 +417,7 @@ class MainController(QObject):
                 "home": self._home,
                 "designer": self.lab_and_designer.make_designer,
                 "results": self._results,
-                "lab": self.lab_and_designer.make_lab,
+                "lab": self._lab,
                 "devices": self.devices.make_place,
                 "machine": self._machine,
                 "help": self._help,
@@ -487,6 +489,15 @@ class MainController(QObject):
         made = self.machine.make_place()
         made.check_asked.connect(self.check_computer)
         return made
+
+    def _lab(self) -> LabPlace:
+        made = self.lab_and_designer.make_lab()
+        made.asked.connect(self._lab_asked)
+        return made
+
+    def _lab_asked(self, what: str, _details: object) -> None:
+        if what == "diagnose" and self.lab_and_designer.lab is not None:
+            self.devices.diagnose(self.lab_and_designer.lab.device, self.window)
 
     def _home(self) -> HomePlace:
         made = HomePlace(self.results, _draft_words)
@@ -593,7 +604,16 @@ class MainController(QObject):
         if live.theme is not self.window.theme:  # it was changed in the cockpit
             self.machine.change({"theme": live.theme.name})
         self.window.come_back()
-        if live.error is not None:
+        if isinstance(live.error, DeviceError) and not live.began:
+            name = live.chosen.device
+            examined = descriptor_of(name).doctor is not None
+            self.window.ask_about_device(
+                "The session did not start",
+                f"{live.error}.",
+                partial(self._start, live.chosen),
+                partial(self.devices.diagnose, name, self.window) if examined else None,
+            )
+        elif live.error is not None:
             title = "The session did not finish" if live.began else "The session did not start"
             self.window.show_message(title, f"{live.error}.")
         elif live.code == BUG:

@@ -110,7 +110,7 @@ class MachineSettings(_Strict):
     recent: Annotated[tuple[Place, ...], Field(max_length=MOST_RECENT, strict=False)] = ()
     theme: Literal["light", "dark"] = "light"
     sound: bool = False
-    photodiode: bool = True
+    photodiode: bool = False
     camera: Annotated[str, Field(max_length=CAMERA_LENGTH)] = ""
     operator: Annotated[str, Field(max_length=40)] = ""
     benches: Annotated[tuple[DeviceBench, ...], Field(strict=False)] = ()

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ from PySide6.QtWidgets import QDialog, QLabel
 from study_app.app.failures import BY_SIGNAL_S
 from study_app.app.main_controller import MainController, home
 from study_app.app.session import live_session
-from study_app.errors import DeviceLost
+from study_app.errors import DeviceLost, DeviceNotFound
+from study_app.gui.widgets.controls import ActionButton
 from study_app.session.start import NewSession
 
 pytestmark = pytest.mark.slow
@@ -98,6 +100,30 @@ def test_a_signal_waits_two_seconds_at_most_for_a_device_that_is_being_opened(
     may_open.set()
     assert took_s < BY_SIGNAL_S + 1.0
     assert visit.code == 128 + 15
+
+
+def test_a_device_that_cannot_be_opened_is_tried_again_or_examined(
+    visit: MainController, monkeypatch: Any, qtbot: Any
+) -> None:
+    tried: list[str] = []
+    examined: list[str] = []
+
+    def missing(name: str, *_settings: Any, **_named: Any) -> None:
+        tried.append(name)
+        raise DeviceNotFound("no Falcon is connected: plug it in")
+
+    monkeypatch.setattr(live_session, "open_rig", missing)
+    monkeypatch.setattr(visit.devices, "diagnose", lambda name, _window: examined.append(name))
+    visit.window.place("home").session_asked.emit(replace(CHOSEN, device="falcon"))
+    for count, words in ((1, "Try again"), (2, "Diagnose …")):
+        qtbot.waitUntil(lambda count=count: len(tried) == count and visit.live is None)
+        notice = visit.window.notice
+        assert notice is not None
+        assert notice.said.text() == "no Falcon is connected: plug it in."
+        button = next(one for one in notice.findChildren(ActionButton) if one.text() == words)
+        qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+        assert not notice.isVisible()
+    assert (tried, examined) == (["falcon", "falcon"], ["falcon"])
 
 
 def test_a_mistake_before_the_first_window_leads_home_again(

@@ -135,7 +135,7 @@ CHANGES: list[tuple[str, Any]] = [
     ("change", {"screen_width_mm": 500.0}), ("operator", "AK"), ("operator", ""), ("operator", "AK"),
     ("protocol", Path("/studies/a.toml")), ("protocol", Path("/studies/a.toml")), ("protocol", Path("/studies/b.toml")),
     ("change", {"device": "falcon"}), ("change", {"firmware": "/there/firmware.bin"}), ("change", {"theme": "dark"}),
-    ("change", {"sound": True}), ("change", {"photodiode": False}), ("measured", (23.5, 1.2, "photodiode", "DP-1")),
+    ("change", {"sound": True}), ("change", {"photodiode": True}), ("measured", (23.5, 1.2, "photodiode", "DP-1")),
     ("change", {"triggers": "serial:COM3"}), ("change", {"camera": "tcp://127.0.0.1:5000"}),
     ("change", {"lsl_markers": True}), ("change", {"lsl_samples": "always"}),
     ("change", {"workspace": "/elsewhere"}), *[("undo", None)] * 15,
@@ -226,7 +226,7 @@ class Live(QObject):
 
     def __init__(self, chosen: NewSession, theme: Any, *, asks: bool) -> None:
         super().__init__()
-        self.theme = theme
+        self.theme, self.chosen = theme, chosen
         self.done.append(f"session of {chosen.participant} {theme.name} {asks}")
 
     def open(self) -> None:

@@ -135,7 +135,7 @@ SETTINGS: Actions = {
     "screen gone": of_settings("screen", screen="HDMI-7", screen_number=2, viewing_distance_mm=900.0),
     "first screen": of_settings(screen="eDP-1", screen_number=1, theme="dark", sound=True, device="falcon"),
     "outlets": of_settings(lsl_markers=True, lsl_samples="always", triggers="serial:COM3", camera="tcp://127.0.0.1:5"),
-    "offset": of_settings(display_offset=DisplayOffset(mean_ms=23.5, spread_ms=1.25, screen="DP-1"), photodiode=False),
+    "offset": of_settings(display_offset=DisplayOffset(mean_ms=23.5, spread_ms=1.25, screen="DP-1"), photodiode=True),
     "offset of another": of_settings(display_offset=DisplayOffset(mean_ms=23.5, screen="HDMI-1")),
     "offset refused": in_turn(typed("offset.editors.mean.control", "900"), clicked("offset.keep")),
     "offset kept": in_turn(typed("offset.editors.mean.control", "20"), clicked("offset.keep", "offset.forget")),

@@ -307,6 +307,18 @@ class MainWindow(QMainWindow):
         """Say what went wrong, with one button; what the place ``of`` has said is closed when one leaves it."""
         self._show_notice(Question(self, self.theme, title, sentence), of)
 
+    def ask_about_device(
+        self, title: str, sentence: str, again: Callable[[], object], diagnose: Callable[[], object] | None
+    ) -> None:
+        """Say that a device failed, and offer to try again, and to examine it, where it can be."""
+        go_on = ActionButton("repeat", "Try again", role="primary")
+        other = None if diagnose is None else ActionButton("pulse", "Diagnose …")
+        if other is not None and diagnose is not None:
+            other.clicked.connect(diagnose)
+        notice = Question(self, self.theme, title, sentence, go_on, back="Close", other=other)
+        notice.accepted.connect(again)
+        self._show_notice(notice)
+
     def _show_notice(self, notice: Question, of: str = "") -> None:
         notice.finished.connect(notice.deleteLater)
         self.notice, self._notice_of = notice, of

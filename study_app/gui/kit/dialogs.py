@@ -35,6 +35,7 @@ class Question(QDialog):
     ----------
     go_on : the button of the step that goes on
     back : the words on the way back
+    other : a button of another step, which closes the question, too
     fields : what is asked
     needs : what is said where one of these fields is empty
     warning : what is said below the explanation, with a sign
@@ -51,6 +52,7 @@ class Question(QDialog):
         go_on: ActionButton | None = None,
         *,
         back: str = "Cancel",
+        other: ActionButton | None = None,
         fields: Iterable[Field] = (),
         needs: Mapping[str, str] = NOTHING,
         warning: str = "",
@@ -72,13 +74,19 @@ class Question(QDialog):
         self.back.setAutoDefault(False)
         self.back.clicked.connect(self.reject)
         self.back.setHidden(go_on is None)
+        if other is not None:
+            other.setAutoDefault(False)
+            other.clicked.connect(self.reject)
         self.said = label(explanation, "body", "text2", wraps=True)
         self.said.setMinimumWidth(420)
         warns = QWidget()
         sign = Icon("warning", "warn", 20), 0, Qt.AlignmentFlag.AlignTop
         hbox(sign, (label(warning, "label", "warn", wraps=True), 1), spacing=10, margins=0, parent=warns)
         warns.setVisible(bool(warning))
-        asked, foot = (*self.editors.values(), self.missing), hbox(self.back, STRETCH, self.go_on)
+        asked, foot = (
+            (*self.editors.values(), self.missing),
+            hbox(self.back, STRETCH, *([other] if other else []), self.go_on, spacing=10),
+        )
         parts: tuple[Part, ...] = (
             label(title, "title_dense"),
             self.said,

@@ -106,7 +106,7 @@ class ErrorRow:
 class DeviceShown:
     """Which devices can be chosen, which is, and how it is: ``state`` is one or two words.
 
-    ``pointer`` is whether the window's pointer moves it.
+    ``pointer`` is whether the window's pointer moves it, ``diagnosable`` whether it can be examined.
     """
 
     choices: Choices
@@ -114,6 +114,7 @@ class DeviceShown:
     state: str = ""
     ready: bool = True
     pointer: bool = False
+    diagnosable: bool = False
 
 
 @dataclass(frozen=True, slots=True)

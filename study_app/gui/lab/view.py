@@ -130,6 +130,7 @@ class LabPlace(Place):
             (form.copy.clicked, "copy"),
             (self.note.fade_in.clicked, "fade in"),
             (self.note.cancel.clicked, "cancel"),
+            (self.note.diagnose.clicked, "diagnose"),
             (estimate.apply.clicked, "apply"),
         ):
             pressed.connect(lambda *_checked, what=what: self.ask(what))

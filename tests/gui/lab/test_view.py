@@ -84,6 +84,19 @@ def test_the_mouse_moves_the_ball_from_a_click_to_the_next_and_only_while_it_lea
         assert not place.tank.pointer.held
 
 
+def test_a_device_that_failed_is_tried_again_or_examined(place: Any, still: LabView) -> None:
+    asked: list[str] = []
+    place.asked.connect(lambda what, _details: asked.append(what))
+    lost = dataclasses.replace(still.device, state="stopped", diagnosable=True)
+    place.show_view(dataclasses.replace(still, device=lost, trouble="the Falcon is gone", force_on=False))
+    for button in (place.note.fade_in, place.note.diagnose):
+        QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert (place.note.fade_in.text(), asked) == ("Try again", ["fade in", "diagnose"])
+    lost = dataclasses.replace(lost, diagnosable=False)
+    place.show_view(dataclasses.replace(still, device=lost, trouble="the mouse is gone", force_on=False))
+    assert not place.note.diagnose.isVisible()
+
+
 def test_escape_and_leaving_give_the_pointer_back(place: Any, still: LabView) -> None:
     place.show_view(still)
     place.tank.setFocus()
