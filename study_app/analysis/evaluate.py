@@ -116,13 +116,13 @@ def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[s
 
     ``tell`` receives the name of each finding that is begun.
     """
-    block = answers.block
+    block, own = answers.block, study is not None and study.own_codes
     found = summarize_block(study, answers)
     for finding in all_findings():
         if not finding.what:
             continue
-        if block.kind not in (finding.kinds if block.revealed else finding.sealed):
-            if not block.revealed and block.kind in finding.waits:
+        if block.kind not in (finding.kinds if block.revealed else () if own else finding.sealed):
+            if not block.revealed and block.kind in (*finding.waits, *(finding.sealed if own else ())):
                 found = replace(found, absent=(*found.absent, NotTested(finding.what, SEALED)))
             continue
         tell(finding.what)
@@ -173,9 +173,9 @@ def _measured(block: Block, code: str | None, delay_ms: float | None, rows: pd.D
 def orders(study: Study) -> dict[str, Evenness]:
     """Return how even the orders of trials were, as run (block id → counts), excluded trials included.
 
-    Of a merged study that is sealed nothing is known, since each site has codes of its own.
+    Nothing is known of a sealed study where each site or each participant has codes of its own.
     """
-    if study.sites and not study.revealed:
+    if study.own_codes or (study.sites and not study.revealed):
         return {}
     here = study.participants.loc[study.participants["counted"], ["participant", "session"]]
     rows = study.trials[study.trials["phase"] == "main"].merge(here, on=["participant", "session"])

@@ -30,6 +30,7 @@ def _later(table: type[Table]) -> list[str]:
 
 
 NEW_KEYS: Final = (
+    "study.codes",
     "study.credits",
     "questionnaires.*.instrument",
     "questionnaires.*.scores",

@@ -99,6 +99,11 @@ class StudyHead(Table):
         description="double: neither participant nor operator knows the condition; single: the operator sees force and "
         "wake while the session runs, the participant does not know the condition.",
     )
+    codes: Literal["study", "participant"] = later(
+        default="study",
+        description="study: a code means the same for everybody; participant: until unblinding files give each "
+        "participant own codes.",
+    )
     credits: Credits | None = later(default=None, description="Authors, licence and citation that exports state.")
 
 

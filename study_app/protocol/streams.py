@@ -17,7 +17,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import random
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias, TypeVar
 
@@ -77,6 +77,13 @@ def sub_key(secret: bytes, name: str) -> bytes:
 def secret_stream(secret: bytes, name: str) -> random.Random:
     """Return the stream of that name; use only its ``.random()``."""
     return random.Random(int.from_bytes(sub_key(sub_key(secret, "levels"), name), "big"))  # noqa: S311 - seeded by a MAC
+
+
+def own_code(codes: Sequence[str], secret: bytes, participant: str, block: str, code: str) -> str:
+    """Return a participant's own code of what ``code`` stands for; ``codes`` are those of the block, in any order."""
+    known = sorted(codes)
+    mixed = shuffle(known, secret_stream(secret, f"codes/{participant}/{block}").random)
+    return mixed[known.index(code)]
 
 
 def group_of(shares: Mapping[str, int], secret: bytes, entry: int) -> str:

@@ -231,6 +231,11 @@ class Study:
         """Whether the key was opened, so that settings have names."""
         return bool(self.settings)
 
+    @property
+    def own_codes(self) -> bool:
+        """Whether a code means another setting for each participant, since the key is sealed."""
+        return not self.revealed and self.protocol.get("study", {}).get("codes") == "participant"
+
     def tell_doubts(self, warn: Callable[[str], object] | None) -> None:
         """Warn, in one line per file, of every file that differs from its recorded state."""
         if warn is None:

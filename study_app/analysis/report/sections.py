@@ -95,6 +95,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "The key is sealed: settings are codes, and only counts and comparisons without an order are shown. Who "
             "decides by them to go on or to stop makes chance findings likelier."
         )
+        if study.own_codes:
+            yield "Each participant has own codes until the key is open, so settings are not compared."
         if study.sites:
             yield (
                 "Each site has a key of its own: until the keys of all sites are open, the code of a setting begins "

@@ -258,7 +258,9 @@ def _track(session: Session, progress: Progress) -> tuple[str, ...]:
         return ()
     design = design_of(session.protocol, session.protocol.blocks[trial.block])
     names = words(session.language).design_answers
-    return track_words(progress, session.schedule, trial, {one: names[one] for one in design.answers})
+    told = track_words(progress, session.schedule, trial, {one: names[one] for one in design.answers})
+    own = session.protocol.study.codes == "participant"
+    return (told[0].replace(f" {trial.code}:", ":", 1), *told[1:]) if own else told
 
 
 def _state(progress: Progress, *, force_on: bool, trouble: str) -> State:

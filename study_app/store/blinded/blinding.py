@@ -32,7 +32,7 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import resolve
 from study_app.protocol.model import Protocol, SceneDefaults, StudyLiquid
 from study_app.protocol.orders.schedule import block_codes, draw_key
-from study_app.protocol.streams import draw_secret, group_of
+from study_app.protocol.streams import draw_secret, group_of, own_code
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
 from study_app.store.blinded.sealing import open_text, seal
@@ -394,6 +394,10 @@ def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
 
 def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> events.Event:
     """Return an event as the journal of a session that began with ``start`` holds it."""
+    if start.own_codes and isinstance(event, events.TrialStarted):
+        own = own_code(list(key.codes[event.block]), key.nonce, start.participant, event.block, event.code)
+        text = seal([*_whose(start, event), "code"], {"code": event.code}, key.nonce)
+        event = replace(event, code=own, sealed_code=text)
     line, names = event.line(), _SEALED_IN.get(type(event), frozenset())
     measured = {name: value for name, value in line.items() if name in names}
     if not start.measures_sealed or not measured:
@@ -431,16 +435,20 @@ def opened_key(folder: StudyFolder) -> Key | None:
 
 
 def _opened(start: events.SessionStarted, line: events.Event, key: Key) -> events.Event:
-    text = getattr(line, "sealed", None)
-    if text is None:
-        return line
-    measured = open_text(_whose(start, line), text, key.nonce, _SEALED_IN.get(type(line), frozenset()))
-    if measured is None:
-        raise StoreError(
-            f"line {line.n} of the journal cannot be decrypted with the study's key: it was changed; restore it "
-            "from a copy"
-        )
-    return events.read_event({**line.line(), **measured, "sealed": None})
+    found: dict[str, Any] = {}
+    for name, more, names in (
+        ("sealed", [], _SEALED_IN.get(type(line), frozenset())),
+        ("sealed_code", ["code"], frozenset({"code"})),
+    ):
+        if (text := getattr(line, name, None)) is None:
+            continue
+        if (measured := open_text([*_whose(start, line), *more], text, key.nonce, names)) is None:
+            raise StoreError(
+                f"line {line.n} of the journal cannot be decrypted with the study's key: it was changed; restore it "
+                "from a copy"
+            )
+        found |= {**measured, name: None}
+    return events.read_event({**line.line(), **found}) if found else line
 
 
 def _whose(start: events.SessionStarted, line: Any) -> list[object]:

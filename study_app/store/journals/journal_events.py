@@ -248,7 +248,10 @@ class EndOfTask(OfAttempt, group=True):
 
 
 class SessionStarted(Event):
-    """The session began: always the first line; `measures_sealed` says whether sealed columns are encrypted."""
+    """The session began: always the first line.
+
+    `measures_sealed` says whether sealed columns are encrypted, `own_codes` whether codes are the participant's own.
+    """
 
     format: Integer | None = None
     participant: ParticipantId
@@ -267,6 +270,7 @@ class SessionStarted(Event):
     device: Text | None
     limits: Numbers
     measures_sealed: Flag | None = None
+    own_codes: Flag | None = None
     protocol_format: Integer | None = None
     intervals: Flag | None = None
     entry: Integer | None = None
@@ -322,7 +326,10 @@ class LanguageChosen(Event):
 
 
 class TrialStarted(OfAttempt):
-    """A trial was presented; with a design `sealed` contains level, standard, arrangement and catch, encrypted."""
+    """A trial was presented; with a design `sealed` contains level, standard, arrangement and catch, encrypted.
+
+    `sealed_code` contains the code that is the same for everybody, where `code` is the participant's own.
+    """
 
     block: Text
     phase: Text
@@ -335,6 +342,7 @@ class TrialStarted(OfAttempt):
     arrangement: Text | None = None
     catch: Any = None
     sealed: Text | None = None
+    sealed_code: Text | None = None
 
     @property
     def has_intervals(self) -> bool:

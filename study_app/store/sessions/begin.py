@@ -174,6 +174,7 @@ def first_records(
         device=start.device.get("name"),
         limits=limits,
         measures_sealed=measures_sealed,
+        own_codes=True if measures_sealed and protocol.study.codes == "participant" else None,
         protocol_format=protocol.format if protocol.format > 1 else None,
         intervals=True if any(block.design is not None for block in protocol.blocks.values()) else None,
         entry=None if allocation is None else allocation.entry,

@@ -53,7 +53,7 @@ def reproduced(session_folder: Path) -> Reproduced:
     try:
         protocol = own_protocol(whole_protocol(ran["protocol"], key), _group(lines, key), ran["session"])
         schedule = build_schedule(protocol, participant, seed, row_of)
-        recorded = recorded_trials(lines)
+        recorded = recorded_trials(opened(lines, key) if lines and events.start_of(lines).own_codes else lines)
     except (KeyError, TypeError, AttributeError, ValueError):  # the reason could reveal a condition
         raise StoreError(
             f"{folder.path}: receipt, key and journal do not give the session: verify the study's folder"

@@ -1,0 +1,61 @@
+"""A study whose participants have codes of their own until it is unblinded."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.evaluate import evaluate
+from study_app.protocol.source.files import source_bytes
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.journals.journal_events import TrialStarted
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+from tests.studies import made_up
+
+PEOPLE = 8
+pytestmark = pytest.mark.slow
+
+
+def held(folder: Path, codes: str) -> Path:
+    text = source_bytes("demo").decode().replace("format = 1", "format = 2", 1)
+    study = folder / f"{codes}.toml"
+    study.write_text(text.replace("[study]", f'[study]\ncodes = "{codes}"', 1), encoding="utf-8")
+    return rehearse_answers(study, participants=PEOPLE, seed=3, results=folder / codes, features=made_up("demo"))
+
+
+def test_one_look_at_a_condition_tells_nothing_of_other_participants(tmp_path: Path) -> None:
+    folder, same = held(tmp_path, "participant"), held(tmp_path, "study")
+    key = read_key(folder)
+    meant: dict[str, set[str]] = {}
+    for session in StudyFolder(folder).sessions():
+        lines = journal.read(session.journal)
+        for line, whole in zip(lines, opened(lines, key), strict=True):
+            if isinstance(line, TrialStarted) and isinstance(whole, TrialStarted) and line.block == "delays":
+                meant.setdefault(line.code, set()).add(key.condition(whole.block, whole.code))
+        found = reproduced(session.path)
+        assert found.differences == []
+    assert meant == {"D1": {"prompt", "late"}, "D2": {"prompt", "late"}}
+    assert verify(folder).errors == ()
+
+    blinded, usual = (evaluate(load_study(one)) for one in (folder, same))
+    assert [dict(block.findings) for block in blinded.blocks] == [{}, {}]
+    assert all(block.findings for block in usual.blocks)
+
+    for one in (folder, same):
+        assert unblind(one, by="AB", reason="a test").left == ()
+        assert verify(one).errors == ()
+    assert coded(folder) == coded(same)
+
+
+def coded(folder: Path) -> list[tuple[str, ...]]:
+    """Return what the tables say was presented to whom, and answered."""
+    names = ("participant", "trial", "block", "code", "item", "response")
+    paths = sorted(folder.rglob("*_description-responses_data.csv"))
+    rows = (row for path in paths for row in csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+    return [tuple(row[name] for name in names) for row in rows]
