@@ -11,6 +11,7 @@ from study_app.protocol.table import Id, Localised, Table, invalid
 
 Phase: TypeAlias = Literal["main", "practice", "baseline"]
 Order: TypeAlias = Literal["fixed", "shuffled", "constrained", "williams", "latin"]
+OrderOfBlocks: TypeAlias = Literal["fixed", "balanced", "random"]
 Compared: TypeAlias = Literal["liquids", "delays", "views"]
 Kind: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_]*$", max_length=MAX_ID)]
 

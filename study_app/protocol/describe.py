@@ -16,6 +16,7 @@ from study_app.protocol.checks.expected_precision import precision_rows
 from study_app.protocol.checks.warnings import warnings
 from study_app.protocol.groups import sessions_differ
 from study_app.protocol.model import Block, Condition, Limits, Protocol
+from study_app.protocol.orders.balance import block_order_words
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
 from study_app.protocol.orders.sequences import row_count
@@ -148,7 +149,8 @@ def _session(one: Variant, language: str) -> Iterable[str]:
             kind, trials = f"{block.phase} trials", counted(order_of(protocol, block).trials, "trial")
             words = f"{protocol.text(block.title, language)}: {trials}"
         rows.append((f"{number:>2}", kind, words))
-    return _titled(title, rows)
+    several = len(protocol.main_blocks) > 1
+    return (*_titled(title, rows), *((f"  Order of blocks: {block_order_words(protocol)}",) if several else ()))
 
 
 def _block(protocol: Protocol, block: Block, language: str, delay_ticks: int) -> Iterable[str]:

@@ -32,6 +32,7 @@ def _later(table: type[Table]) -> list[str]:
 NEW_KEYS: Final = (
     "study.codes",
     "study.credits",
+    "study.block_order",
     "questionnaires.*.instrument",
     "questionnaires.*.scores",
     "questionnaires.*.items.*.kind",

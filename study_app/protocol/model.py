@@ -23,7 +23,7 @@ from study_app.haptics.model.scene import (
     Scene,
     SceneScale,
 )
-from study_app.protocol.blocks import Block, Compared, Kind
+from study_app.protocol.blocks import Block, Compared, Kind, OrderOfBlocks
 from study_app.protocol.groups import Group, Sequences, Steps, every_step
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
@@ -103,6 +103,12 @@ class StudyHead(Table):
         default="study",
         description="study: a code means the same for everybody; participant: until unblinding files give each "
         "participant own codes.",
+    )
+    block_order: OrderOfBlocks = later(
+        default="fixed",
+        description="Order of blocks, of the main ones, which take each other's places; pages, forms and practice "
+        "stay. fixed: as written; balanced: counterbalanced, in rows of a Williams design by the number in the "
+        "participant's id; random: drawn in each session.",
     )
     credits: Credits | None = later(default=None, description="Authors, licence and citation that exports state.")
 
@@ -455,8 +461,9 @@ class Protocol(Table):
 
     @property
     def assigns_rows(self) -> bool:
-        """Whether a block is in the order of a square, whose rows are assigned to participants."""
-        return any(block.order in ("williams", "latin") for block in self.blocks_in_order)
+        """Whether blocks, or trials of one, are in the order of a square, whose rows are assigned to participants."""
+        squares = any(block.order in ("williams", "latin") for block in self.blocks_in_order)
+        return squares or self.study.block_order == "balanced"
 
     @property
     def forms(self) -> dict[str, Questionnaire]:

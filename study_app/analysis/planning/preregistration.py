@@ -20,6 +20,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.model import Analysis, Protocol
+from study_app.protocol.orders.balance import block_order_words
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
 from study_app.protocol.trials.stimuli import assumed_for
@@ -265,6 +266,8 @@ def _design(protocol: Protocol) -> Iterator[str]:
     if protocol.groups:
         shares = ", ".join(f"{name} (share {group.share})" for name, group in protocol.groups.items())
         yield f"Participants are allocated at random, in permuted blocks, to the groups {shares}."
+    if len(protocol.main_blocks) > 1:
+        yield f"Order of blocks {block_order_words(protocol)}."
     yield "Orders are drawn for each participant from the session's seed, as described for each block below."
     for block in protocol.main_blocks:
         rows = dict(precision_rows(protocol, block))

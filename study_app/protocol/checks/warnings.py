@@ -236,8 +236,27 @@ def _unanswerable(protocol: Protocol) -> Iterator[str]:
             "analysis.participants: is missing: a study that ends at the first significant result has more false "
             "positives than alpha"
         )
+    yield from _order_of_blocks(protocol)
     for number, one in enumerate(() if decided is None else decided.published):
         yield from _not_bracketed(protocol, number, one)
+
+
+def _order_of_blocks(protocol: Protocol) -> Iterator[str]:
+    """Yield contrasts of blocks that come in one order, and blocks that stay while others take their places."""
+    for number, one in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts):
+        if len(one.blocks) == 2 and protocol.study.block_order == "fixed" and not protocol.groups:
+            yield (
+                f"analysis.contrasts.{number}: all participants have {' and '.join(one.blocks)} in one order: their "
+                'difference cannot be told from practice and fatigue: choose study.block_order = "balanced"'
+            )
+    blocks = protocol.blocks_in_order
+    main = [at for at, block in enumerate(blocks) if block.phase == "main"]
+    for block in blocks[main[0] : main[-1]] if main and protocol.study.block_order != "fixed" else ():
+        if block.phase != "main":
+            yield (
+                f"study.block_order: block {block.id} ({block.phase}) stays in its place while the main blocks change: "
+                "put it before the first of them"
+            )
 
 
 def _of_conditions(protocol: Protocol, block: Block) -> Iterator[str]:

@@ -14,9 +14,9 @@ from typing import TypeAlias
 
 from study_app.errors import StudyError
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import CodeOrder, orders_of
+from study_app.protocol.orders.block_orders import CodeOrder, Orders, orders_of
 from study_app.protocol.orders.durations import variants
-from study_app.protocol.orders.schedule import codes_of
+from study_app.protocol.orders.schedule import blocks_in_order, codes_of
 from study_app.protocol.orders.sequences import borders_even, enrolment, longest_run, row_count, shortest_distance
 from study_app.protocol.streams import draw_secret, group_of, stream
 
@@ -124,6 +124,10 @@ def balance(protocol: Protocol, participants: Sequence[str], seed: int, session:
             title = protocol.text(protocol.blocks[block.id].title, protocol.study.languages[0])
             counted = evenness(block.codes, [codes_of(orders.study, block, who, seed) for who in participants])
             blocks.append(BlockBalance(block.id, title, block.order, block.repetitions, counted, unnumbered))
+    if orders.block_order != "fixed":
+        order: CodeOrder = "williams" if orders.block_order == "balanced" else "shuffled"
+        of_blocks = _of_blocks(orders, participants, seed)
+        blocks.append(BlockBalance("", "The main blocks", order, 1, of_blocks, unnumbered))
     return Balance(orders.study, session, len(participants), seed, tuple(blocks))
 
 
@@ -141,6 +145,33 @@ def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iter
             yield balance(one.protocol, own, seed, one.name)
 
 
+def block_order_words(protocol: Protocol) -> str:
+    """Return in which order the main blocks of a session come, and how even it is for the planned participants."""
+    orders, planned = orders_of(protocol), None if protocol.analysis is None else protocol.analysis.participants
+    blocks = sum(block.phase == "main" for block in orders.blocks)
+    if orders.block_order == "fixed":
+        return "fixed: everybody has them in this order"
+    if orders.block_order == "random":
+        of = "" if planned is None else f": {planned / blocks:.3g} of {planned} participants have a block in a place"
+        return f"random: drawn in each session, even on average only{of}"
+    found = _of_blocks(orders, numbered(planned), 1) if planned is not None else None
+    rows = row_count("williams", blocks)
+    words = f"balanced: {rows} orders, by the number in the participant's id"
+    if found is None or planned is None:
+        return f"{words}; any multiple of {rows} participants is even"
+    times = _range([count for line in found.positions for count in line])
+    even = f"{_times(found.positions[0][0])}" if found.positions_even else times
+    more = "" if found.balanced else f"; {planned + -planned % rows} would be even"
+    return f"{words}; {planned} participants have each block in each place {even}{more}"
+
+
+def _of_blocks(orders: Orders, participants: Sequence[str], seed: int) -> Evenness:
+    """Return how even the orders of the main blocks are."""
+    names = [block.id for block in orders.blocks if block.phase == "main"]
+    shown = (blocks_in_order(orders, who, seed) for who in participants)
+    return evenness(names, ([names[number] for number in one] for one in shown))
+
+
 def describe_balance(judged: Balance) -> str:
     """Return the tables of every block, and what they mean."""
     people = "1 participant" if judged.participants == 1 else f"{judged.participants} participants"
@@ -154,7 +185,10 @@ def describe_balance(judged: Balance) -> str:
 def _section(block: BlockBalance) -> Iterator[str]:
     counted = block.evenness
     times = "" if block.repetitions == 1 else f", each {block.repetitions} times"
-    yield f"{block.title} (block {block.id}): {len(counted.codes)} codes{times}, order {block.order}"
+    if block.id:
+        yield f"{block.title} (block {block.id}): {len(counted.codes)} codes{times}, order {block.order}"
+    else:
+        yield f"{block.title}: {'balanced' if block.order == 'williams' else 'random'}"
     yield ""
     yield from _table("position", range(1, len(counted.positions) + 1), counted.codes, counted.positions)
     yield ""

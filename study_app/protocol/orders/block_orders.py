@@ -6,7 +6,7 @@ from typing import Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict
 
-from study_app.protocol.blocks import Block, Order, Phase
+from study_app.protocol.blocks import Block, Order, OrderOfBlocks, Phase
 from study_app.protocol.groups import Group, every_step, follows
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.trials.methods import TrackOrder
@@ -59,10 +59,14 @@ class FormOrder:
 
 @dataclass(frozen=True, slots=True)
 class Orders:
-    """A study as scheduling sees it: page ids, blocks and forms in the order of the session."""
+    """A study as scheduling sees it: page ids, blocks and forms in the order of the session.
+
+    ``block_order`` says how the main blocks take each other's places.
+    """
 
     study: str
     steps: tuple[str | BlockOrder | FormOrder, ...]
+    block_order: OrderOfBlocks = "fixed"
 
     @property
     def blocks(self) -> tuple[BlockOrder, ...]:
@@ -90,7 +94,8 @@ def orders_of(protocol: Protocol) -> Orders:
         name: FormOrder(name, **_items(form)) for name, form in protocol.forms.items()
     }
     steps |= {name: order_of(protocol, block) for name, block in protocol.blocks.items()}
-    return Orders(protocol.study.name, tuple(steps.get(step, step) for step in protocol.steps))
+    in_order = tuple(steps.get(step, step) for step in protocol.steps)
+    return Orders(protocol.study.name, in_order, protocol.study.block_order)
 
 
 def order_of(protocol: Protocol, block: Block) -> BlockOrder:

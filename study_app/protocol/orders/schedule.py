@@ -16,13 +16,16 @@ blocked         of a block with a design: one track after another, in random ord
                 "order/PARTICIPANT/BLOCK"
 williams latin  a row of a square, assigned by the number in the participant's id, not by the seed (`sequences`)
 ==============  ========================================================================================================
+
+Main blocks take each other's places in a row of a square if their order is balanced, and in an order from stream
+"blocks/PARTICIPANT" if it is random.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from study_app.protocol.blocks import Phase
@@ -116,7 +119,7 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, row
     orders = orders_of(protocol) if isinstance(protocol, Protocol) else protocol
     steps: list[Step] = []
     number, after, times = 1, None, Counter[str]()
-    for step in orders.steps:
+    for step in _placed(orders, participant, seed, row_of):
         if isinstance(step, str):
             steps.append(PageStep(step))
             continue
@@ -135,6 +138,30 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, row
             if step.break_page and step.break_every and index < step.trials and index % step.break_every == 0:
                 steps.append(PageStep(step.break_page))
     return Schedule(participant, seed, tuple(steps))
+
+
+def _placed(
+    orders: Orders, participant: str, seed: int, row_of: str | None
+) -> tuple[str | BlockOrder | FormOrder, ...]:
+    """Return the steps with the main blocks in the participant's order; each takes the part of its place."""
+    places = [at for at, step in enumerate(orders.steps) if isinstance(step, BlockOrder) and step.phase == "main"]
+    steps = list(orders.steps)
+    for at, number in zip(places, blocks_in_order(orders, participant, seed, row_of), strict=True):
+        there, block = orders.steps[at], orders.steps[places[number]]
+        if isinstance(there, BlockOrder) and isinstance(block, BlockOrder):
+            steps[at] = replace(block, part=there.part)
+    return tuple(steps)
+
+
+def blocks_in_order(orders: Orders, participant: str, seed: int, row_of: str | None = None) -> tuple[int, ...]:
+    """Return the numbers (from 0, as written) of the main blocks of a session in the order of ``participant``."""
+    count = sum(block.phase == "main" for block in orders.blocks)
+    if orders.block_order == "random":
+        return shuffle(range(count), stream(seed, f"blocks/{participant}").random)
+    if orders.block_order == "fixed" or count < 2:
+        return tuple(range(count))
+    taken = assigned_row(orders.study, "block order", row_count("williams", count), row_of or participant)
+    return row("williams", count, taken)
 
 
 def codes_of(study: str, block: BlockOrder, participant: str, seed: int, row_of: str | None = None) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """A study with every kind of question, from its rehearsal to tables, verification, export, SPSS and report."""
 
 import shutil
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -82,8 +83,9 @@ def test_results_window_is_told_of_every_figure(folder: Path) -> None:
     assert not any("comment" in name for name in drawn)  # texts are not drawn
 
 
-@pytest.mark.parametrize("grouped", [False, True])
-def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, grouped: bool) -> None:
+@pytest.mark.parametrize("order", ["fixed", "balanced", "random", "groups"])
+def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, order: str) -> None:
+    grouped = order == "groups"
     orders = [["load", "stir", "usability", "load", "again", "load"], ["again", "load", "stir", "load"]]
     groups = "".join(f"[groups.g{n}]\nsequence = {order}\n" for n, order in enumerate(orders)) if grouped else ""
     again = '[blocks.again]\nquestionnaire = "after"\nconditions = ["thin", "thick"]\n'
@@ -92,10 +94,18 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, grou
     sequence = (old, "" if grouped else f"sequence = {orders[0]}"), (last, f"{last}\n{again}{groups}")
     felt = {(block, name): (TrialFeatures(1.0, 4.0, 0.1, 0.02, 0.03, 0.0),) for block in ("stir", "again")
             for name in ("thin", "thick")}  # fmt: skip
-    protocol = mixed_file(tmp_path, *sequence)
+    name = 'name = "mixed"'
+    named = (name, name if grouped else f'{name}\nblock_order = "{order}"')
+    protocol = mixed_file(tmp_path, *sequence, named)
     folder = rehearse_answers(protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=felt)
     assert verify(folder).errors == ()
+    assert [reproduced(session.path).differences for session in StudyFolder(folder).sessions()] == [[]] * PEOPLE
     study = load_study(folder)
+    began = study.trials.sort_values("trial").groupby("participant").first()
+    assert set(began["part"]) == {1}
+    firsts = Counter(began["block"])
+    counts = {"fixed": [PEOPLE], "balanced": [PEOPLE // 2] * 2, "groups": [PEOPLE // 2] * 2}
+    assert list(firsts.values()) == counts[order] if order in counts else len(firsts) == 2
     first = PEOPLE // 2 if grouped else PEOPLE
     n = {"At the start": first, "After Stir": PEOPLE, "After Again": PEOPLE}
     results = evaluate(study)
