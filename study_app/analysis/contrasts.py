@@ -20,7 +20,7 @@ from study_app.analysis.levels.statistic import LevelStatistic
 from study_app.analysis.levels.thresholds import Exponents, Thresholds
 from study_app.analysis.report.html_page import heading, paragraph, table_of
 from study_app.analysis.results import ContrastResult, LevelsResult, Results, interval, number, p_equals, p_value
-from study_app.analysis.statistics.outcome import Interval, holm
+from study_app.analysis.statistics.outcome import SIDES, Interval, holm
 from study_app.protocol.model import Contrast
 
 STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
@@ -55,7 +55,7 @@ def _tested(
     study: Study, one: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
 ) -> tuple[Any, tuple[np.ndarray[Any, Any], ...]]:
     """Return the test (None: there is none), and the differences within people or the numbers of both groups."""
-    side = {"higher": "greater", "lower": "less", None: "two-sided"}[one.expected]
+    side = SIDES[one.expected]
     if one.groups is not None:
         values = _values(one, one.blocks[0], None, answers, levels)
         members = group_members(study)

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, TypeAlias, TypeVar
 
 from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynamics, Setting
 from study_app.analysis.data.motion import Performance
-from study_app.analysis.statistics.equivalence import UNSEEN, UNSEEN_EQUAL, Equivalence, fewest
+from study_app.analysis.statistics.equivalence import UNSEEN, Equivalence, fewest
 from study_app.analysis.statistics.outcome import Interval, Outcome
 from study_app.protocol.model import Contrast, Published
 from study_app.protocol.orders.balance import Evenness
@@ -397,28 +397,27 @@ def said_of_presentations(found: BlockResult) -> tuple[str, ...]:
         often = f"{most}" if fewest == most else f"{fewest} to {most}"
         lines.append(
             f"A participant answered each statement {often} times for one {settings_noun(found)}: tests of ranks, of "
-            "equivalence and of recognition take the median of these answers; the mixed model and the detection "
-            "threshold take every single one."
+            "equivalence and of recognition take the median of these answers; the detection threshold takes every "
+            "single one."
         )
     if len(found.sessions) > 1:
         lines.append(
-            f"The answers are of sessions {listed(list(map(str, found.sessions)))}, which are compared with each other "
-            "and are a factor of the mixed model; the other tests pool them."
+            f"The answers are of sessions {listed(list(map(str, found.sessions)))}, which are compared with each "
+            "other; the other tests pool them."
         )
     return tuple(lines)
 
 
 def least(alpha: float) -> str:
     """Return how many participants equivalence needs at least."""
-    return f"at least {fewest(alpha)} participants ({fewest(alpha, equal=True)} where all differences are equal)"
+    return f"at least {fewest(alpha)} participants"
 
 
 def enough(alpha: float) -> str:
     """Return how many participants equivalence needs at least, and why."""
-    one_in, one_in_equal = (NUMBERS[round(1 / share)] for share in (UNSEEN, UNSEEN_EQUAL))
     return (
         f"{least(alpha)}: more than {percent(alpha)} of smaller samples contain no one from a group of one person in "
-        f"{one_in} (one in {one_in_equal})"
+        f"{NUMBERS[round(1 / UNSEEN)]}"
     )
 
 
@@ -428,6 +427,7 @@ def test_name(outcome: Outcome) -> str:
         "Friedman": "Friedman's test",
         "Wilcoxon signed ranks": "Wilcoxon's signed ranks",
         "trend over participants": "the test of a trend over participants",
+        "linear mixed model": "a linear mixed model",
     }.get(outcome.test, outcome.test)
 
 

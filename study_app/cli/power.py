@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from study_app.cli.options import EXIT_CANCELLED, FILE, ShowProgress, Target, executor_for, progress, takes_workers
 from study_app.workers.executors import Workers
@@ -105,6 +106,10 @@ def power(
         )
     if to is not None:
         make_folder(to)
+    if looks := () if study.analysis is None else study.analysis.looks:
+        if click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT:
+            raise click.UsageError(f"--sizes: the study plans looks at {', '.join(map(str, looks))}: omit --sizes")
+        sizes = looks
     found: Powers | Precisions | None = None
     steps: Iterator[Powers] | Iterator[Precisions]
     cancelled = False

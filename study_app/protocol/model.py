@@ -6,6 +6,7 @@ can decide by itself is checked by its class; what needs two tables is in ``chec
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from itertools import pairwise
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
@@ -371,8 +372,30 @@ class Analysis(Table):
     precision: Annotated[float, within(0.001, 10, "a share of the group's mean")] | None = later(
         default=None, description="Half the 95 % interval of the group's mean that is planned, as a share of the mean."
     )
+    trends: Literal["ranks", "slopes"] = later(
+        default="ranks",
+        description="What tests whether answers follow the delay: signs of each participant's rank correlation, or a "
+        "linear mixed model with random slopes.",
+    )
+    looks: tuple[Annotated[int, Field(ge=2, le=100_000)], ...] = later(
+        default=(),
+        description="Numbers of participants at which the key is opened and all is tested; the last is participants. "
+        "Left out: once, at the end.",
+    )
+    spending: Literal["obrien-fleming", "pocock"] = later(
+        default="obrien-fleming",
+        description="How the looks share alpha (Lan and DeMets 1983): most of it at the last one, or about evenly.",
+    )
     published: tuple[Published, ...] = later(default=(), description="Published values to compare with.")
     contrasts: tuple[Contrast, ...] = later(default=(), description="Hypotheses that are tested, and reported first.")
+
+    @model_validator(mode="after")
+    def _looks_end_at_the_last_participant(self) -> Self:
+        if self.looks and (len(self.looks) < 2 or self.looks[-1] != self.participants):
+            raise invalid("give two or more numbers, of which the last is analysis.participants", "looks")
+        if any(after <= look for look, after in pairwise(self.looks)):
+            raise invalid("each look has more participants than the one before", "looks")
+        return self
 
     def described(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield a row in words for each decision; ``named_by`` says which item names each condition."""
@@ -392,6 +415,8 @@ class Analysis(Table):
         yield "Noticed", "not asked" if self.noticed is None else f"{self.noticed} from 5 on"
         if self.participants is not None:
             yield "Participants", f"{self.participants} planned"
+        if self.looks:
+            yield "Looks", f"at {', '.join(map(str, self.looks))} participants; alpha is shared by {self.spending}"
         if self.precision is not None:
             yield "Precision", f"group mean ±{100 * self.precision:g} % (half its 95 % interval)"
         yield from (("Hypothesis", one.described()) for one in self.contrasts)

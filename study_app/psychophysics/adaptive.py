@@ -188,7 +188,7 @@ class Observers:
         Their psychometric function.
     thresholds : (tracks,) array
         In u.
-    width : float
+    width : float or (tracks,) array
         From 5 to 95 %, in u.
     guess, lapse : float
         Guess rate and lapse rate.
@@ -198,7 +198,7 @@ class Observers:
 
     family: Family
     thresholds: Floats
-    width: float
+    width: ArrayLike
     guess: float
     lapse: float
     presented: Callable[[Floats], Floats] | None = None

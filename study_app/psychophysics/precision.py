@@ -41,8 +41,8 @@ class Expected:
         Of one standard.
     standards : int
         Number of standards in the group's mean.
-    half : float
-        Half the 95 % interval of one participant, in u; infinite if nothing is measured.
+    halves : tuple of float
+        Half the 95 % interval of one participant, in u, for each width of observers; infinite if nothing is measured.
     spread : float
         Standard deviation of the estimate's error, in u; infinite if nothing is measured.
     threshold : float
@@ -52,19 +52,14 @@ class Expected:
     spacing: Literal["log", "linear"]
     trials: int
     standards: int
-    half: float
+    halves: tuple[float, ...]
     spread: float
     threshold: float
 
     @property
     def measured(self) -> bool:
         """Whether there are estimates: levels are not clipped."""
-        return math.isfinite(self.half)
-
-    @property
-    def factor(self) -> float | None:
-        """The factor by which each end of one participant's interval differs from the threshold; None: not log."""
-        return 10.0**self.half if self.spacing == "log" else None
+        return math.isfinite(max(self.halves))
 
     def of_group(self, participants: int, trials: float | None = None) -> float:
         """Return half the 95 % interval of a group's mean over all standards, as a share of the mean.

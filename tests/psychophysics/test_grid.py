@@ -170,21 +170,20 @@ def test_a_groups_interval_is_students_over_errors_and_people(participants, tria
 
 
 def test_standards_average_the_errors_but_not_the_people():
-    one, four = (Expected("log", 60, standards, 0.3, 0.12, 0.2) for standards in (1, 4))
+    one, four = (Expected("log", 60, standards, (0.3,), 0.12, 0.2) for standards in (1, 4))
     errors = 0.12**2 * np.array([1, 0.25]) + math.log10(1.2) ** 2
     halves = np.log10([1 + one.of_group(20), 1 + four.of_group(20)])
     assert halves == pytest.approx(student.ppf(0.975, 19) * np.sqrt(errors / 20))
 
 
 def test_linear_spacing_gives_a_share_of_the_threshold():
-    one = Expected("linear", 60, 1, 8.0, 4.0, 50.0)
+    one = Expected("linear", 60, 1, (8.0,), 4.0, 50.0)
     half = student.ppf(0.975, 9) * math.sqrt((4.0**2 + (50 * math.log(1.2)) ** 2) / 10)
     assert one.of_group(10) == pytest.approx(half / 50)
-    assert one.factor is None
 
 
 def test_the_fewest_participants_and_trials_for_a_precision():
-    one = Expected("log", 20, 1, 0.5, 0.2, 0.2)
+    one = Expected("log", 20, 1, (0.5,), 0.2, 0.2)
     people = one.participants_for(0.15)
     assert one.of_group(people) <= 0.15 < one.of_group(people - 1)
     trials = one.trials_for(0.15, 20)

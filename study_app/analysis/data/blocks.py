@@ -6,8 +6,9 @@ in its first language.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal, TypeAlias, get_args
+from typing import Any, Final, Literal, Self, TypeAlias, get_args
 
+from study_app.analysis.statistics.outcome import Spending, alpha_of_looks
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase
 from study_app.protocol.model import Contrast, Protocol, Published
@@ -332,7 +333,8 @@ class Decided:
     """The protocol's table ``analysis``.
 
     ``made`` is False where there was none; ``changed`` where sessions were run under different ones, of which this is
-    the first: in both cases everything found is exploratory.
+    the first: in both cases everything found is exploratory. Where ``looks`` are planned, ``alpha`` is that of the
+    number ``look`` of them; 0: before the first one, where everything is exploratory, too.
     """
 
     made: bool
@@ -344,11 +346,37 @@ class Decided:
     rising: tuple[str, ...]
     falling: tuple[str, ...]
     noticed: str | None
+    looks: tuple[int, ...] = ()
+    spending: Spending = "obrien-fleming"
+    look: int | None = None
+    trends: Literal["ranks", "slopes"] = "ranks"
 
     @property
     def binding(self) -> bool:
         """Whether it was decided before the first session, and kept to."""
-        return self.made and not self.changed
+        return self.made and not self.changed and self.look != 0
+
+    @property
+    def alphas(self) -> tuple[float, ...]:
+        """The significant p at each planned look; ``alpha`` is that of all of them."""
+        return alpha_of_looks(self.looks, self.alpha, self.spending) if self.looks else (self.alpha,)
+
+    def at(self, n: int) -> Self:
+        """Return what holds with so many participants: at the last planned look that they reach."""
+        look = sum(planned <= n for planned in self.looks)
+        return replace(self, alpha=self.alphas[max(look, 1) - 1], look=look) if self.looks else self
+
+    def look_words(self) -> str:
+        """Return which planned look this is, in a sentence; nothing where one is planned."""
+        if self.look is None:
+            return ""
+        planned = f"{' and '.join([', '.join(map(str, self.looks[:-1])), str(self.looks[-1])])} participants"
+        if self.look == 0:
+            return f"Looks are planned at {planned}, none of which is reached: everything found is exploratory."
+        return (
+            f"This is look {self.look} of {len(self.looks)}, planned at {planned}: a p of at most {self.alpha:.2g} "
+            f"counts (alpha is shared by {SPENDINGS[self.spending]} spending)."
+        )
 
     def is_primary(self, item: str) -> bool:
         """Whether a statement is one that the study is about."""
@@ -359,6 +387,7 @@ class Decided:
         return "increasing" if item in self.rising else "decreasing" if item in self.falling else None
 
 
+SPENDINGS: Final[Mapping[Spending, str]] = {"obrien-fleming": "O'Brien–Fleming", "pocock": "Pocock"}
 NOTHING_DECIDED: Final = Decided(False, False, 0.05, None, (), (), (), (), None)
 
 
@@ -380,6 +409,9 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
             rising=tuple(map(str, first["rising"])),
             falling=tuple(map(str, first["falling"])),
             noticed=None if noticed is None else str(noticed),
+            looks=tuple(map(int, first.get("looks", ()))),
+            spending=first.get("spending", "obrien-fleming"),
+            trends=first.get("trends", "ranks"),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise AnalysisError(

@@ -308,7 +308,8 @@ def load_study(folder: Path) -> Study:
     1        P001   L2     immersive         5
     """
     merged = read_merged(Path(folder))
-    return _load(Path(folder)) if merged is None else _load_sites(merged)
+    found = _load(Path(folder)) if merged is None else _load_sites(merged)
+    return replace(found, decided=found.decided.at(found.n))
 
 
 def _load_sites(merged: Merged) -> Study:

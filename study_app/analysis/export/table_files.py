@@ -99,7 +99,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
             "quartiles": QUARTILES,
             "agree_percent": f"levels {AGREEMENT[0]} to {AGREEMENT[-1]}, of the valid answers",
             "repeated": "of a participant's repeated answers the median, except where single answers are used: the "
-            "mixed model, the detection threshold, and the counts of levels",
+            "detection threshold, and the counts of levels",
             "counted": "main trials of completed sessions; of a repeated trial the last attempt; nothing excluded",
         },
         "files": files,

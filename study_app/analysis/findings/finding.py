@@ -25,7 +25,7 @@ U = TypeVar("U")
 
 SEALED: Final = "after unblinding: the key is sealed, and this needs to know which setting is which"
 MANY: Final = DRAWN_UP_TO
-"""Above so many participants p of single statements is approximated, and no mixed model is fitted."""
+"""Above so many participants p of single statements is approximated."""
 
 FEWER_DRAWS: Final = 1999
 """So many rearrangements are drawn for the test over all statements above ``MANY``, which has no approximation."""
@@ -217,12 +217,6 @@ def in_family(
         adjusted = None if p is None else max(p, answers.gate)
         found.append(Tested(item, outcome, family, len(ps), correction, adjusted, of_primary[place], said))
     return tuple(found)
-
-
-def alone(outcome: Outcome, item: str, answers: BlockAnswers, family: str) -> Tested:
-    """Return a test that asks again what another one asked: it is not corrected, and never more than exploratory."""
-    said = answers.verdict(outcome.p, outcome.smallest_p, primary=False)
-    return Tested(item, outcome, family, 1, ALONE, outcome.p, False, said)
 
 
 def verdict(p: float | None, least: float | None, alpha: float, *, primary: bool) -> Verdict:

@@ -1,7 +1,7 @@
 """Tests of statements: whether settings differ, in which pairs, with the delay and between sessions."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -46,6 +46,7 @@ from study_app.analysis.results import (
     statistic,
     test_name,
 )
+from study_app.analysis.statistics.mixed_model import Mixed, mixed
 from study_app.analysis.statistics.outcome import Outcome, false_discovery, holm, student_interval
 from study_app.analysis.statistics.rank_tests import Paired, friedman, global_permutation, paired
 from study_app.analysis.statistics.trend import trend
@@ -123,6 +124,16 @@ def _alike(answers: BlockAnswers, values: Any) -> Outcome:
     return friedman(values, draws=answers.draws, seed=answers.seed)
 
 
+def mixed_models(answers: BlockAnswers) -> dict[str, Mixed]:
+    """Return the model of every statement: slopes over the delay, or effects of the settings against the first."""
+    over_delay = answers.block.kind == "delays"
+    columns = np.array(answers.block.delays_ms)[:, None] / 100 if over_delay else None
+    return {
+        item: mixed(values, columns, answers.decided.direction(item) if over_delay else None)
+        for item, values in answers.values.items()
+    }
+
+
 class StatementTests(Finding[tuple[Tested, ...]]):
     """One test of every statement; words may contain {noun}, what the settings are called."""
 
@@ -196,18 +207,23 @@ class DelayTrend(StatementTests):
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY),)
-        outcomes = {
+        outcomes: Mapping[str, Outcome] = {
             item: trend(values, answers.decided.direction(item), seed=answers.intervals)
             for item, values in answers.values.items()
         }
+        if answers.decided.trends == "slopes":
+            outcomes = mixed_models(answers)
         return judged(outcomes, answers, f"{answers.block.id}: trend over delay"), ()
 
     def methods(self) -> Iterator[str]:
         if trends := self.value:
             stated = "beforehand" if self.results.decided.binding else "by the protocol"
+            by = "changing the signs of each participant's rank correlation of answers and delays"
+            if self.results.decided.trends == "slopes":
+                by = "linear mixed models with random intercepts and slopes of each participant"
             yield (
-                "Trends over the delay were tested by changing the signs of each participant's rank correlation of "
-                f"answers and delays ({_first_tested(trends).outcome.method.split(',')[0]}), which is about the "
+                f"Trends over the delay were tested by {by} "
+                f"({_first_tested(trends).outcome.method.split(',')[0]}), which is about the "
                 f"population, one-sided where a direction was stated {stated}, {families(trends)}; where a trend "
                 "showed, the longest delay was dropped and the test repeated until it no longer did, which gives an "
                 "upper bound of the lowest delay that is noticed (every step at alpha over the number of statements, "

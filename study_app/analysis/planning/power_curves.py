@@ -20,13 +20,22 @@ from study_app import __version__
 from study_app import figure_style as style
 from study_app.analysis.data.measures import Array
 from study_app.analysis.figures.page_layout import Style
-from study_app.analysis.planning.simulated_studies import EFFECTS, FULL, PLANNED_DRAWS, Counts, Plan, Planned
+from study_app.analysis.planning.simulated_studies import (
+    EFFECTS,
+    FULL,
+    ODD,
+    ODD_POINTS,
+    PLANNED_DRAWS,
+    Counts,
+    Plan,
+    Planned,
+)
 from study_app.analysis.results import enough
 from study_app.psychophysics.grid import Z_95
 from study_app.store.output_files import write_files
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
-Question: TypeAlias = Literal["settings differ", "trend", "lowest delay", "equivalence"]
+Question: TypeAlias = Literal["settings differ", "trend", "lowest delay", "equivalence", "contrast"]
 
 WANTED: Final = 0.8
 """The power that "smallest detectable effect" and "participants needed" are about."""
@@ -87,8 +96,9 @@ class Powers:
 
 def powers(plan: Plan, sizes: Sequence[int], studies: int, asked: int, seed: int, counts: Counts) -> Powers:
     """Return what ``studies`` of ``asked`` studies found, from their counts."""
-    curves = tuple(curve for block in plan.blocks for curve in _curves(block, counts, studies))
-    return Powers(plan, tuple(sizes), studies, asked, seed, curves)
+    curves = [curve for block in plan.blocks for curve in _curves(block, counts, studies)]
+    curves += _contrast_curves(plan, counts, studies)
+    return Powers(plan, tuple(sizes), studies, asked, seed, tuple(curves))
 
 
 def interval(share: float, studies: int) -> tuple[float, float]:
@@ -122,6 +132,13 @@ def _curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
             )
     yield from _lowest_curves(block, counts, studies)
     yield from _equivalence_curves(block, counts, studies)
+
+
+def _contrast_curves(plan: Plan, counts: Counts, studies: int) -> Iterator[Curve]:
+    for one in plan.contrasts:
+        power, alarms = _shares(counts[one.described(), "contrast"] / studies)
+        within = None if len(one.blocks) == 2 else alarms  # effects are those of the settings of one block
+        yield Curve(one.blocks[0], "contrast", None, one.described(), None, power, within, None, None)
 
 
 def _shares(shares: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -206,6 +223,7 @@ _HEADS: Final[dict[Question, tuple[str, str]]] = {
     "trend": ("Do answers follow the delay?", "statement"),
     "lowest delay": ("Is a trend shown up to this delay, or a shorter one?", "statement, delay"),
     "equivalence": ("Is a delay shown to be equivalent to the shortest?", "statement, delay"),
+    "contrast": ("Is the hypothesis shown?", "hypothesis"),
 }
 
 
@@ -261,13 +279,16 @@ def power_markdown(found: Powers) -> str:
 def _preface(found: Powers) -> list[str]:
     decided = found.plan.decided
     low, high = interval(WANTED, found.studies)
+    of_looks = ", ".join(f"{n}: {level:.2g}" for n, level in zip(decided.looks, decided.alphas, strict=False))
+    looks = f" of all looks ({of_looks}), found at a look or an earlier one" if of_looks else ""
     lines = [
         f"**SIMULATED.** {found.studies} studies of each size were answered by the rehearsals' answer model (seed "
         f"{found.seed}, liquid-study {__version__}), whose shapes and constants are plausible and not measured: real "
         "effects may be smaller. Read the tables of the smallest detectable difference together with those of power.",
         "",
-        f"Tests at α = {decided.alpha:g}; p from {PLANNED_DRAWS} random rearrangements of each participant's answers. "
-        "Statements that the protocol calls primary are corrected by Holm, the others by Benjamini and Hochberg. "
+        f"Tests at α = {decided.alpha:g}{looks}; p from {PLANNED_DRAWS} random rearrangements of each participant's "
+        "answers. Statements that the protocol calls primary are corrected by Holm, the others by Benjamini and "
+        f"Hochberg. One answer in {1 / ODD:.0f} is {ODD_POINTS:g} points higher than the model says. "
         f"Effects of {EFFECTS[1]:g} to {EFFECTS[-1]:g} times the model's were tried. A power of 80 % is uncertain by "
         f"±{50 * (high - low):.1f} percentage points.",
     ]
@@ -316,6 +337,8 @@ def _explained(question: Question, found: Powers) -> list[str]:
                 f"{enough(found.plan.decided.alpha)}. Where the model's difference is near the bound or beyond it, "
                 "finding equivalence would be wrong, and few should."
             ]
+        case "contrast":
+            return ["Paired t tests of each participant's mean answers, by Holm over the hypotheses."]
 
 
 def _markdown_table(

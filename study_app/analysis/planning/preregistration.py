@@ -10,7 +10,7 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from study_app import __version__
-from study_app.analysis.data.blocks import spoken
+from study_app.analysis.data.blocks import SPENDINGS, read_decided, spoken
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.report.html_page import bullets, heading, paragraph
@@ -185,10 +185,12 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     decided = protocol.analysis or DEFAULTS
     kinds = {protocol.compared_in(block.id) for block in asked}
     if "delays" in kinds:
+        by = "changing the signs of each participant's rank correlation with the delay"
+        if decided.trends == "slopes":
+            by = "linear mixed models with random intercepts and slopes of each participant (t of the mean slope)"
         yield (
-            "Delays: a trend in the population, by changing the signs of each participant's rank correlation with the "
-            "delay, in the stated direction, otherwise two-sided, stepping down from the longest delay; "
-            "equivalence to no delay by two one-sided tests, where a bound is given, with "
+            f"Delays: a trend in the population, by {by}, in the stated direction, otherwise two-sided, stepping down "
+            "from the longest delay; equivalence to no delay by two one-sided tests, where a bound is given, with "
             f"{least(decided.alpha)}; the detection threshold from agreement, where it shows a trend."
         )
     if others := kinds - {None, "delays"}:
@@ -280,9 +282,16 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
     """Yield how many participants there are and why."""
     planned = "Their number is not decided: there is no stopping rule."
     if one.participants is not None:
+        decided = read_decided([(protocol.analysis or DEFAULTS).model_dump(mode="json")])
         planned = (
             f"{one.participants} are planned. The study ends when so many sessions that count are complete; the key is "
             "opened, and anything tested, only then."
+            if not decided.looks
+            else f"{one.participants} are planned. The key is opened, and everything tested, when "
+            f"{listed([str(look) for look in decided.looks])} sessions that count are complete; an adjusted p of at "
+            f"most {listed([f'{level:.2g}' for level in decided.alphas])} is significant there "
+            f"({SPENDINGS[decided.spending]} spending of alpha, Lan and DeMets 1983). The study ends at the first look "
+            "at which all that is primary is shown, otherwise at the last one."
         )
     wanted = (
         ""
@@ -392,7 +401,7 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
 
 
 def _other_participants(study: Study, planned: int | None) -> Iterator[str]:
-    if planned is not None and study.n != planned:
+    if planned is not None and study.n not in (planned, *study.decided.looks):
         kind = "fewer" if study.n < planned else "more"
         yield f"{kind} participants: {study.n} are analysed, {planned} were planned"
 

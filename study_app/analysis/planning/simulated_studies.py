@@ -16,17 +16,18 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import ttest_1samp
 
 from study_app.analysis.data.blocks import Block as StatementBlock
 from study_app.analysis.data.blocks import Decided, Item, Setting, read_decided, spoken
 from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
 from study_app.analysis.statistics.equivalence import p_above, sizes
-from study_app.analysis.statistics.outcome import false_discovery, holm
+from study_app.analysis.statistics.outcome import SIDES, false_discovery, holm
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.groups import groups_with
-from study_app.protocol.model import Protocol
+from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.questions import POINTS, Question
 from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulate_ratings
 from study_app.protocol.table import text_in
@@ -62,13 +63,15 @@ class Planned(StatementBlock):
 
 @dataclass(frozen=True)
 class Plan:
-    """A study that is planned."""
+    """A study that is planned; of its contrasts those of statements within people, and how many others there are."""
 
     name: str
     title: str
     version: str
     blocks: tuple[Planned, ...]
     decided: Decided
+    contrasts: tuple[Contrast, ...] = ()
+    untested: int = 0
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -86,12 +89,19 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
             "questionnaire with statements"
         )
     table = None if protocol.analysis is None else protocol.analysis.model_dump(mode="json")
+    every = () if protocol.analysis is None else protocol.analysis.contrasts
+    items = {block.id: {item.id for item in _statements(protocol, block)} for block in asked}
+    within = tuple(
+        one for one in every if one.groups is None and all(one.measure in items.get(it, ()) for it in one.blocks)
+    )
     return Plan(
         protocol.study.name,
         text_in(protocol.study.title, language),
         protocol.study.version,
         tuple(_planned(protocol, block, features, language) for block in asked),
         read_decided([table]),
+        within,
+        len(every) - len(within),
     )
 
 
@@ -155,6 +165,11 @@ class Opinions:
         return np.asarray(given[:, 0] if given.shape[1] == 1 else np.median(given, axis=1))
 
 
+ODD: Final = 0.1
+ODD_POINTS: Final = 3.0
+"""So often an answer is so many points higher than the answer model says: people answer in error. [choice]"""
+
+
 def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinions, ...]:
     """Return what the participants of simulated study number ``study`` think in each block of the plan."""
     rng = np.random.default_rng([seed, study])
@@ -163,7 +178,8 @@ def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinio
         person = rater(rng.random)
         for place, block in enumerate(plan.blocks):
             items = [item.id for item in block.items]
-            found[place].append(simulate_ratings(items, block.features, block.repetitions, person, rng))
+            thought, noise = simulate_ratings(items, block.features, block.repetitions, person, rng)
+            found[place].append((thought, noise + ODD_POINTS * (rng.random(noise.shape) < ODD)))
     return tuple(
         Opinions(np.array([thought for thought, _ in block]), np.array([noise for _, noise in block]))
         for block in found
@@ -230,6 +246,16 @@ def trend(ranked: Single, both_ways: NDArray[np.bool_], rng: np.random.Generator
     return np.where(both_ways, np.minimum(1.0, 2 * np.minimum(rising, falling)), rising)
 
 
+def slopes(rising: Array, block: Planned, both_ways: NDArray[np.bool_]) -> Array:
+    """Return the p (studies, items) that slopes over the delay rise; as `trend`, by the mixed model."""
+    delays = np.array(block.delays_ms) - np.mean(np.array(block.delays_ms))
+    own = np.einsum("snki,k->sin", rising, delays)
+    ps = np.ones(own.shape[:2])
+    varied = np.ptp(own, axis=-1) > 0
+    ps[varied] = ttest_1samp(own[varied], 0.0, axis=-1, alternative="greater").pvalue
+    return np.where(both_ways, np.minimum(1.0, 2 * np.minimum(ps, 1 - ps)), ps)
+
+
 def signed(answers: Array, rng: np.random.Generator) -> Array:
     """Return the p (studies, items) of Wilcoxon's signed ranks for ``answers`` (studies, people, 2, items)."""
     differences = answers[:, :, 0] - answers[:, :, 1]
@@ -268,7 +294,8 @@ Counts: TypeAlias = dict[tuple[str, str], NDArray[np.float64]]
 ``found`` (sizes, effects, items): a test of the statement shows it; ``any``, ``all`` (sizes, effects): at least one
 does, the test over all does; ``lowest`` (sizes, items, delays): a trend is shown up to this delay or a shorter one;
 ``equivalent`` (sizes, 2, items, delays): to the shortest, without effect and with the full one. ``means`` (effects,
-settings, items) are sums of mean answers.
+settings, items) are sums of mean answers. (Contrast in words, ``contrast``) (sizes, effects): it is shown. Where looks
+are planned the sizes are theirs, and what counts is shown at one of them or an earlier one.
 """
 
 
@@ -278,36 +305,64 @@ def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int)
     given = [together(held, place, EFFECTS) for place, _ in enumerate(plan.blocks)]
     flat = [answers.reshape(-1, *answers.shape[2:]) for answers in given]
     ranked = [ranks(answers) for answers in flat]
-    of_sizes: dict[tuple[str, str], list[Array]] = {}
+    of_sizes: dict[tuple[str, str], list[NDArray[np.bool_]]] = {}
     for n in sizes:
+        decided = plan.decided.at(n)
         rngs = [np.random.default_rng([seed, batch, place, n]) for place, _ in enumerate(plan.blocks)]
         ps = [friedman(one[:, :n], rng) for one, rng in zip(ranked, rngs, strict=True)]
         gates = np.array([holm(of_study) for of_study in np.array([p_all for _, p_all in ps]).T.tolist()], float).T
         for place, block in enumerate(plan.blocks):
             judge = _delays if block.kind == "delays" else _liquids
-            shown = gates[place] <= plan.decided.alpha
-            found = judge(block, plan.decided, given[place][:, :, :n], ps[place][0], shown, rngs[place])
-            for what, number in found.items():
-                of_sizes.setdefault((block.id, what), []).append(number)
-    counts = {what: np.array(numbers, dtype=np.float64) for what, numbers in of_sizes.items()}
+            shown = gates[place] <= decided.alpha
+            found = judge(block, decided, given[place][:, :, :n], ps[place][0], shown, rngs[place])
+            for what, of_studies in found.items():
+                of_sizes.setdefault((block.id, what), []).append(of_studies)
+        for name, shown in contrasts(plan, [one[:, :, :n] for one in given], decided.alpha).items():
+            of_sizes.setdefault((name, "contrast"), []).append(shown)
+    for numbers in of_sizes.values() if plan.decided.looks else ():
+        numbers[:] = np.logical_or.accumulate(numbers)  # a study that shows it at a look ends there
+    counts = {what: np.array(numbers, np.float64).sum(axis=1) for what, numbers in of_sizes.items()}
     means = {(one.id, "means"): here.mean(axis=2).sum(axis=1) for one, here in zip(plan.blocks, given, strict=True)}
     return counts | means
 
 
-def _counted(found: NDArray[np.bool_], shown: NDArray[np.bool_], effects: int) -> dict[str, Array]:
-    """Return the numbers of studies (effects, …) of what is ``found`` (studies, items), in all and by statement."""
-    by_effect = found.reshape(effects, -1, found.shape[-1])
-    return {
-        "found": by_effect.sum(axis=1),
-        "any": by_effect.any(axis=2).sum(axis=1),
-        "all": shown.reshape(effects, -1).sum(axis=1),
-    }
+def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDArray[np.bool_]]:
+    """Return which studies (studies, effects) show each contrast of statements, in words: paired t tests, by Holm.
+
+    ``given`` are each block's answers (effects, studies, participants, settings, items).
+    """
+    blocks = {block.id: (block, answers) for block, answers in zip(plan.blocks, given, strict=True)}
+    ps = []
+    for one in plan.contrasts:
+        sides = []
+        for name, condition in zip(
+            one.blocks if len(one.blocks) == 2 else one.blocks * 2, one.conditions or (None, None), strict=True
+        ):
+            block, answers = blocks[name]
+            rows = [place for place, it in enumerate(block.settings) if condition in (None, it.condition)]
+            sides.append(answers[:, :, :, rows, [it.id for it in block.items].index(one.measure)].mean(axis=-1))
+        away = sides[0] - sides[1]
+        differ = np.ptp(away, axis=-1) > 0  # equal differences have no t
+        found = np.ones(differ.shape)
+        found[differ] = ttest_1samp(away[differ], 0.0, axis=-1, alternative=SIDES[one.expected]).pvalue
+        ps.append(found.T)
+    if not ps:
+        return {}
+    family = np.stack([*ps, *[np.ones_like(ps[0])] * plan.untested], axis=-1)
+    adjusted = np.apply_along_axis(lambda each: np.array(holm(each.tolist())), -1, family)
+    return {one.described(): adjusted[..., place] <= alpha for place, one in enumerate(plan.contrasts)}
+
+
+def _counted(found: NDArray[np.bool_], shown: NDArray[np.bool_], effects: int) -> dict[str, NDArray[np.bool_]]:
+    """Return which studies (studies, effects, …) show what is ``found`` (effects · studies, items), in all and each."""
+    by_effect = found.reshape(effects, -1, found.shape[-1]).swapaxes(0, 1)
+    return {"found": by_effect, "any": np.any(by_effect, axis=2), "all": shown.reshape(effects, -1).T}
 
 
 def _liquids(
     block: Planned, decided: Decided, answers: Array, ps: Array, shown: NDArray[np.bool_], rng: np.random.Generator
-) -> dict[str, Array]:
-    """Count what is found where the test over all statements (studies,) shows a difference; ``ps`` are Friedman's."""
+) -> dict[str, NDArray[np.bool_]]:
+    """Return what is found where the test over all statements (studies,) shows a difference; ``ps`` are Friedman's."""
     effects = len(answers)
     if block.k == 2:
         ps = signed(answers.reshape(-1, *answers.shape[2:]), rng)
@@ -316,12 +371,13 @@ def _liquids(
 
 def _delays(
     block: Planned, decided: Decided, answers: Array, _ps: Array, shown: NDArray[np.bool_], rng: np.random.Generator
-) -> dict[str, Array]:
+) -> dict[str, NDArray[np.bool_]]:
     effects, studies = answers.shape[:2]
     directions = [decided.direction(item.id) for item in block.items]
     rising = answers * np.array([-1.0 if one == "decreasing" else 1.0 for one in directions])
     both_ways = np.array([one is None for one in directions])
-    ps = trend(ranks(rising.reshape(-1, *rising.shape[2:])), both_ways, rng)
+    flat = rising.reshape(-1, *rising.shape[2:])
+    ps = slopes(flat, block, both_ways) if decided.trends == "slopes" else trend(ranks(flat), both_ways, rng)
     found = _family(block, decided, ps) & shown[:, None]
     counted = _counted(found, shown, effects)
     at_full = found.reshape(effects, studies, -1)[FULL]
@@ -329,26 +385,26 @@ def _delays(
     if decided.equivalence_bound is not None:
         here = answers[[0, FULL]]
         away = here[:, :, :, 1:] - here[:, :, :, :1]
-        equal = [equivalent(one, decided.equivalence_bound, decided.alpha, rng).sum(axis=0) for one in away]
-        counted["equivalent"] = np.array(equal).transpose(0, 2, 1)
+        equal = [equivalent(one, decided.equivalence_bound, decided.alpha, rng) for one in away]
+        counted["equivalent"] = np.array(equal).transpose(1, 0, 3, 2)
     return counted
 
 
 def _step_down(
     rising: Array, shown: NDArray[np.bool_], both_ways: NDArray[np.bool_], alpha: float, rng: np.random.Generator
-) -> Array:
-    """Return how often a trend is shown up to each delay or a shorter one (items, delays).
+) -> NDArray[np.bool_]:
+    """Return whether a trend is shown up to each delay or a shorter one (studies, items, delays).
 
     ``shown`` (studies, items) says where the trend over all delays is; the steps after it are not corrected.
     """
     _, _, k, items = rising.shape
-    counted = np.zeros((items, k))
+    found = np.zeros((len(shown), items, k), dtype=bool)
     going = shown
     for longest in range(k - 1, 0, -1):
         if longest < k - 1:
             going = going & (trend(ranks(rising[:, :, : longest + 1]), both_ways, rng) <= alpha)
-        counted[:, longest] = going.sum(axis=0)
-    return counted
+        found[:, :, longest] = going
+    return found
 
 
 def _family(block: Planned, decided: Decided, ps: Array) -> NDArray[np.bool_]:

@@ -17,13 +17,14 @@ from scipy.stats import nct
 from scipy.stats import t as student
 
 from study_app import __version__
-from study_app.analysis.data.blocks import spoken
+from study_app.analysis.data.blocks import read_decided, spoken
 from study_app.analysis.data.measures import Array
 from study_app.analysis.planning.power_curves import WANTED, interval
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.errors import AnalysisError
 from study_app.protocol.checks.expected_precision import (
+    WIDTHS,
     MeanPlan,
     RatingPlan,
     SensitivityPlan,
@@ -162,7 +163,7 @@ def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Pr
 def _estimates(plan: ThresholdPlan, truth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Return posterior medians and variances of observers with these thresholds [u]."""
     starts = range(0, len(truth), TRACKS_AT_ONCE)
-    found = [plan.simulate(truth[first : first + TRACKS_AT_ONCE], rng) for first in starts]
+    found = [plan.simulate(truth[first : first + TRACKS_AT_ONCE], rng, WIDTHS) for first in starts]
     return np.concatenate([one.medians for one in found]), np.concatenate([one.variances for one in found])
 
 
@@ -317,12 +318,13 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
         rows = [] if one.measure != "threshold" or len(one.blocks) < 2 else [*_spreads(precisions, *one.blocks)]
         if not rows:
             continue
-        tail = decided.alpha / (2 if one.expected is None else 1)
+        alpha = read_decided([decided.model_dump(mode="json")]).alphas[-1]
+        tail = alpha / (2 if one.expected is None else 1)
         yield from ("", f"## Contrast: {one.described()}", "")
         yield (
             "SD: of the difference of one participant, that of both estimates and of people, whose differences vary by "
             f"a factor of {BETWEEN_PEOPLE:g}. Smallest difference: what {WANTED:.0%} of studies show at α = "
-            f"{decided.alpha:g}, {'two-sided' if one.expected is None else 'one-sided'}."
+            f"{alpha:.2g}, {'two-sided' if one.expected is None else 'one-sided'}."
         )
         heads = ("trials per standard", "participants", "SD", "half the 95 % interval", "smallest difference")
         yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
@@ -357,9 +359,9 @@ def _assumed(plans_of_block: Mapping[int, Plan]) -> str:
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):
         return (
-            "Observers answer by a psychometric function with a lapse rate of 2 %; the mean of their thresholds is in "
-            "the middle half of the levels. The group's interval is that of the mean over all standards "
-            "(Hartung–Knapp)."
+            "Observers answer by a psychometric function half, once or twice as wide as the prior's median, with a "
+            "lapse rate of 2 %; the mean of their thresholds is in the middle half of the levels. The group's interval "
+            "is that of the mean over all standards (Hartung–Knapp)."
         )
     group = "The group's interval is that of the mean (Student)."
     if isinstance(plan, SensitivityPlan):

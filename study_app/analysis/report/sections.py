@@ -121,8 +121,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if study.n < FEW and results.blocks:
         people = counted(study.n, "participant")
         yield (
-            f"{people[:1].upper()}{people[1:]}: below {FEW} no bootstrap interval and no mixed model is given, since "
-            "they do not hold there. An effect that is not shown here may well exist."
+            f"{people[:1].upper()}{people[1:]}: below {FEW} no bootstrap interval is given, since it does not hold "
+            "there. An effect that is not shown here may well exist."
         )
 
 
@@ -256,7 +256,10 @@ def first_page(results: Results, limits: Sequence[str]) -> Markup:
     return render(
         "first_page.html",
         verdicts=verdicts if rows else "",
-        sentences=of_levels(results) or (() if rows else (none_found(results),)),
+        sentences=[
+            *filter(None, [results.decided.look_words()]),
+            *(of_levels(results) or (() if rows else (none_found(results),))),
+        ],
         limits=list(limits),
         shown=LIMITS_SHOWN,
         empty=empty_studies(max(found.n for found in results.blocks)) if given else "",

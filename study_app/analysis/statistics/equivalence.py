@@ -87,9 +87,7 @@ SAME: Final = 1e-9
 """Differences that spread less than this are equal."""
 
 UNSEEN: Final = 1 / 5
-UNSEEN_EQUAL: Final = 1 / 4
-"""A group of this share of all people, who differ strongly, must not be missed by chance; the second where all
-differences are equal."""
+"""A group of this share of all people, who differ strongly, must not be missed by chance."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,18 +180,18 @@ def tost(
     return replace(found, dropped=len(array) - len(kept))
 
 
-def p_unseen(n: int, *, equal: bool) -> float:
+def p_unseen(n: int) -> float:
     """Return the probability that a group of the share ``UNSEEN`` is not among ``n`` participants at all.
 
     The Clopper-Pearson upper bound of the share of people who differ strongly, where none of ``n`` does, is below
-    that share where this is at most alpha. ``equal``: all differences are equal.
+    that share where this is at most alpha.
     """
-    return float((1 - (UNSEEN_EQUAL if equal else UNSEEN)) ** n)
+    return float((1 - UNSEEN) ** n)
 
 
-def fewest(alpha: float, *, equal: bool = False) -> int:
+def fewest(alpha: float) -> int:
     """Return how many participants it takes at least to show equivalence."""
-    return math.ceil(math.log(alpha) / math.log(p_unseen(1, equal=equal)) - 1e-9)
+    return math.ceil(math.log(alpha) / math.log(1 - UNSEEN) - 1e-9)
 
 
 @lru_cache(maxsize=4096)
@@ -219,13 +217,13 @@ def _compared(
             **by_signs,
             p=max(by_signs.values()),
             method=f"signs and signed ranks, bound ±{bound:g} points: all differences are equal",
-            p_unseen=p_unseen(found.n, equal=True),
+            p_unseen=p_unseen(found.n),
         )
     asked = (found.p_permutation, found.p_ranks, found.p_bootstrap)
     if found.p_ranks is not None and found.statistic is not None:
         by_t = found.p is not None and found.p <= alpha
         found = replace(found, checks_agree=all((p is None or p <= alpha) == by_t for p in asked))
-    verdict: Verdict = "out of reach" if p_unseen(found.n, equal=True) > alpha else "inconclusive"
+    verdict: Verdict = "out of reach" if p_unseen(found.n) > alpha else "inconclusive"
     found = replace(found, verdict="equivalent" if found.equal else verdict)
     return replace(found, note=_note(found))
 
@@ -269,7 +267,7 @@ def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
         "t_upper": upper,
         "p_lower": p_lower,
         "p_upper": p_upper,
-        "p_unseen": p_unseen(len(kept), equal=False),
+        "p_unseen": p_unseen(len(kept)),
         "smallest_check_p": None,
     }
 
@@ -339,8 +337,8 @@ def equivalent(
     mean = np.abs(differences.mean(axis=1))
     flat = spread <= SAME
     reach = float(t_distribution.ppf(1 - alpha, n - 1)) * spread / math.sqrt(n) if n > 1 else spread
-    many, many_equal = p_unseen(n, equal=False) <= alpha, p_unseen(n, equal=True) <= alpha
-    shown = np.asarray(np.where(flat, (mean < bound - SAME) & many_equal, (mean + reach <= bound) & many))
+    within = np.where(flat, mean < bound - SAME, mean + reach <= bound)
+    shown: NDArray[np.bool_] = within & (p_unseen(n) <= alpha)
     held = np.flatnonzero(shown & ~flat)
     up = (rng.random((draws, n)) < 0.5).astype(np.float32)
     for part in np.array_split(held, max(1, math.ceil(len(held) / AT_ONCE))):

@@ -9,11 +9,12 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
-from typing import Final, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import binomtest, false_discovery_control, rankdata
+from scipy.optimize import brentq
+from scipy.stats import binomtest, false_discovery_control, norm, rankdata
 from scipy.stats import t as student
 
 from study_app.errors import AnalysisError
@@ -32,12 +33,9 @@ SAMPLES: Final = 1999
 """Bootstrap samples of an interval."""
 
 FEW: Final = 10
-"""Below so many participants neither a bootstrap interval nor a mixed model is offered: they do not hold there."""
+"""Below so many participants no bootstrap interval is offered: it does not hold there."""
 
 TOO_FEW: Final = f"no interval below {FEW} participants: resampling so few covers far less than it claims"
-MINIMISER: Final = "TNC"
-"""Scipy's only bounded minimiser that asks no threads of BLAS: on busy cores those made a small fit 50 times slower."""
-
 NO_VARIATION: Final = "no variation: every participant answered alike under all settings"
 
 
@@ -99,6 +97,52 @@ def complete(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]
 def draws_for(alpha: float, usual: int, members: int = 1) -> int:
     """Return how many rearrangements are drawn for each of ``members`` tests: their number decides no verdict."""
     return min(MOST_DRAWS, max(usual, math.ceil(members / (FLOOR * alpha))))
+
+
+SIDES: Final = {"higher": "greater", "lower": "less", None: "two-sided"}
+"""The alternative of a test, by what is expected of the first of two."""
+
+Spending: TypeAlias = Literal["obrien-fleming", "pocock"]
+NODES: Final = 200
+"""Of the quadrature over the statistic of a look."""
+
+
+@lru_cache(maxsize=64)
+def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: Spending) -> tuple[float, ...]:
+    """Return the largest two-sided p that is significant at each look: the error rate of all of them is ``alpha``.
+
+    Parameters
+    ----------
+    looks : tuple of int
+        Participants at each look, ascending.
+    alpha : float
+        Of all looks.
+    spending : "obrien-fleming" | "pocock"
+        How much is spent until a look (Lan & DeMets 1983, Biometrika 70, 659–663).
+
+    Notes
+    -----
+    The sums of a study's data are a random walk; its density within the bounds of the looks before is integrated
+    numerically (Armitage, McPherson & Rowe 1969, J. R. Stat. Soc. A 132, 235–244).
+    """
+    shares = np.array(looks) / looks[-1]
+    spent = alpha * np.log1p((math.e - 1) * shares)
+    if spending == "obrien-fleming":
+        spent = 4 * norm.sf(norm.isf(alpha / 4) / np.sqrt(shares))
+    nodes, of_nodes = np.polynomial.legendre.leggauss(NODES)
+    found, places, weights, before = [], np.zeros(1), np.ones(1), 0.0
+    for share, due in zip(shares, np.diff(spent, prepend=0.0), strict=True):
+        end = float(brentq(_excess, 0.0, 40.0, (places, weights, math.sqrt(share - before), due)))
+        inside = end * nodes
+        density = norm.pdf(inside[:, None], places, math.sqrt(share - before)) @ weights
+        places, weights, before = inside, density * end * of_nodes, share
+        found.append(float(2 * norm.sf(end / math.sqrt(share))))
+    return tuple(found)
+
+
+def _excess(end: float, places: Array, weights: Array, step: float, due: float) -> float:
+    """Return how much likelier than ``due`` a walk from ``places`` is beyond ± ``end`` after a ``step``."""
+    return float(weights @ (norm.sf(end, places, step) + norm.cdf(-end, places, step))) - due
 
 
 @lru_cache(maxsize=4096)

@@ -65,18 +65,26 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     type=click.IntRange(10, 1_000_000),
     default=200,
     show_default=True,
-    help="Studies of ten participants, of each protocol.",
+    help="Studies of ten participants, of each protocol and seed.",
 )
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
+@click.option(
+    "--seed",
+    "seeds",
+    type=click.IntRange(0, 2**31 - 1),
+    multiple=True,
+    default=(1,),
+    show_default=True,
+    help="Seed of the simulation; may be given several times: studies of all seeds are judged together.",
+)
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
-def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, to: Path | None) -> None:
+def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], workers: Workers, to: Path | None) -> None:
     """Recover the known thresholds of simulated observers, with methods and analysis alone and with the whole program.
 
     For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) many studies of ten
-    identical observers are simulated and analysed; in magnitude estimation the exponent is known. Then three
-    participants are rehearsed with servo, files, unblinding and analysis. Every value is printed with its limit. Ends
-    with exit code 3 if a value exceeds its limit.
+    observers, who differ by a factor of 1.2, are simulated and analysed; in magnitude estimation the exponent is known.
+    Then three participants are rehearsed with servo, files, unblinding and analysis. Every value is printed with its
+    limit. Ends with exit code 3 if a value exceeds its limit.
     """
     from study_app.evidence.thresholds.known_values import NAMES, evidence, known_value
     from study_app.evidence.thresholds.known_values import validate as validate_values
@@ -89,10 +97,11 @@ def validate(files: tuple[str, ...], studies: int, seed: int, workers: Workers, 
     prepare(to)
     begun = time.monotonic()
     with progress() as show, executor_for(workers) as executor:
-        verdicts = validate_values(chosen, studies, seed, executor, show)
+        verdicts = validate_values(chosen, studies, seeds, executor, show)
     used_s = sum(os.times()[:4])  # with the workers', which have ended
     took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
-    present(evidence(verdicts, f"{studies} studies of each protocol, seed {seed}, in {took}"), to)
+    heading = f"{studies} studies of each protocol and seed ({', '.join(map(str, seeds))}), in {took}"
+    present(evidence(verdicts, heading), to)
 
 
 @click.command("delay-thresholds")

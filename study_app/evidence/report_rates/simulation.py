@@ -19,11 +19,12 @@ import numpy as np
 from scipy.special import expit
 from scipy.stats import binomtest
 
-from study_app.analysis.data.blocks import Block
+from study_app.analysis.data.blocks import Block, Decided
 from study_app.analysis.data.measures import Array
 from study_app.analysis.evaluate import evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, common_ms
 from study_app.analysis.findings.finding import FOUND, BlockAnswers, of_tables
+from study_app.analysis.findings.mixed_models import MixedModel
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, OverAll, Pairs, SettingsDiffer, gated
 from study_app.analysis.planning.power_curves import interval
@@ -31,6 +32,7 @@ from study_app.analysis.planning.simulated_studies import Opinions, Plan, people
 from study_app.analysis.report.sections import answers as answered
 from study_app.analysis.results import BlockResult, Failures, Results
 from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.outcome import Spending
 from study_app.analysis.statistics.thresholds import noticed
 from study_app.evidence.table import Evidence, Table
 
@@ -257,16 +259,19 @@ ANYWHERE: Final = "anything in the report claims something"
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """Studies of one kind: model of the answers, true effects, and number of participants."""
+    """Studies of one kind: model of the answers, true effects, number of participants, and planned looks if any."""
 
     generator: Generator
     extent: Extent
     participants: int
+    looks: tuple[int, ...] = ()
+    spending: Spending = "obrien-fleming"
 
     @property
     def name(self) -> str:
         """The cell in words, without its size."""
-        return f"{self.generator}, {self.extent}"
+        looks = f", looks at {', '.join(map(str, self.looks))} by {self.spending}" if self.looks else ""
+        return f"{self.generator}, {self.extent}{looks}"
 
 
 def truth(simulation: Plan, cell: Cell) -> Truth:
@@ -288,22 +293,16 @@ def count_studies(simulation: Plan, cell: Cell, truth: Truth, seed: int, batch: 
 def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) -> dict[Event, bool]:
     failures = Failures()
     given = answers(simulation, cell.generator, cell.extent, cell.participants, seed, study)
-    people = tuple(f"P{number:03d}" for number in range(cell.participants))
-    found: dict[Event, bool] = {}
-    tables = [
-        of_tables(
-            block,
-            simulation.decided if cell.extent != "partial" else replace(simulation.decided, noticed=None),
-            people,
-            {item.id: values[:, :, [column]] for column, item in enumerate(block.items)},
-            seed=1 + study,  # draws of its own: the same draws in all studies would shift the rate
-            failures=failures,
-            verdicts_only=True,
+    if cell.looks:
+        planned = replace(simulation.decided, looks=cell.looks, spending=cell.spending)
+        seen = (
+            _report(simulation, planned.at(n), [values[:n] for values in given], study, failures)[1] for n in cell.looks
         )
-        for block, values in zip(simulation.blocks, given, strict=True)
-    ]
-    asked = [replace(answers, seed=1) for answers in gated(tables, DRAWS)]
-    results = tuple(evaluate_block(None, answers) for answers in asked)
+        claimed = any(any(map(_claims, results)) for results in seen)
+        return {(f"{ANYWHERE}, at any look", "at most 5 %"): claimed, LOST: bool(failures.found)}
+    decided = simulation.decided if cell.extent != "partial" else replace(simulation.decided, noticed=None)
+    asked, results = _report(simulation, decided, given, study, failures)
+    found: dict[Event, bool] = {}
     for place, (block, result) in enumerate(zip(simulation.blocks, results, strict=True)):
         judged = _in_delays if block.kind == "delays" else _in_liquids
         for (what, at_most), hit in judged(asked[place], result, cell, truth[place]):
@@ -314,11 +313,33 @@ def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) ->
             found[f"test over all statements ({block.kind})", "at most 5 %"] = differs
     found[LOST] = bool(failures.found)
     if cell.extent != "partial":
+        people = asked[0].people
         whole = Results(simulation.decided, people, results, delivered=(), orders={}, performance=None, seed=1)
         limit: Limit = "counted" if cell.extent == "full" else "at most 5 %"
         found[CLAIMED, limit] = any(one.claims for one in answered(whole))
         found[ANYWHERE, limit] = any(map(_claims, results))
     return found
+
+
+def _report(
+    simulation: Plan, decided: Decided, given: Sequence[Array], study: int, failures: Failures
+) -> tuple[list[BlockAnswers], tuple[BlockResult, ...]]:
+    """Return the answers of each block, and what the report finds in them."""
+    people = tuple(f"P{number:03d}" for number in range(len(given[0])))
+    tables = [
+        of_tables(
+            block,
+            decided,
+            people,
+            {item.id: values[:, :, [column]] for column, item in enumerate(block.items)},
+            seed=1 + study,  # draws of its own: the same draws in all studies would shift the rate
+            failures=failures,
+            verdicts_only=True,
+        )
+        for block, values in zip(simulation.blocks, given, strict=True)
+    ]
+    asked = [replace(answers, seed=1) for answers in gated(tables, DRAWS)]
+    return asked, tuple(evaluate_block(None, answers) for answers in asked)
 
 
 def _claims(found: BlockResult) -> bool:
@@ -328,6 +349,11 @@ def _claims(found: BlockResult) -> bool:
     return any(one.verdict in FOUND for one in tests) or low or _recognised(found) or _printed(found)
 
 
+def _modelled(found: BlockResult) -> Iterator[tuple[Event, bool]]:
+    """Yield whether the mixed model finds anything in a statement."""
+    yield ("found by the mixed model", "at most 5 %"), any(one.verdict in FOUND for one in MixedModel.of(found))
+
+
 def _in_liquids(asked: BlockAnswers, found: BlockResult, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
     if cell.extent in NO_EFFECT:
         yield (
@@ -335,6 +361,7 @@ def _in_liquids(asked: BlockAnswers, found: BlockResult, cell: Cell, _truth: Arr
             any(one.verdict in FOUND for one in SettingsDiffer.of(found)),
         )
         yield ("liquids recognised", "at most 5 %"), _recognised(found)
+        yield from _modelled(found)
     equal = _equal_pairs(asked.block, cell.extent)
     if equal:
         found_equal = any(one.tested.verdict in FOUND and (one.first, one.second) in equal for one in Pairs.of(found))
@@ -367,6 +394,7 @@ def _in_delays(asked: BlockAnswers, found: BlockResult, cell: Cell, truth: Array
     if cell.extent in NO_EFFECT:
         yield ("trend in a statement", "at most 5 %"), any(one.verdict in FOUND for one in DelayTrend.of(found))
         yield ("detection threshold printed", "at most 5 %"), _printed(found)
+        yield from _modelled(found)
     if null:
         low = any(one.over_all_ms is not None and one.over_all_ms <= max(null) for one in LowestDelay.of(found))
         yield ("lowest delay stated too low", "at most 5 %"), low
@@ -418,9 +446,6 @@ TRUE_MS: Final = 120.0
 WIDTH_MS: Final = 60.0
 LAPSE: Final = 0.02
 
-TWELVE_EQUAL: Final = (12, (0.0,))
-"""In 6.9 % of these studies no one of the one in five takes part, and all twelve differences are 0: equivalent."""
-
 
 @cache
 def single_tests() -> Mapping[Case, tuple[Limit, str, Trial]]:
@@ -429,7 +454,7 @@ def single_tests() -> Mapping[Case, tuple[Limit, str, Trial]]:
     for n in (5, 12, 24):
         for words, most in (("-1, 0, 1", (-1.0, 0.0, 1.0)), ("0", (0.0,))):
             found[f"one in five differs by 5 points, the others by {words}", n] = (
-                "counted" if (n, most) == TWELVE_EQUAL else "at most 5 %",
+                "at most 5 %",
                 "called equivalent",
                 _leaning(n, most),
             )
@@ -479,6 +504,7 @@ def _people(rng: np.random.Generator, n: int, spread_ms: float, never: float) ->
 
 SIZES: Final = (5, 12, 24)
 
+LOOKS: Final = (12, 18, 24)
 ROUNDS: Final = 4
 """A cell with an undecided rate is continued until it has so many times the studies that were asked for."""
 
@@ -490,8 +516,10 @@ Count: TypeAlias = Callable[[int, int, int], tuple[Rate, ...]]
 
 
 def cells(sizes: Sequence[int] = SIZES) -> tuple[Cell, ...]:
-    """Return every kind of study by every generator at every size."""
-    return tuple(Cell(generator, extent, n) for generator in GENERATORS for extent in EXTENTS for n in sizes)
+    """Return every kind of study by every generator at every size, and empty studies with planned looks."""
+    every = [Cell(generator, extent, n) for generator in GENERATORS for extent in EXTENTS for n in sizes]
+    looked = [Cell("ordinal probit", "empty", LOOKS[-1], LOOKS, spending) for spending in get_args(Spending)]
+    return (*every, *looked)
 
 
 def validate(

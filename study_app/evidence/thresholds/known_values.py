@@ -1,7 +1,7 @@
 """Whether known thresholds and exponents are recovered: by methods and analysis alone, and by the whole program.
 
-In many studies of equal observers what is presented is what was requested, so that errors are those of methods and
-estimates. Rehearsed participants pass through servo, store, unblinding and analysis.
+In many studies of observers who differ what is presented is what was requested, so that errors are those of methods
+and estimates. Rehearsed participants pass through servo, store, unblinding and analysis.
 
 In magnitude estimation an observer's estimate is exp(n y + 0.25 N), where y is the logarithm of what reaches the hand:
 mean force over RMS speed. The exponent over the varied number is n times the slope of y over its logarithm at the
@@ -14,7 +14,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeAlias
 
@@ -23,13 +22,7 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.study_tables import load_study
-from study_app.analysis.levels.thresholds import (
-    ThresholdEstimate,
-    estimate_slope,
-    estimated_exponents,
-    jnd_slope,
-    thresholds,
-)
+from study_app.analysis.levels.thresholds import estimate_slope, estimated_exponents, jnd_slope, thresholds
 from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.planning.power_curves import interval as wilson_interval
 from study_app.analysis.statistics.outcome import student_interval
@@ -38,10 +31,11 @@ from study_app.haptics.model.overrides import override
 from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.simulated import OBSERVER, Observer, as_requested, simulate_study
+from study_app.protocol.simulated import OBSERVER, Observer, as_requested, normal, simulate_study
+from study_app.protocol.streams import Draw, stream
 from study_app.protocol.trials.stimuli import DELAYS
 from study_app.protocol.trials.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
-from study_app.psychophysics.precision import ESTIMATE_NOISE
+from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
@@ -63,13 +57,16 @@ NAMES: Final = (*SHIPPED, "thickness")
 EXPONENT: Final = 0.44
 """Of perceived thickness over viscosity (Stevens & Guirao 1964)."""
 POINTS: Final = 64
+LAPSES_MOST: Final = 0.05
+BETWEEN_SESSIONS: Final = 10**0.049
+"""Factor between a person's thresholds of several sessions, as measured (`protocol.trials.stimuli.SESSION_SD`)."""
 
 PEOPLE: Final = 10
 REHEARSED: Final = 3
 ERROR_MOST: Final = 0.05
 NEAR: Final = 0.15
 NEAR_SHARE: Final = 0.95
-OWN_COVERAGE: Final = (0.93, 0.99)
+OWN_COVERAGE: Final = (0.93, 0.98)
 SLOPE_ERROR_MOST: Final = 0.15
 EXPONENT_ERROR_MOST: Final = 0.03
 DELIVERED_LEAST: Final = 0.99
@@ -87,11 +84,17 @@ class Verdict(NamedTuple):
 
 
 class Estimated(NamedTuple):
-    """A value as the analysis estimates it, with its 95 % interval."""
+    """A value as the analysis estimates it, with its 95 % interval, and the true one."""
 
     value: float
     low: float = math.nan
     high: float = math.nan
+    truth: float = math.nan
+
+    @property
+    def covered(self) -> bool:
+        """Whether the interval holds the true value."""
+        return self.low <= self.truth <= self.high
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,9 +127,18 @@ class KnownValue(ABC):
         """Return the mean error of values."""
 
     def spread(self, studies: Sequence[StudyFound], people: int) -> float:
-        """Return the standard deviation of the error over studies of so many participants."""
-        errors = [self.error([one.value for own in found.own[:people] for one in own]) for found in studies]
+        """Return the standard deviation of the error over studies of so many participants, beyond their own values."""
+        errors = [
+            self.error([one.value for one in some]) - self.error([one.truth for one in some])
+            for found in studies
+            for some in ([one for own in found.own[:people] for one in own],)
+        ]
         return float(np.std(errors, ddof=1))
+
+    def _apart(self, people: int, seed: int, number: int) -> tuple[list[float], Draw]:
+        """Return how far people lie from the mean in a study, in ln of `BETWEEN_PEOPLE`, and what else to draw from."""
+        draw = stream(seed, f"validate/{self.name}/{number}/people").random
+        return [math.log(BETWEEN_PEOPLE) * normal(draw) for _ in range(people)], draw
 
     def _simulated(
         self, observers: Sequence[Observer], seed: int, number: int, sense: Callable[[Any], float] = as_requested
@@ -135,13 +147,6 @@ class KnownValue(ABC):
         who = {f"P{at:03d}": observer for at, observer in enumerate(observers, start=1)}
         rows = pd.DataFrame(simulate_study(self.protocol, who, seed, f"validate/{self.name}/{number}", sense))
         return rows[rows["block"] == self.block.id]
-
-    def _coverage(self, studies: Sequence[StudyFound], truth: float) -> Verdict:
-        """Return whether the share of the group's intervals that hold the truth is 95 %, but for chance."""
-        share = float(np.mean([one.low <= truth <= one.high for found in studies for one in found.group]))
-        slack = 3 * math.sqrt(0.95 * 0.05 / len(studies))
-        limit, what = f"95 ± {100 * slack:.1f} %", "coverage of the group's 95 % intervals"
-        return Verdict(self.name, what, f"{100 * share:.1f} %", limit, abs(share - 0.95) <= slack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,8 +157,11 @@ class KnownThreshold(KnownValue):
 
     @property
     def threshold(self) -> float:
-        """The threshold, as a level: a Weber fraction or a difference [ms]."""
-        return 1000 * self.observer.delay_jnd_s if self._of_delay else self.observer.weber_fraction
+        """The mean threshold, as a level: a Weber fraction or a difference [ms]."""
+        return self._threshold(self.observer)
+
+    def _threshold(self, observer: Observer) -> float:
+        return 1000 * observer.delay_jnd_s if self._of_delay else observer.weber_fraction
 
     @property
     def _of_delay(self) -> bool:
@@ -163,9 +171,23 @@ class KnownThreshold(KnownValue):
         """Return the mean of ln value over threshold."""
         return sum(math.log(value / self.threshold) for value in values) / len(values)
 
-    def simulate(self, number: int, seed: int, people: int = PEOPLE, observers: Sequence[Observer] = ()) -> StudyFound:
-        """Return what a study finds; ``observers`` differ, and take part in place of ``people`` equal ones."""
-        rows = self._simulated(observers or (self.observer,) * people, seed, number)
+    def people(self, number: int, seed: int) -> Iterator[tuple[Observer, float]]:
+        """Yield the people of a study, with their thresholds: they differ in them, and in lapses up to `LAPSES_MOST`.
+
+        In the study's session the threshold is another one than on average over sessions.
+        """
+        apart, draw = self._apart(PEOPLE, seed, number)
+        name = "delay_jnd_s" if self._of_delay else "weber_fraction"
+        for one in apart:
+            own = replace(self.observer, lapses=LAPSES_MOST * draw())
+            own = replace(own, **{name: getattr(own, name) * math.exp(one)})
+            today = getattr(own, name) * BETWEEN_SESSIONS ** normal(draw)
+            yield replace(own, **{name: today}), self._threshold(own)
+
+    def simulate(self, number: int, seed: int, observers: Sequence[Observer] = ()) -> StudyFound:
+        """Return what a study finds of ``observers``, by default of `people`."""
+        people = [(one, self._threshold(one)) for one in observers] or [*self.people(number, seed)]
+        rows = self._simulated([one for one, _ in people], seed, number)
         frame = rows.assign(session=1, level_delivered=rows["level"], analysed=True)
         frame = frame.astype({"level_delivered": "Float64", "success": "boolean"})
         protocol, block = self.protocol, self.block
@@ -178,15 +200,20 @@ class KnownThreshold(KnownValue):
             settings=(),
             method=method_of(protocol, block),
         )
+        truths = {f"P{at:03d}": threshold for at, (_, threshold) in enumerate(people, start=1)}
         found: dict[str | None, list[Estimated]] = {}
         for row in thresholds(levels, frame):
-            found.setdefault(row.participant, []).append(_estimated(row))
+            truth = self.threshold if row.participant is None else truths[row.participant]
+            assert row.low is not None and row.high is not None  # noqa: S101, PT018 - ten participants have an interval
+            found.setdefault(row.participant, []).append(Estimated(row.threshold, row.low, row.high, truth))
         group = tuple(found.pop(None))
         return StudyFound(group, tuple(map(tuple, found.values())))
 
     def verdicts(self, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
-        """Yield error, coverage and, with several standards, the slope of ln JND over ln standard."""
-        errors = np.array([self.error([one.value for one in found.group]) for found in studies])
+        """Yield error and, with several standards, the slope of ln JND over ln standard."""
+        truths = [[one.truth for person in found.own for one in person] for found in studies]
+        of_groups = [self.error([one.value for one in found.group]) for found in studies]
+        errors = np.array(of_groups) - [self.error(of_people) for of_people in truths]
         mean = math.expm1(float(errors.mean()))
         what = "mean error of the threshold"
         yield Verdict(self.name, what, f"{100 * mean:+.1f} %", "within ±5 %", abs(mean) <= ERROR_MOST)
@@ -194,12 +221,6 @@ class KnownThreshold(KnownValue):
         what, limit = f"studies of {PEOPLE} within ±15 %", "at least 95 % (Wilson interval)"
         holds = wilson_interval(near / n, n)[1] >= NEAR_SHARE
         yield Verdict(self.name, what, f"{100 * near / n:.1f} %", limit, holds)
-        yield self._coverage(studies, self.threshold)
-        own = [one for found in studies for person in found.own for one in person]
-        share = sum(one.low <= self.threshold <= one.high for one in own) / len(own)
-        low, high = OWN_COVERAGE
-        what, limit = "coverage of participants' 95 % intervals", f"{100 * low:.0f} to {100 * high:.0f} %"
-        yield Verdict(self.name, what, f"{100 * share:.1f} %", limit, low <= share <= high)
         standards = np.array([one for one in standards_of(self.protocol, self.block) if one is not None])
         if len(standards) < 2:
             return
@@ -226,11 +247,6 @@ class KnownThreshold(KnownValue):
         return Verdict(self.name, what, value, limit, abs(error) <= SPREADS * spread)
 
 
-def _estimated(row: ThresholdEstimate) -> Estimated:
-    assert row.low is not None and row.high is not None  # noqa: S101, PT018 - ten participants have an interval
-    return Estimated(row.threshold, row.low, row.high)
-
-
 @dataclass(frozen=True, slots=True)
 class KnownExponent(KnownValue):
     """The exponent of a block of magnitude estimation.
@@ -242,9 +258,13 @@ class KnownExponent(KnownValue):
 
     @property
     def observer(self) -> Observer:
-        """Who estimates; the slope of ln resistance over ln level is by least squares."""
+        """Who estimates with the known exponent."""
+        return self._observer(EXPONENT)
+
+    def _observer(self, exponent: float) -> Observer:
+        """Return who estimates; the slope of ln resistance over ln level is by least squares."""
         slope = float(np.polyfit(np.log(_levels(self.protocol, self.block)), np.log(self.resistances), 1)[0])
-        return replace(OBSERVER, estimates=(EXPONENT / slope, ESTIMATE_NOISE))
+        return replace(OBSERVER, estimates=(exponent / slope, ESTIMATE_NOISE))
 
     def error(self, values: Sequence[float]) -> float:
         """Return the mean less the exponent."""
@@ -253,21 +273,21 @@ class KnownExponent(KnownValue):
     def simulate(self, number: int, seed: int, people: int = PEOPLE) -> StudyFound:
         """Return what a study finds; observers estimate what would reach the hand at the pace."""
         reached = dict(zip(_levels(self.protocol, self.block), self.resistances, strict=True))
-        frame = self._simulated(
-            (self.observer,) * people, seed, number, lambda presented: reached.get(presented.value, math.nan)
-        )
+        truths = [EXPONENT * (1 + one) for one in self._apart(people, seed, number)[0]]
+        observers = [self._observer(one) for one in truths]
+        frame = self._simulated(observers, seed, number, lambda presented: reached.get(presented.value, math.nan))
         own = np.array([estimate_slope(one["level"], one["answer"]) for _, one in frame.groupby("participant")])
         low, high = student_interval(own)
         assert low is not None and high is not None  # noqa: S101, PT018 - several participants have an interval
-        return StudyFound((Estimated(float(own.mean()), low, high),), tuple((Estimated(it),) for it in own.tolist()))
+        each = tuple((Estimated(one, truth=truth),) for one, truth in zip(own.tolist(), truths, strict=True))
+        return StudyFound((Estimated(float(own.mean()), low, high, EXPONENT),), each)
 
     def verdicts(self, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
-        """Yield mean and coverage."""
+        """Yield the mean."""
         mean = float(np.mean([found.group[0].value for found in studies]))
         what = f"exponent over {stimulus_of(self.protocol, self.block).vary}"
         limit = f"{EXPONENT:g} ± {EXPONENT_ERROR_MOST:g}"
         yield Verdict(self.name, what, f"{mean:.3f}", limit, abs(mean - EXPONENT) <= EXPONENT_ERROR_MOST)
-        yield self._coverage(studies, EXPONENT)
 
     def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
         """Yield each participant's exponent."""
@@ -339,6 +359,19 @@ def rehearsed(one: Known, source: bytes, seed: int) -> Rehearsed:
         return Rehearsed(float(intervals["invalid_reasons"].isna().mean()), findings, values)
 
 
+def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
+    """Yield whether 95 % intervals hold the truth: the group's in 95 % of studies but for chance, and participants'."""
+    groups = [one.covered for found in studies for one in found.group]
+    share, slack = float(np.mean(groups)), 3 * math.sqrt(0.95 * 0.05 / len(studies))
+    limit, what = f"95 ± {100 * slack:.1f} %", "coverage of the group's 95 % intervals"
+    yield Verdict(name, what, f"{100 * share:.1f} %", limit, abs(share - 0.95) <= slack)
+    own = [one.covered for found in studies for person in found.own for one in person if not math.isnan(one.low)]
+    if own:
+        (low, high), share = OWN_COVERAGE, float(np.mean(own))
+        what, limit = "coverage of participants' 95 % intervals", f"{100 * low:.0f} to {100 * high:.0f} %"
+        yield Verdict(name, what, f"{100 * share:.1f} %", limit, low <= share <= high)
+
+
 def judged(one: Known, found: Rehearsed, spread: float) -> Iterator[Verdict]:
     """Yield the verdicts on rehearsed participants; ``spread`` is that of studies of as many."""
     share, findings = found.delivered, found.findings
@@ -351,25 +384,29 @@ def judged(one: Known, found: Rehearsed, spread: float) -> Iterator[Verdict]:
 def validate(
     known: Sequence[tuple[bytes, Known]],
     studies: int,
-    seed: int,
+    seeds: Sequence[int],
     executor: Executor,
     progress: Callable[[str, float | None], object],
 ) -> list[Verdict]:
-    """Return all verdicts on known values, each with the source of its protocol.
+    """Return all verdicts on known values, each with the source of its protocol; studies of all seeds count together.
 
     ``progress`` is called with what is done, and the share of it.
     """
     verdicts: list[Verdict] = []
-    rehearsals = [executor.submit(rehearsed, one, source, seed) for source, one in known]
+    every: list[StudyFound] = []
+    rehearsals = [executor.submit(rehearsed, one, source, seeds[0]) for source, one in known]
+    cases = [(number, seed) for seed in seeds for number in range(studies)]
     for (_, one), rehearsal in zip(known, rehearsals, strict=True):
 
         def counted(done: int, name: str = one.name) -> None:
-            progress(f"{name}: {done} of {studies} studies", done / studies)
+            progress(f"{name}: {done} of {len(cases)} studies", done / len(cases))
 
-        found = run(partial(one.simulate, seed=seed), [(number,) for number in range(studies)], executor, counted)
+        found = run(one.simulate, cases, executor, counted)
+        every += found
+        verdicts += [*one.verdicts(found), *coverage(one.name, found)]
         progress(f"{one.name}: rehearsing {REHEARSED} participants", None)
-        verdicts += [*one.verdicts(found), *judged(one, rehearsal.result(), one.spread(found, REHEARSED))]
-    return verdicts
+        verdicts += judged(one, rehearsal.result(), one.spread(found, REHEARSED))
+    return [*verdicts, *coverage("all of them", every)]
 
 
 def evidence(verdicts: Sequence[Verdict], heading: str) -> Evidence:

@@ -96,8 +96,8 @@ def detected(people: Sequence[Person], seed: int) -> tuple[float, float, float]:
     """Return the group's threshold in `FORCED_CHOICE` with the ends of its 95 % interval [ms]."""
     one = known_value(FORCED_CHOICE, load(FORCED_CHOICE))
     assert isinstance(one, KnownThreshold)  # noqa: S101 - it has forced choices alone
-    (group,) = one.simulate(0, seed, observers=[person.observer for person in people]).group
-    return group
+    (group,) = one.simulate(0, seed, [person.observer for person in people]).group
+    return group.value, group.low, group.high
 
 
 def rated(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: int) -> Rated:

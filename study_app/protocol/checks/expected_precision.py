@@ -8,7 +8,7 @@ that of the mean by Student's t.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar, Final, TypeAlias
@@ -173,13 +173,15 @@ def expected_mean(plan: MeanPlan) -> Expected:
     """Return how precise the d′, d_a or exponent of one participant, and their mean, are expected to be."""
     found = plan.estimates(np.full(MEAN_OBSERVERS, plan.value), np.random.default_rng(SEED))
     spread = float(found.std())
-    return Expected("linear", plan.trials, standards=1, half=Z_95 * spread, spread=spread, threshold=plan.value)
+    return Expected("linear", plan.trials, standards=1, halves=(Z_95 * spread,), spread=spread, threshold=plan.value)
 
 
 OBSERVERS: Final = 200
 """Of a simulated threshold."""
 SEED: Final = 1
 LAPSES: Final = 0.02
+WIDTHS: Final = (0.5, 1.0, 2.0)
+"""Of simulated observers, as shares of the prior's median: one in three each, so that the prior is wrong, too."""
 FALSE_ALARMS: Final = 0.1
 """Of simulated observers, where the guess rate is free. [choice]"""
 MOST_WORK: Final = 700_000_000
@@ -266,14 +268,17 @@ class ThresholdPlan:
         with np.errstate(divide="ignore"):  # a level of 0 has the logarithm −∞
             return np.log10(np.maximum(found, 0.0)) if log else found
 
-    def answers(self, thresholds: Floats, random: Generator, lapses: float = LAPSES) -> ObserverAnswers:
-        """Return what observers with thresholds (n,) [u] answer."""
+    def answers(
+        self, thresholds: Floats, random: Generator, lapses: float = LAPSES, widths: Sequence[float] = (1.0,)
+    ) -> ObserverAnswers:
+        """Return what observers with thresholds (n,) [u] answer; ``widths`` [prior's median] take turns among them."""
         stimulus, design = self.stimulus, self.design
         assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
         if guess is None:
             guess = lapses if guesses_of(stimulus, design) is None else FALSE_ALARMS
         presented = None if self.clipping is None else self.presented
-        observers = Observers(assumed.family, thresholds, assumed.width_prior[0], guess, lapses, presented)
+        own = assumed.width_prior[0] * (np.resize(widths, len(thresholds)) if len(widths) > 1 else widths[0])
+        observers = Observers(assumed.family, thresholds, own, guess, lapses, presented)
         noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
         tracks, yes = [], np.zeros(len(thresholds))
         for number in range(1, self.method.tracks + 1):
@@ -307,9 +312,9 @@ class ThresholdPlan:
         fits = (fit(places, right, wrong, grid) for right, wrong in counts.transpose(1, 0, 2))
         return Estimates(*np.array([(one.threshold, *one.interval, one.variance) for one in fits]).T)
 
-    def simulate(self, thresholds: Floats, random: Generator) -> Estimates:
-        """Return what the analysis estimates of observers with these thresholds [u]."""
-        return self.estimates(self.answers(thresholds, random))
+    def simulate(self, thresholds: Floats, random: Generator, widths: Sequence[float] = (1.0,)) -> Estimates:
+        """Return what the analysis estimates of observers with these thresholds [u], as in `answers`."""
+        return self.estimates(self.answers(thresholds, random, widths=widths))
 
 
 def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
@@ -328,7 +333,7 @@ def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
 
 @lru_cache(maxsize=32)
 def expected(plan: ThresholdPlan) -> Expected:
-    """Return how precise thresholds are expected to be.
+    """Return how precise thresholds are expected to be, of observers with each of `WIDTHS`.
 
     Only thresholds below the highest level that is presented in full have estimates; where those are not the larger
     half of all, none is expected.
@@ -342,16 +347,18 @@ def expected(plan: ThresholdPlan) -> Expected:
     truth = low + (high - low) * (0.25 + 0.5 * (np.arange(observers) + 0.5) / observers)  # the middle half
     halves, variances = [], []
     for one in simulated.each_standard():
-        found = one.simulate(truth, np.random.default_rng(SEED))
+        found = one.simulate(truth, np.random.default_rng(SEED), WIDTHS)
         full = one.measures(truth)
-        halves.append(float((found.highs - found.lows)[full].mean()) / 2 if full.mean() > 0.5 else math.inf)
+        ends, turn = (found.highs - found.lows) / 2, np.arange(observers) % len(WIDTHS)
+        measured = [ends[full & (turn == place)] if full.mean() > 0.5 else math.inf for place in range(len(WIDTHS))]
+        halves.append([float(np.mean(one)) for one in measured])
         variances.append(float((found.medians - truth)[full].var()) if full.mean() > 0.5 else math.inf)
     shrunk = (simulated.trials / plan.trials) ** 0.5
     return Expected(
         spacing=plan.stimulus.spacing,
         trials=plan.trials,
         standards=plan.standards,
-        half=shrunk * sum(halves) / len(halves),
+        halves=tuple((shrunk * np.mean(halves, axis=0)).tolist()),
         spread=shrunk * (sum(variances) / len(variances)) ** 0.5,
         threshold=plan.stimulus.level_of(float(np.median(truth))),
     )
@@ -375,7 +382,9 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
     if not (found := expected_of(plan)).measured:
         yield "Expected precision", "none: the levels of most thresholds are clipped"
         return
-    one = f"±{found.half:.2g}{plan.unit}" if found.factor is None else f"×/÷ {found.factor:.1f}"
+    log = found.spacing == "log"
+    ends = [f"{10.0**half:.1f}" if log else f"{half:.2g}" for half in (min(found.halves), max(found.halves))]
+    one = f"{'×/÷ ' if log else '±'}{' to '.join(dict.fromkeys(ends))}{'' if log else plan.unit}"
     people, precision = _planned(protocol)
     over = "" if found.standards == 1 else " over all standards"
     group = ""

@@ -1,8 +1,6 @@
 """What is said of a delay: never more than every delay up to it allows, and equivalent only where all checks agree."""
 
 from collections.abc import Mapping
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,13 +8,10 @@ import pytest
 from study_app.analysis.data.blocks import NOTHING_DECIDED, Item, Setting
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.findings.delays import ContrastsWithControl, ContrastWithControl, Lowest, LowestDelay, by_delay
-from study_app.analysis.findings.finding import MANY
-from study_app.analysis.findings.mixed_models import MixedModel
 from study_app.analysis.report.sections import limits
 from study_app.analysis.results import BlockResult
 from study_app.analysis.results import Results as Found
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.trend import step_down
 from tests.analysis.conftest import Results
 
@@ -94,23 +89,3 @@ def test_every_delay_has_its_own_sentence() -> None:
     rows = by_delay(delays({50: CALM, 125: SCATTERED, 300: AWAY}, (Lowest("different", steps),)))
     assert rows[0][-1].startswith(WITHIN)
     assert "speak against “delays up to 300 ms do not matter”: “Different” follows the delay" in rows[2][-1]
-
-
-@pytest.mark.parametrize(
-    ("k", "sites", "revealed", "n", "reason"),
-    [
-        (1, (), True, 20, "there is one setting"),
-        (2, ("A", "B"), False, 20, "each site has settings of its own until the keys of all sites are open"),
-        (2, (), True, FEW - 1, f"with {FEW - 1} participants, below {FEW}, its estimates and errors would not hold"),
-        (2, (), True, MANY + 1, f"it is left out above {MANY} participants, where it takes minutes"),
-        (2, ("A", "B"), True, FEW, ""),
-        (2, (), False, MANY, ""),
-    ],
-)
-def test_the_mixed_model_is_left_out_for_a_reason(
-    k: int, sites: tuple[str, ...], revealed: bool, n: int, reason: str
-) -> None:
-    block = SimpleNamespace(id="b", kind="liquids", revealed=revealed)
-    asked: Any = SimpleNamespace(k=k, sites=sites, n=n, block=block, single={}, verdicts_only=False)
-    _, absent = MixedModel.test(asked, found(delays({50: CALM})))
-    assert [(one.what, one.why) for one in absent] == ([("mixed model of the settings", reason)] if reason else [])

@@ -145,11 +145,11 @@ def test_the_answers_are_those_of_the_answer_model() -> None:
     answers = people(study_plan, 400, 1, 0)[1].answers(1.0)
     assert set(np.unique(answers)) <= set(range(1, 8))
     different = answers[:, :, [item.id for item in study_plan.blocks[1].items].index("different")]
-    assert different[:, 0].mean() == pytest.approx(1.9, abs=0.2)
+    assert different[:, 0].mean() == pytest.approx(1.9 + 0.3, abs=0.2)  # one in ten is 3 points higher
     assert different[:, -1].mean() == pytest.approx(6.1, abs=0.2)
     none = people(study_plan, 400, 1, 0)[1].answers(0.0).mean(axis=0)
     assert np.ptp(none, axis=0).max() < 0.25
-    assert (np.diff(different.mean(axis=0)) > -0.1).all()
+    assert (np.diff(different.mean(axis=0)) > -0.2).all()
 
 
 def test_the_lowest_delay_is_the_step_downs_of_the_report() -> None:

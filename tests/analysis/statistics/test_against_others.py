@@ -5,9 +5,12 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import binom, ttest_rel
+from scipy.stats import f as variance_ratio
+from scipy.stats import t as student
 
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.mixed_model import ordinal
+from study_app.analysis.statistics.mixed_model import mixed
 from study_app.analysis.statistics.outcome import false_discovery, holm
 from study_app.analysis.statistics.rank_tests import friedman, paired
 from study_app.analysis.statistics.recognition import kappa
@@ -61,14 +64,33 @@ def test_statsmodels() -> None:
 
 @pytest.mark.filterwarnings("ignore")
 def test_statsmodels_models() -> None:
-    ordered = vendor("statsmodels.miscmodels.ordinal_model")
-    values = answers(30, 3, seed=5)
-    design = np.tile(np.eye(3)[:, 1:], (30, 1))
-    theirs = ordered.OrderedModel(values.ravel(), design, distr="logit").fit(method="bfgs", disp=False, gtol=1e-8)
-    ours = ordinal(values, intercepts=False)
-    assert ours.log_likelihood == pytest.approx(theirs.llf, abs=1e-7)
-    assert [one.estimate for one in ours.coefficients] == pytest.approx(theirs.params[:2], abs=1e-5)
-    assert [one.error for one in ours.coefficients] == pytest.approx(theirs.bse[:2], rel=1e-4)
+    models = vendor("statsmodels.regression.mixed_linear_model")
+    draw, delays = np.random.default_rng(5), np.linspace(0.0, 2.0, 7)
+    values = 4 + draw.normal(0, 1, (30, 1)) + draw.normal(0.3, 0.8, (30, 1)) * delays + draw.normal(0, 0.6, (30, 7))
+    design = np.tile(np.column_stack([np.ones(7), delays]), (30, 1))
+    theirs = models.MixedLM(values.ravel(), design, np.repeat(np.arange(30), 7), exog_re=design).fit(reml=True)
+    ours = mixed(values, delays[:, None])
+    assert ours.effect == pytest.approx(theirs.params[1], abs=1e-5)
+    assert ours.statistic == pytest.approx(theirs.tvalues[1], rel=1e-3)
+    assert ours.p == pytest.approx(2 * student.sf(abs(theirs.tvalues[1]), 29), rel=1e-2)  # theirs is normal: too small
+
+
+def test_two_settings_are_students_and_several_hotellings() -> None:
+    values = answers(12, 3, seed=9).astype(float)
+    both = mixed(values[:, :2])
+    assert (both.statistic, both.p) == pytest.approx(tuple(ttest_rel(values[:, 1], values[:, 0])))
+    away = values[:, 1:] - values[:, :1]
+    t2 = 12 * away.mean(axis=0) @ np.linalg.inv(np.cov(away.T)) @ away.mean(axis=0)
+    assert mixed(values).p == pytest.approx(variance_ratio.sf(t2 * 10 / (2 * 11), 2, 10))
+    assert mixed(values[:, ::-1]).p == pytest.approx(mixed(values).p)  # whichever setting is the first
+
+
+def test_people_with_slopes_of_their_own_are_no_trend() -> None:
+    """A model with random intercepts alone finds one in half of such studies."""
+    draw, delays = np.random.default_rng(3), np.arange(7.0)
+    own = draw.normal(size=(2000, 12, 1)) * delays + draw.normal(size=(2000, 12, 7))
+    shown = [(one.p or 1.0) <= 0.05 for one in (mixed(study, delays[:, None]) for study in own)]
+    assert sum(shown) <= binom.ppf(0.999, 2000, 0.05)
 
 
 def test_the_trend_is_scipys() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.mixed_model import ordinal
+from study_app.analysis.statistics.mixed_model import mixed
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired
 from study_app.analysis.statistics.recognition import UNANSWERED, UNDECIDED, Recognition, named, recognition
@@ -46,7 +46,8 @@ TESTS: dict[str, Callable[[np.ndarray], Outcome]] = {
     "tost": lambda values: tost(values[:, 2] - values[:, 0], 1.0),
     "threshold": lambda values: noticed(values, (0, 100, 200)),
     "recognition": lambda values: recognition(named(np.stack([values, values[:, ::-1]], axis=1)), [0, 2], 3),
-    "ordinal": ordinal,
+    "mixed": mixed,
+    "slope": lambda values: mixed(values, [[0.0], [1.0], [2.0]], "increasing"),
 }
 
 
@@ -79,7 +80,7 @@ def test_every_result_holds_what_it_promises(test: str, table: str) -> None:
     assert "no effect" not in said
 
 
-@pytest.mark.parametrize("test", ["friedman", "global", "trend", "paired", "tost"])
+@pytest.mark.parametrize("test", ["friedman", "global", "trend", "paired", "tost", "mixed", "slope"])
 def test_the_order_of_people_does_not_matter(test: str) -> None:
     there, back = TESTS[test](ANSWERS[:7]), TESTS[test](ANSWERS[:7][::-1])
     assert (there.statistic, there.effect) == pytest.approx((back.statistic, back.effect))

@@ -69,7 +69,7 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participant
             assert (LowestDelay.of(quick), DetectionThreshold.of(quick), MixedModel.of(quick)) == (
                 LowestDelay.of(whole),
                 DetectionThreshold.of(whole),
-                (),
+                MixedModel.of(whole),
             )
             recognised = LiquidRecognition.of(whole), LiquidRecognition.of(quick)
             assert len({None if one is None else (one.verdict, one.found.p) for one in recognised}) == 1

@@ -15,6 +15,7 @@ from study_app.evidence.thresholds.known_values import (
     KnownExponent,
     KnownThreshold,
     StudyFound,
+    coverage,
     judged,
     known_value,
     rehearsed,
@@ -104,12 +105,44 @@ def test_studies_are_the_same_in_any_order_and_on_any_number_of_workers(
 
 @pytest.mark.slow
 def test_the_threshold_is_recovered(threshold: KnownThreshold, thresholds: list[StudyFound]) -> None:
-    judged = {row.what: row for row in threshold.verdicts(thresholds)}
+    judged = {row.what: row for row in [*threshold.verdicts(thresholds), *coverage("small", thresholds)]}
     few = {"studies of 10 within ±15 %"}  # 20 trials are few
     assert {what for what, row in judged.items() if not row.holds} <= few
     assert threshold.threshold == 0.24
     assert 0.1 < threshold.spread(thresholds, 3) < 0.6
     assert threshold.spread(thresholds, 10) < threshold.spread(thresholds, 3)
+    planted = {one.truth for found in thresholds for (one,) in found.own}
+    assert len(planted) == 200, "people differ"
+
+
+def changed(found: StudyFound, factor: float, reach: float) -> StudyFound:
+    """Return a study with estimates and intervals times a factor, and the intervals ``reach`` times as wide."""
+
+    def one(it: Estimated) -> Estimated:
+        ends = (it.value * factor * (end / it.value) ** reach for end in (it.low, it.high))
+        return Estimated(it.value * factor, *ends, it.truth)
+
+    return StudyFound(tuple(map(one, found.group)), tuple(tuple(map(one, person)) for person in found.own))
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_another_estimator_and_another_interval_are_noticed(threshold: KnownThreshold) -> None:
+    long = replace(threshold, protocol=parse(SMALL.replace("trials = 20", "trials = 60").encode(), "small.toml"))
+    studies = [long.simulate(number, seed=1) for number in range(30)]
+    assert all(row.holds for row in [*long.verdicts(studies), *coverage("small", studies)])
+    for factor, reach in ((1.1, 1.0), (0.9, 1.0), (1.0, 0.7), (1.0, 1.3)):
+        other = [changed(one, factor, reach) for one in studies]
+        missed = {row.what for row in [*long.verdicts(other), *coverage("small", other)] if not row.holds}
+        assert ("mean error of the threshold" if reach == 1.0 else "coverage of participants' 95 % intervals") in missed
+
+
+def test_the_limit_of_a_coverage_follows_from_the_number_of_all_studies() -> None:
+    held, missed = (StudyFound((Estimated(1.0, 0.5, high, 1.0),), ()) for high in (2.0, 0.9))
+    seed = [held] * 183 + [missed] * 17
+    (alone,), (pooled,) = coverage("one seed", seed), coverage("two seeds", 2 * seed)
+    assert (alone.value, alone.limit, alone.holds) == ("91.5 %", "95 ± 4.6 %", True)
+    assert (pooled.value, pooled.limit, pooled.holds) == ("91.5 %", "95 ± 3.3 %", False)
 
 
 @pytest.mark.nightly
@@ -128,7 +161,7 @@ def test_the_whole_program_recovers_it_and_another_observer_is_found(threshold: 
 def test_without_noise_the_known_exponent_is_found(exponent: KnownExponent, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(known_values, "ESTIMATE_NOISE", 1e-6)
     found = exponent.simulate(0, seed=1, people=3)
-    assert [own.value for (own,) in found.own] == pytest.approx([EXPONENT] * 3, abs=1e-5)
+    assert [own.value for (own,) in found.own] == pytest.approx([own.truth for (own,) in found.own], abs=1e-5)
 
 
 @pytest.mark.slow
@@ -136,14 +169,14 @@ def test_studies_recover_the_exponent_and_a_wrong_one_is_found(
     exponent: KnownExponent, exponents: list[StudyFound]
 ) -> None:
     judged = list(exponent.verdicts(exponents))
-    assert [row.what for row in judged] == ["exponent over viscosity_pa_s", "coverage of the group's 95 % intervals"]
-    assert all(row.holds for row in judged), judged
+    assert [row.what for row in judged] == ["exponent over viscosity_pa_s"]
+    assert all(row.holds for row in [*judged, *coverage("thickness", exponents)]), judged
     assert exponent.simulate(0, seed=1).group == exponents[0].group != exponent.simulate(0, seed=2).group
     means = [found.group[0].value for found in exponents]
     steeper = [StudyFound((Estimated(1.1 * mean, 0.0, 1.0),), ()) for mean in means]
     assert not next(iter(exponent.verdicts(steeper))).holds
-    narrow = [StudyFound((Estimated(mean, mean, mean),), ()) for mean in means]
-    assert not list(exponent.verdicts(narrow))[1].holds
+    narrow = [StudyFound((Estimated(mean, mean, mean, EXPONENT),), ()) for mean in means]
+    assert not next(coverage("thickness", narrow)).holds
     assert exponent.spread(exponents, 10) < exponent.spread(exponents, 3) < 0.05
 
 

@@ -38,11 +38,10 @@ def test_the_verdict_is_that_of_the_interval(seed: int) -> None:
 @pytest.mark.parametrize(
     ("differences", "verdict"),
     [
-        ([2.0] * 12, "inconclusive"),
-        ([0.0] * 12, "equivalent"),
-        ([1.0] * 12, "inconclusive"),  # on the bound: not within it
-        ([0.0] * 11, "equivalent"),
-        ([0.0] * 10, "out of reach"),
+        ([2.0] * 14, "inconclusive"),
+        ([0.0] * 14, "equivalent"),
+        ([1.0] * 14, "inconclusive"),  # on the bound: not within it
+        ([0.0] * 13, "out of reach"),
         ([0.0] * 5, "out of reach"),
         ([-2.0] * 6, "out of reach"),
         ([2.0] * 5, "out of reach"),
@@ -56,16 +55,15 @@ def test_equal_differences_are_judged_by_the_tests_that_need_no_spread(differenc
 
 def test_equivalence_needs_so_many_participants_that_one_in_five_would_be_seen() -> None:
     spread = [0.0, 1.0, 0.0, -1.0] * 6
-    assert tost(spread[:13], 1.0).verdict == "inconclusive"
+    assert tost(spread[:13], 1.0).verdict == "out of reach"
     assert tost(spread[:13], 1.0).note == "too few participants to call it equivalent: 14 are needed"
     assert tost(spread[:14], 1.0).verdict == "equivalent"
     assert 0.8**14 <= 0.05 < 0.8**13
-    assert 0.75**11 <= 0.05 < 0.75**10
-    assert (fewest(0.05), fewest(0.05, equal=True), fewest(0.01)) == (14, 11, 21)
+    assert (fewest(0.05), fewest(0.01)) == (14, 21)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("n", "others"), [(5, (0,)), (5, (-1, 0, 1)), (12, (-1, 0, 1)), (24, (0,)), (24, (-1, 0, 1))])
+@pytest.mark.parametrize(("n", "others"), list(product((5, 12, 24), ((0,), (-1, 0, 1)))))
 def test_where_a_few_notice_strongly_equivalence_is_seldom_shown(n: int, others: tuple[int, ...]) -> None:
     # One in five answers five points higher: the mean lies on the bound.
     rng = np.random.default_rng(n)

@@ -1,0 +1,114 @@
+"""Planned looks: how they share alpha, what a study file may state, and how a look is planned and reported."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.stats import norm, ttest_rel
+
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.planning.preregistration import preregistration
+from study_app.analysis.planning.simulated_studies import FULL, count, people, plan
+from study_app.analysis.report.sections import first_page
+from study_app.analysis.statistics.mixed_model import mixed
+from study_app.analysis.statistics.outcome import Spending, alpha_of_looks, holm
+from study_app.cli import commands
+from study_app.errors import ProtocolError
+from study_app.protocol.load import parse
+from study_app.protocol.source.files import source_bytes
+from tests.analysis.made_up import everybody, liquids, study
+from tests.analysis.power.test_power import felt_in
+
+CONTRAST = '{ measure = "different", blocks = ["delays"], conditions = ["delay_150", "delay_0"], expected = "higher" }'
+LOOKED = (
+    source_bytes("rek2024")
+    .decode()
+    .replace("format = 1", "format = 2")
+    .replace("[analysis]\n", f"[analysis]\nparticipants = 12\nlooks = [6, 12]\ncontrasts = [{CONTRAST}]\n")
+)
+
+
+@pytest.mark.parametrize(
+    ("spending", "bounds"),
+    [
+        ("obrien-fleming", (4.8769, 3.3569, 2.6803, 2.2898, 2.0310)),
+        ("pocock", (2.4380, 2.4268, 2.4101, 2.3966, 2.3859)),
+    ],
+)
+def test_bounds_are_those_of_published_tables(spending: Spending, bounds: tuple[float, ...]) -> None:
+    """Five equal looks, two-sided alpha of 0.05: Reboussin et al. 2000, Control. Clin. Trials 21, 190-207 (ld98)."""
+    found = norm.isf(np.array(alpha_of_looks((5, 10, 15, 20, 25), 0.05, spending)) / 2)
+    assert found == pytest.approx(bounds, abs=3e-4)
+    assert alpha_of_looks((7, 12), 0.05, spending)[0] < alpha_of_looks((9, 12), 0.05, spending)[0] < 0.05
+
+
+@pytest.mark.parametrize(
+    ("looks", "said"),
+    [
+        ("[12]", "give two or more numbers, of which the last is analysis.participants"),
+        ("[6, 10]", "give two or more numbers, of which the last is analysis.participants"),
+        ("[12, 6, 12]", "each look has more participants than the one before"),
+        ("[1, 12]", "looks"),
+    ],
+)
+def test_looks_that_make_no_sense_are_refused(looks: str, said: str) -> None:
+    with pytest.raises(ProtocolError, match=said):
+        parse(LOOKED.replace("[6, 12]", looks).encode(), "looked.toml")
+
+
+@pytest.mark.slow
+def test_a_look_is_planned_and_its_alpha_is_less_than_that_of_all() -> None:
+    protocol = parse(LOOKED.encode(), "looked.toml")
+    planned, (first, last) = plan(protocol, felt_in(protocol)), alpha_of_looks((6, 12), 0.05, "obrien-fleming")
+    counts = count(planned, (6, 12), 1, 0, 10)
+    for place, level in enumerate((first, last)):
+        alone = replace(planned, decided=replace(planned.decided, looks=(), alpha=level))
+        once = count(alone, (6, 12), 1, 0, 10)
+        for what, found in counts.items():
+            if what[1] != "means":
+                assert (found[place] == once[what][place]).all() if place == 0 else (found[1] >= once[what][1]).all()
+                assert (found[1] >= found[0]).all()
+    (contrast,) = planned.contrasts
+    here = [people(planned, 12, 1, study)[1].answers(1.0)[:6] for study in range(10)]
+    names, items = [it.condition for it in planned.blocks[1].settings], [it.id for it in planned.blocks[1].items]
+    late, prompt, item = names.index("delay_150"), names.index("delay_0"), items.index("different")
+    ps = [ttest_rel(one[:, late, item], one[:, prompt, item], alternative="greater").pvalue for one in here]
+    assert counts[contrast.described(), "contrast"][0, FULL] == sum(p <= first for p in ps) > 0
+    text = preregistration(protocol, "0" * 64)
+    assert "everything tested, when 6 and 12 sessions that count are complete" in text
+    assert f"at most {first:.2g} and {last:.2g} is significant there (O'Brien–Fleming spending" in text
+
+
+@pytest.mark.slow
+def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
+    protocol = parse(LOOKED.replace("looks = [6, 12]", 'trends = "slopes"').encode(), "looked.toml")
+    planned = plan(protocol, felt_in(protocol))
+    counts = count(planned, (6,), 1, 0, 10)["delays", "found"]
+    items, x = planned.blocks[1].items, np.array(planned.blocks[1].delays_ms)[:, None] / 100
+    shown = 0
+    for number in range(10):
+        given = people(planned, 6, 1, number)[1].answers(1.0)
+        ps = [mixed(given[:, :, at], x, planned.decided.direction(one.id)).p or 1.0 for at, one in enumerate(items)]
+        shown += (holm(ps)[0] or 1.0) <= 0.05
+    assert counts[0, FULL, 0] == shown > 0
+    assert "linear mixed models with random intercepts and slopes" in preregistration(protocol, "0" * 64)
+
+
+@pytest.mark.parametrize(("n", "said"), [(5, "none of which is reached"), (6, "look 1 of 2"), (13, "look 2 of 2")])
+def test_the_first_page_says_which_look_it_is(n: int, said: str) -> None:
+    made = study(liquids(3), list(everybody(liquids(3), n, lambda person, _s, code, _i: 1 + int(code[1]) + person % 2)))
+    decided = replace(made.decided, made=True, changed=False, looks=(6, 12))
+    results = evaluate(replace(made, decided=decided.at(made.n)))
+    assert said in first_page(results, ())
+    assert results.decided.binding == (n >= 6)
+    assert results.decided.alpha == pytest.approx(alpha_of_looks((6, 12), 0.05, "obrien-fleming")[int(n > 12)])
+
+
+def test_the_sizes_of_power_are_the_looks(tmp_path: Path) -> None:
+    file = tmp_path / "looked.toml"
+    file.write_text(LOOKED)
+    result = CliRunner().invoke(commands, ["power", str(file), "--sizes", "5,10"])
+    assert result.exit_code == 2
+    assert "the study plans looks at 6, 12: omit --sizes" in " ".join(result.output.split())
