@@ -603,6 +603,8 @@ class MainController(QObject):
             return
         if live.theme is not self.window.theme:  # it was changed in the cockpit
             self.machine.change({"theme": live.theme.name})
+        if live.began and self.results_controller is not None:
+            self.results_controller.choose(live.chosen.results)
         self.window.come_back()
         if isinstance(live.error, DeviceError) and not live.began:
             name = live.chosen.device

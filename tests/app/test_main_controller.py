@@ -6,12 +6,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QDialog, QLabel
 
+from study_app.app import main_controller
 from study_app.app.failures import BY_SIGNAL_S
 from study_app.app.main_controller import MainController, home
 from study_app.app.session import live_session
@@ -124,6 +126,29 @@ def test_a_device_that_cannot_be_opened_is_tried_again_or_examined(
         qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
         assert not notice.isVisible()
     assert (tried, examined) == (["falcon", "falcon"], ["falcon"])
+
+
+class Held(QObject):
+    """A session that was held and is over as soon as it is opened."""
+
+    over = Signal()
+    began, opening, error, code = True, False, None, 0
+
+    def __init__(self, chosen: NewSession, theme: Any, *, asks: bool) -> None:
+        super().__init__()
+        self.chosen, self.theme = chosen, theme
+        assert asks
+
+    def open(self) -> None:
+        self.over.emit()
+
+
+def test_results_show_what_was_run_last(visit: MainController, monkeypatch: Any) -> None:
+    shown: list[Path] = []
+    monkeypatch.setattr(main_controller, "LiveSession", Held)
+    monkeypatch.setattr(visit, "results_controller", SimpleNamespace(choose=shown.append))
+    visit.window.place("home").session_asked.emit(CHOSEN)
+    assert (shown, visit.live) == ([CHOSEN.results], None)
 
 
 def test_a_mistake_before_the_first_window_leads_home_again(

@@ -156,6 +156,7 @@ COLUMNS = (
     Column("answers", "Answers", 80, 78),
 )
 EVERY = "every"
+LEAST_HEIGHT = 200
 NONE = {
     "": "No sessions of participants yet. The first one appears here when it begins.",
     "pilot": "No pilot sessions.",
@@ -186,7 +187,8 @@ class SessionsCard(Card):
         self.kind.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToContents)
         self.details = ActionButton("file", "Details", role="plain", height=34)
         self.all = ActionButton("chevron", "All results", role="plain", height=34)
-        parts = (label("Sessions", "card"), self.kind, (self.where, 1), self.details, self.all)
+        self.nothing = label(NONE[EVERY], "body", "text2")
+        parts = (label("Sessions", "card"), (self.nothing, 1), self.kind, (self.where, 1), self.details, self.all)
         self.rows = SessionsTable(COLUMNS, NONE[""])
         add_parts(self.column, hbox(*parts, spacing=12, margins=(12, 0, 12, 0)), (self.rows, 1))
         self.none = self.rows.none
@@ -197,7 +199,18 @@ class SessionsCard(Card):
         self.details.setEnabled(False)
         self.details.setAccessibleName("Details of the selected session")
         self._show_kinds()
-        self.setMinimumHeight(200)
+        self._show_emptiness()
+
+    @property
+    def is_empty(self) -> bool:
+        return not self._found
+
+    def _show_emptiness(self) -> None:
+        """Be one line where there is no session at all."""
+        self.nothing.setVisible(self.is_empty)
+        for part in (self.kind, self.where, self.details, self.all, self.rows):
+            part.setVisible(not self.is_empty)
+        self.setMinimumHeight(0 if self.is_empty else LEAST_HEIGHT)
 
     @property
     def shown(self) -> tuple[SessionFacts, ...]:
@@ -208,6 +221,7 @@ class SessionsCard(Card):
         self._found, self._now = tuple(found), now
         self.where.show_text(f"in {where}")
         self._show_kinds()
+        self._show_emptiness()
         self.rows.show_rows(self._found, now)
         self._filter()
 

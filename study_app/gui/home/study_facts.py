@@ -12,6 +12,7 @@ from typing import Final, TypeAlias
 
 from study_app.errors import ProtocolError, StudyError
 from study_app.gui.sessions.session_facts import (
+    SAMPLE,
     SessionFacts,
     counted_each,
     extent_of,
@@ -38,6 +39,7 @@ from study_app.store.workstation import recent_protocols
 from study_app.workspace import workspace
 
 SHIPPED: Final = "Shipped study"
+FIRST_STUDY: Final = "demo"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,16 +131,44 @@ LoadWords: TypeAlias = Callable[[], DraftWords] | None
 """Loads the designer's modules, only where there is a draft; None where a draft's content is not described."""
 
 
+def held_ns(session: Path) -> int:
+    """Return when a line was last written of a session in a folder [ns]; 0 where nobody knows."""
+    with suppress(OSError):
+        return (session / "journal.jsonl").stat().st_mtime_ns
+    return 0
+
+
+def last_study(results: Path) -> str:
+    """Return the study of the session that was held last under ``results``, samples aside; "" where there is none."""
+    found = results.glob("*/data/sub-*/ses-*")
+    with suppress(StudyError, ValueError):
+        last = max((one for one in found if not one.relative_to(results).parts[0].startswith(SAMPLE)), key=held_ns)
+        return start_of(journal.read(last / "journal.jsonl")).study
+    return ""
+
+
 def read_studies(
-    opened: Iterable[str], draft_words: LoadWords = None
+    opened: Iterable[str], draft_words: LoadWords = None, results: Path | None = None
 ) -> tuple[StudyFacts | BrokenFacts | DraftFacts, ...]:
-    """Return what is said of each study at hand: drafts first, the newest first of all, then ``opened`` ones."""
+    """Return what is said of each study at hand.
+
+    Drafts come first, the newest first of all, then ``opened`` ones, then the study that was run last under
+    ``results``; before the first session the demo.
+    """
+    opened = tuple(opened)
+    last = "" if results is None else last_study(results)
+    begins = results is not None and not last
     drafts = (_of_draft(file, draft_words) for file in unsaved_files(workspace().protocols))
     found = (
         *filter(None, drafts),
         *(study_facts(source, draft_words) for source in dict.fromkeys((*opened, *sources()))),
     )
-    return tuple(sorted(found, key=lambda it: 0.0 if it.draft is None else -_seconds(it.draft.kept_at)))
+
+    def place(it: StudyFacts | BrokenFacts | DraftFacts) -> tuple[float, bool, bool]:
+        first = it.name == last if last and isinstance(it, StudyFacts) else it.source == FIRST_STUDY and begins
+        return 0.0 if it.draft is None else -_seconds(it.draft.kept_at), it.source not in opened, not first
+
+    return tuple(sorted(found, key=place))
 
 
 def _of_draft(file: Path, draft_words: LoadWords) -> DraftFacts | None:

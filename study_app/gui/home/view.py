@@ -33,6 +33,7 @@ from study_app.gui.home.study_facts import (
     StudyFacts,
     file_states,
     held,
+    held_ns,
     holds_liquids_alone,
     interrupted,
     read_studies,
@@ -91,6 +92,8 @@ class HomePlace(Place):
         self._facts: tuple[Facts, ...] = ()
         self._files: frozenset[tuple[Path, int, int]] | None = None  # as the studies were read from them last
         self._unread = False  # whether reading them failed
+        self._last: Path | None = None  # the folder of the session that was held last
+        self._read_once = False
         self._studies = Background(self)
         self._studies.done.connect(self._show_studies)
         self._studies.failed.connect(self._show_unread)
@@ -196,7 +199,7 @@ class HomePlace(Place):
         """Read the protocols at hand, outside the window's thread; show a card for each, and the sessions."""
         self.folder.show_text(f"Workspace: {workspace().folder}")
         self._files, self._unread = file_states(self._opened), False
-        self._studies.run(partial(read_studies, tuple(self._opened), self._draft_words))
+        self._studies.run(partial(read_studies, tuple(self._opened), self._draft_words, self.results))
 
     def _show_studies(self, read: tuple[Facts, ...]) -> None:
         self.waiting.hide()
@@ -275,10 +278,22 @@ class HomePlace(Place):
     def _show_read(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
         results, found, stopped = read
         self.sessions.show_sessions(found, str(results), datetime.now().astimezone())
+        self._show_last(found)
+        self._arrange()
         self.banner.show_interrupted(stopped)
         for card in self.grid.cards:
             if isinstance(card, StudyCard):
                 card.held.setText(held(found, card.facts.protocol.study.name))
+
+    def _show_last(self, found: tuple[SessionFacts, ...]) -> None:
+        """Show the sessions of the kind that was held last, and its study first, once there is another one."""
+        last = max((one for one in found if one.kind != "sample"), key=lambda one: held_ns(one.folder), default=None)
+        before, self._last = self._last, None if last is None else last.folder
+        if last is not None and last.folder != before:
+            self.sessions.show_kind(last.kind)
+            if self._read_once:
+                self.show_studies()
+        self._read_once = True
 
     def ask_for_session(self, facts: StudyFacts) -> None:
         """Open the questions before a session; ``session_asked`` carries the answers."""
@@ -306,7 +321,6 @@ class HomePlace(Place):
         dialog = RehearsalDialog(facts, self.results, theme=self.theme, parent=self)
         self._open(dialog)
         dialog.finished.connect(self.show_sessions)
-        dialog.finished.connect(lambda: self.sessions.show_kind("simulated") if dialog.over else None)
         dialog.accepted.connect(lambda: self.results_asked.emit(dialog.folder))
 
     def _open_session(self, session: SessionFacts) -> None:
@@ -336,7 +350,8 @@ class HomePlace(Place):
         self.show_studies()
 
     def _arrange(self) -> None:
-        stacked = self.width() < STACKED_BELOW
+        stacked = self.width() < STACKED_BELOW or self.sessions.is_empty
+        self._page.setStretch(self._page.count() - 1, 0 if self.sessions.is_empty else BELOW_SHARE)
         down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
         self._below.setDirection(down if stacked else right)
         self._beside.setDirection(right if stacked else down)

@@ -12,11 +12,11 @@ from study_app.protocol.source.files import source_bytes
 from study_app.store.sessions.begin import SessionStart, begin
 
 
-def hold(folder, participant, *, simulated=False):
+def hold(folder, participant, *, simulated=False, study="demo"):
     with begin(
         folder,
-        load("demo"),
-        source_bytes("demo"),
+        load(study),
+        source_bytes(study),
         SessionStart(
             participant, seed=1, operator="", language="en", device={"name": "mouse"}, screens={}, simulated=simulated
         ),

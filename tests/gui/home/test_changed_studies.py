@@ -65,7 +65,7 @@ def test_a_study_that_is_added_edited_or_damaged_changes_its_card(qtbot, tmp_pat
     come_back()
     qtbot.waitUntil(lambda: titles(home).count("A first look") == 2)
     cards = [card for card in study_cards(home) if card.facts.title == "A first look"]
-    assert [card.origin.whole for card in cards] == ["Own study  ·  own.toml", "Shipped study  ·  demo.toml"]
+    assert [card.origin.whole for card in cards] == ["Shipped study  ·  demo.toml", "Own study  ·  own.toml"]
     assert len({card.new.accessibleName() for card in cards}) == 2
     file.write_text("format = 1\n")
     come_back()

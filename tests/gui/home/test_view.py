@@ -27,6 +27,28 @@ def test_participants_pilots_simulated_and_sample_sessions_are_shown_apart(qtbot
     assert shown == ids | {"All": ["P001", "P002", "P003"]}
 
 
+def first_study(home):
+    """Return the study of the first card, whose way into a session is the only primary button of the page."""
+    first, *others = study_cards(home)
+    assert [card.new.property("role") for card in (first, *others)] == ["primary", *[""] * len(others)]
+    return first.facts.source
+
+
+def test_the_demo_is_first_until_a_session_exists_then_what_was_run_last(qtbot, tmp_path):
+    home = open_home(qtbot, tmp_path)
+    assert first_study(home) == "demo"
+    assert home.sessions.height() < 60, "an empty card is one line"
+    assert home.sessions.nothing.isVisible()
+    for study, simulated, kind in (("rek2024", False, ""), ("slime", True, "simulated"), ("slime", False, "")):
+        hold(tmp_path / f"{study}{simulated}", "P001", study=study, simulated=simulated)
+        home.enter()
+        qtbot.waitUntil(lambda kind=kind: home.sessions.shown != () and home.sessions.kind.currentData() == kind)
+        qtbot.waitUntil(lambda study=study: not home.reading and first_study(home) == study)
+        assert study in {one.study for one in home.sessions.shown}
+    home.main.close()
+    assert first_study(open_home(qtbot, tmp_path)) == "slime", "another day, too"
+
+
 def test_a_session_is_opened_by_the_keyboard_a_double_click_and_a_button(home, qtbot):
     table, asked = home.sessions.rows.table, []
     home.sessions.open_asked.connect(lambda facts: asked.append(facts.participant))
