@@ -362,16 +362,19 @@ class HomePlace(Place):
         self._share_height()
 
     def _share_height(self) -> None:
-        """Let the cards have at least their first row, and no more than all of them need."""
+        """Let the cards have at least their first row; all they need where the page scrolls: one bar is enough."""
         if (whole := self.grid.whole_height) > 0:  # cards that came just now have no height yet
-            self.cards_area.setMinimumHeight(min(whole, self.grid.row_height + NEXT_ROW_PX))
+            others = self._page.totalMinimumSize().height() - self.cards_area.minimumHeight()
+            least = min(whole, self.grid.row_height + NEXT_ROW_PX)
+            self.cards_area.setMinimumHeight(least if others + least <= self.area.viewport().height() else whole)
             self.cards_area.setMaximumHeight(whole)
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         moved = super().focusNextPrevChild(forward)
         now = self.focusWidget()
         if moved and now is not None and self.grid.isAncestorOf(now):
-            self.cards_area.ensureWidgetVisible(now)
+            for area in (self.cards_area, self.area):
+                area.ensureWidgetVisible(now)
         return moved
 
     def resizeEvent(self, event: QResizeEvent) -> None:

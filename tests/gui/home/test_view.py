@@ -1,7 +1,7 @@
 """Home: cards, sessions, and the ways into a session."""
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QFileDialog
 
 from study_app.gui.home.cards import BrokenCard, StudyCard
@@ -47,6 +47,16 @@ def test_the_demo_is_first_until_a_session_exists_then_what_was_run_last(qtbot, 
         assert study in {one.study for one in home.sessions.shown}
     home.main.close()
     assert first_study(open_home(qtbot, tmp_path)) == "slime", "another day, too"
+
+
+@pytest.mark.parametrize("size", [(1024, 640), (1366, 768), (1600, 1000)])
+@pytest.mark.parametrize("held", [True, False])
+def test_no_scroll_bar_stands_in_a_scroll_area(qtbot, tmp_path, size, held):
+    if held:
+        hold(tmp_path / "demo", "P001")
+    home = open_home(qtbot, tmp_path, QSize(*size))
+    bars = [area.verticalScrollBar() for area in (home.area, home.cards_area)]
+    qtbot.waitUntil(lambda: sum(bar.maximum() > 0 for bar in bars) == 1)
 
 
 def test_a_session_is_opened_by_the_keyboard_a_double_click_and_a_button(home, qtbot):
