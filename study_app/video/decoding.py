@@ -17,6 +17,8 @@ NICE: Final = 5
 SECOND_NS: Final = 1_000_000_000
 USUAL_RATE_HZ: Final = 30.0
 RATES_HZ: Final = (1.0, 240.0)
+OF_FILE: Final = {"format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpeg,mpegts,ogg"}
+"""FFmpeg's names of containers that hold the video themselves: others, such as ffconcat, name another file."""
 
 
 class Pixels(NamedTuple):
@@ -47,7 +49,10 @@ def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **o
     if not container.streams.video:
         container.close()
         raise VideoError("it holds no video")
-    container.streams.video[0].codec_context.thread_count = 1
+    if (codec := container.streams.video[0].codec_context) is None:
+        container.close()
+        raise VideoError("its codec is unknown, or the file is damaged")
+    codec.thread_count = 1
     return container
 
 
@@ -55,6 +60,8 @@ def reason(error: Exception) -> str:
     """Return why a video cannot be read, as the system or FFmpeg reports it."""
     if type(error).__name__ == "ExitError":  # FFmpeg: "Immediate exit requested", after its time limit
         return "no data came in time"
+    if isinstance(error, UnicodeError):  # PyAV reads a name in it
+        return "the file is damaged"
     return str(getattr(error, "strerror", None) or error or type(error).__name__)
 
 

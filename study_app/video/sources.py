@@ -27,6 +27,7 @@ from study_app.protocol.source.files import file_hash
 from study_app.protocol.trials.stimuli import DELAY, MOST_DELAY_MS
 from study_app.video.decoding import (
     EXTRA,
+    OF_FILE,
     SECOND_NS,
     Scaler,
     installed,
@@ -220,7 +221,7 @@ class Footage:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            with open_video(str(path)) as container:
+            with open_video(str(path), **OF_FILE) as container:
                 stream = container.streams.video[0]
                 self._period_ns = period_ns(stream)
                 if (first := next(container.decode(stream), None)) is None:
@@ -228,7 +229,10 @@ class Footage:
                 self._start_s = first.time or 0.0
                 self.size = (stream.width, stream.height)
         except Exception as error:
-            raise VideoError(f"{path} cannot be shown: {reason(error)}") from error
+            raise VideoError(
+                f"{path} cannot be shown: {reason(error)}; give a video file that plays: MP4, MOV, Matroska, WebM, "
+                "AVI, MPEG or Ogg"
+            ) from error
         self._scaler = Scaler()
         self._changed = threading.Condition()
         self._frames: deque[VideoFrame] = deque()
@@ -292,7 +296,7 @@ class Footage:
     def _work(self) -> None:
         make_less_urgent()
         try:
-            with open_video(str(self.path)) as container:
+            with open_video(str(self.path), **OF_FILE) as container:
                 while not self._closed:
                     play = self._play
                     for frame in self._decoded(container, play):

@@ -1,7 +1,7 @@
 """Footage from a file: which frame is shown when, from the beginning of each trial, again and again."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -95,11 +95,11 @@ def test_frames_are_scaled_to_the_tank_with_their_own_ratio(footage: Footage) ->
 def test_a_file_that_fails_later_stops_without_its_name(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[Any] = []
 
-    def once(source: str) -> Any:
+    def once(source: str, **options: str) -> Any:
         if opened:
             raise VideoError("it is gone")
         opened.append(source)
-        return decoding.open_video(source)
+        return decoding.open_video(source, **options)
 
     monkeypatch.setattr("study_app.video.sources.open_video", once)
     footage = Footage(clip)
@@ -125,10 +125,23 @@ def test_an_error_of_ffmpeg_that_is_no_system_error_stops_it_too(clip: Path, mon
     footage.close()
 
 
-@pytest.mark.parametrize("content", [b"", b"no video at all" * 100])
-def test_a_file_that_is_no_video_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda _clip: b"",
+        lambda _clip: b"no video at all" * 100,
+        lambda clip: clip[: len(clip) // 2],
+        lambda clip: clip.replace(b"avc1", b"zzzz"),  # a codec that there is not
+        lambda clip: clip.replace(b"trak", b"zzzz"),
+        lambda _clip: b"ffconcat version 1.0\nfile clip.mp4\n",
+        lambda _clip: b"#EXTM3U\n#EXTINF:1,\nclip.mp4\n",
+    ],
+)
+def test_a_file_that_is_no_video_is_refused_in_one_line(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
+    write_clip(tmp_path / "clip.mp4", frames=6, size=(64, 48))
     broken = tmp_path / "broken.mp4"
-    broken.write_bytes(content)
-    with pytest.raises(VideoError, match=r"broken\.mp4 cannot be shown: .+") as refused:
+    broken.write_bytes(damage((tmp_path / "clip.mp4").read_bytes()))
+    with pytest.raises(VideoError, match=r"broken\.mp4 cannot be shown: .+; give a video file") as refused:
         Footage(broken)
     assert "\n" not in str(refused.value)
+    assert "NoneType" not in str(refused.value)

@@ -16,6 +16,7 @@ from study_app.protocol.checks.delayed_force import delay_warnings
 from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.checks.force_limits import PACED, clipped_unpaced, fastest_hz
 from study_app.protocol.model import Follow, Protocol, Published, Reach
+from study_app.protocol.orders.durations import variants
 from study_app.protocol.questionnaires import instrument
 from study_app.protocol.questions import POINTS
 from study_app.protocol.trials.presented_levels import highest_damping
@@ -237,8 +238,17 @@ def _unanswerable(protocol: Protocol) -> Iterator[str]:
             "positives than alpha"
         )
     yield from _order_of_blocks(protocol)
+    yield from dict.fromkeys(_pages_again(protocol))
     for number, one in enumerate(() if decided is None else decided.published):
         yield from _not_bracketed(protocol, number, one)
+
+
+def _pages_again(protocol: Protocol) -> Iterator[str]:
+    """Yield the pages that a session has several times and that are no breaks."""
+    for steps in (one.protocol.steps for one in variants(protocol)):
+        for name, page in protocol.pages.items():
+            if page.kind != "break" and (times := steps.count(name)) > 1:
+                yield f"pages.{name}: this page of kind {page.kind} comes {times} times in a session"
 
 
 def _order_of_blocks(protocol: Protocol) -> Iterator[str]:
