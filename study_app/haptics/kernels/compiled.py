@@ -23,9 +23,15 @@ from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 import numba
+from llvmlite.binding.newpassmanagers import ModulePassManager, create_new_module_pass_manager
 from numba.core import event
-from numba.core.caching import UserProvidedCacheLocator
+from numba.core.caching import FunctionCache, UserProvidedCacheLocator
+from numba.core.codegen import CPUCodegen, JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.options import DefaultOptions
+from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
 from platformdirs import user_cache_path
 
 log = logging.getLogger(__name__)
@@ -44,9 +50,11 @@ _IMPORTS = re.compile(r"from study_app\.([\w.]+) import \(?((?<=\()[^)]*|[^\n]*)
 _DIGEST = re.compile(r"[0-9a-f]{16}")
 _HALF_REMOVED = re.compile(r"\.[0-9a-f]{16}\.[0-9a-f]{8}\.gone")
 
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+_OPTIONS: dict[str, Any] = {"nopython": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 # numba's private name, which its stubs lack; without the option ticks are slower and equally correct.
 _NO_MEMORY: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+_DEFERS = hasattr(CPUCodegen, "_pass_builder") and hasattr(ModulePassManager, "add_global_dead_code_eliminate_pass")
+"""Whether numba is new enough to optimise a step within its callers only; otherwise compiling takes longer."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -161,7 +169,6 @@ def remove_cache(path: Path, used_at: float) -> None:
 SOURCES = compiled_sources(_PACKAGE)
 CACHE: Path | None = _use_own_cache()
 """The folder of compiled code; None if no folder is writable."""
-_OPTIONS["cache"] = CACHE is not None
 
 
 class PackageCacheLocator(UserProvidedCacheLocator):
@@ -195,23 +202,127 @@ if CACHE is not None:  # numba before 0.61.1 ignores it, and compiles again afte
     vars(numba.config)["CACHE_LOCATOR_CLASSES"] = ",".join(_LOCATORS)
 
 
+class _StepCode(JITCodeLibrary):
+    """Code that is optimised and translated only within the functions that call it."""
+
+    _codegen: Any
+
+    def _optimize_final_module(self) -> None:
+        if not _DEFERS:
+            super()._optimize_final_module()  # type: ignore[no-untyped-call]
+            return
+        removal = create_new_module_pass_manager()  # of addresses of this process, which are not used
+        removal.add_global_dead_code_eliminate_pass()
+        removal.run(self._final_module, self._codegen._pass_builder())  # noqa: SLF001 - numba has no public way to it
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
+        self._finalized = True
+
+    def get_pointer_to_function(self, _name: str) -> int:
+        """Return 0: Python does not call it."""
+        self._ensure_finalized()  # type: ignore[no-untyped-call]
+        return 0
+
+    def serialize_using_object_code(self) -> Any:
+        """Return it for the cache: there is no object code."""
+        return self.serialize_using_bitcode()  # type: ignore[no-untyped-call]
+
+    @property
+    def codegen(self) -> Any:
+        """The part of the code generator that a finished function needs."""
+        return self
+
+    def set_env(self, _name: str, _environment: Any) -> None:
+        """Do nothing: only Python objects are found through the environment."""
+
+
+class _StepCompiler(Compiler):
+    def define_pipelines(self) -> Any:
+        """Compile into a `_StepCode`."""
+        self.state.library = _StepCode(self.state.targetctx.codegen(), self.state.func_id.func_qualname)  # type: ignore[no-untyped-call]
+        return super().define_pipelines()  # type: ignore[no-untyped-call]
+
+
+class _Cache(FunctionCache):
+    of_step = False
+
+    def _index_key(self, *of: Any) -> Any:
+        return (*super()._index_key(*of), self.of_step)  # type: ignore[no-untyped-call]
+
+
+class _Kernel(CPUDispatcher):
+    """A compiled function. What a call from Python needs is compiled only if Python calls it."""
+
+    _compiler: Any
+    _of_step = False
+
+    def enable_caching(self) -> None:
+        """Use the cache on disk."""
+        self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
+
+    def _choose(self, of_step: bool) -> None:
+        self._of_step = self._cache.of_step = of_step
+        self.targetoptions["no_cpython_wrapper"] = of_step
+        self._compiler.pipeline_class = _StepCompiler if of_step else Compiler
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Compile it for a compiled function that calls it."""
+        with global_compiler_lock:
+            before = self._of_step
+            self._choose(True)
+            try:
+                return super().get_call_template(args, kws)
+            finally:
+                self._choose(before)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile it; if Python calls it, again where it is compiled as a step only."""
+        with global_compiler_lock:
+            arguments = tuple(normalize_signature(sig)[0])  # type: ignore[no-untyped-call]
+            if not self._of_step and arguments in self.overloads and not _is_callable(self.overloads[arguments]):
+                del self.overloads[arguments]
+            return super().compile(sig)
+
+    def add_overload(self, cres: Any) -> None:
+        """Let calls from Python find it if they may."""
+        if _is_callable(cres):
+            super().add_overload(cres)
+        else:
+            self.overloads[tuple(cres.signature.args)] = cres
+
+
+def _is_callable(compiled: Any) -> bool:
+    """Return whether Python can call a compiled function."""
+    return bool(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cpython_wrapper_name))
+
+
+def _compiled(function: F, **options: Any) -> F:
+    if vars(numba.config)["DISABLE_JIT"]:
+        return function
+    dispatcher = _Kernel(function, targetoptions=_OPTIONS | options)
+    if CACHE is not None:
+        dispatcher.enable_caching()
+    return cast(F, dispatcher)
+
+
 def kernel(function: F) -> F:
     """Compile ``function`` for the servo: no interpreter lock, IEEE arithmetic, division by zero gives infinity.
 
     numba's memory management is off: code that would allocate does not compile, and arrays passed on are not
     reference-counted, which took two thirds of a tick. The Python caller keeps the arrays alive.
     """
-    return cast(F, numba.njit(**_OPTIONS, **_NO_MEMORY)(function))
+    return _compiled(function, **_NO_MEMORY)
 
 
 def part(function: F) -> F:
     """Compile ``function`` inline into each kernel that calls it: for the steps of a tick, which pass whole models."""
-    return cast(F, numba.njit(**_OPTIONS, **_NO_MEMORY, forceinline=True)(function))
+    return _compiled(function, **_NO_MEMORY, forceinline=True)
 
 
 def workings(function: F) -> F:
     """Compile ``function`` for evidence, not for the servo: like `kernel`, but it may allocate arrays."""
-    return cast(F, numba.njit(**_OPTIONS)(function))
+    return _compiled(function)
 
 
 def entry_of(function: F, *arguments: Any) -> F:

@@ -28,6 +28,22 @@ def test_code_of_the_servo_that_would_allocate_does_not_compile(decorator):
         make(3)
 
 
+@about_compiled_code
+@pytest.mark.parametrize("decorator", [kernel, part])
+def test_python_calls_a_function_that_compiled_code_called_first(decorator):
+    @decorator
+    def half(value):
+        return value / 2
+
+    @kernel
+    def whole(value):
+        return 2 * half(value)
+
+    assert whole(3.0) == 3.0
+    assert half(3.0) == 1.5
+    assert whole(5.0) == 5.0
+
+
 def said_at_start(folder: Path, environment: dict[str, str]) -> tuple[str, str]:
     """Start an interpreter that compiles a file in ``folder``; return where it keeps that, and what it said."""
     program = folder / "program.py"
