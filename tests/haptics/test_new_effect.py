@@ -116,11 +116,10 @@ def copy(tmp_path: Path) -> Path:
     text = edited(
         tick.read_text("utf-8"),
         "from study_app.haptics.kernels.effects.surface import",
-        "from study_app.haptics.kernels.effects.spring import spring_force\n"
-        "from study_app.haptics.model.effects import spring",
+        "from study_app.haptics.kernels.effects.spring import spring_force",
     )
-    line = "    if liquid.effects & spring.BIT:\n        spring_force(parameters, liquid, local, state)"
-    tick.write_text(edited(text, "    if liquid.effects & added_mass.BIT:", line), "utf-8")
+    line = "    if liquid.effects & effects.spring.BIT:\n        spring_force(parameters, liquid, local, state)"
+    tick.write_text(edited(text, "    if liquid.effects & effects.added_mass.BIT:", line), "utf-8")
     study = (ROOT / "protocols" / "demo.toml").read_text("utf-8")
     study = study.replace(
         'density_kg_m3 = 1400\neffects = ["drag"]', 'density_kg_m3 = 1400\neffects = ["drag", "spring"]'
