@@ -30,7 +30,7 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s
-from study_app.protocol.orders.schedule import Schedule, stream
+from study_app.protocol.orders.schedule import PageStep, Schedule, stream
 from study_app.protocol.wording.languages import words
 from study_app.protocol.wording.without_force import without_force
 from study_app.session.pages import Page, TaskPage
@@ -301,7 +301,9 @@ class SessionBridge(QObject):
         if self.runner.finished and self._leaves:
             QTimer.singleShot(0, self, self._leave)
         elif self.runner.finished and self.participant.isFullScreen():
-            QTimer.singleShot(END_SHOWN_MS, self.operator, self.operator.come_forward)
+            ended = self.parts.journal.progress.ended == "completed"
+            said = ended and isinstance(self.parts.session.schedule.steps[-1], PageStep)  # goodbye, by the study
+            QTimer.singleShot(0 if said else END_SHOWN_MS, self.operator, self.operator.come_forward)
 
     def _show(self) -> None:
         view = self.view()

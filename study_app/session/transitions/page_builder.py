@@ -45,7 +45,10 @@ def page(state: SessionState) -> pages.Page:
         case Phase.TROUBLE | Phase.STALLED:
             return pages.TroublePage(_words(state).trouble_title, _words(state).trouble_body)
         case Phase.COMPLETE:
-            return pages.EndPage(_words(state).end_title, _words(state).end_body)
+            last = state.plan.schedule.steps[-1]  # a study that says goodbye itself does so once
+            text = state.plan.protocol.pages[last.page_id] if isinstance(last, PageStep) else None
+            title = _words(state).end_title if text is None else _text(state, text.title)
+            return pages.EndPage(title, _words(state).end_body)
         case Phase.ENDED:
             return pages.EndPage(_words(state).ended_early_title, _words(state).ended_early_body)
         case _:

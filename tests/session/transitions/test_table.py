@@ -46,6 +46,8 @@ def test_a_session_goes_through_its_schedule_and_ends_complete() -> None:
         TextPage,
         EndPage,
     ]
+    goodbye, end = pages[-2:]
+    assert (end.title, end.paragraph) == (goodbye.title, "The session is complete."), "one goodbye, not two"
     schedule = state.plan.schedule
     assert [trial["code"] for trial in trials] == [trial.code for trial in schedule.trials]
     assert [trial["trial"] for trial in trials] == [1, 2, 3, 4, 5, 6]
