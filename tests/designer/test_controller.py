@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.place.requests import RetypeFile, SetText, SetValue
+from study_app.designer.document.steps import RetypeFile, SetText, SetValue
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.store.drafts import draft_of
 
@@ -44,7 +44,7 @@ def test_an_edit_changes_its_bytes_alone_is_undone_redone_and_saved(designer: An
 def test_typing_in_one_field_is_one_step(designer: Any) -> None:
     before = designer.file.read_text()
     designer.open()
-    page = designer.editing.opened.history.selected
+    page = designer.editing.opened.selected
     for text in ("H", "He", "Hel", "Hello"):
         designer.editing.ask(SetText((*page, "title"), "en", text))
     assert "Hello" in designer.text

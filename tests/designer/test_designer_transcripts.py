@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
-from study_app.designer.place.requests import ChangeLanguage, RetypeFile, SetValue
+from study_app.designer.document.steps import ChangeLanguage, RetypeFile, SetValue
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.protocol.source.document import Path
 from tests.designer.document.test_study_transcripts import elements, generic, studies
@@ -29,7 +29,7 @@ TIP = re.compile(r"^(StaticText readOnly .+) \| = \|  \| =$")
 @pytest.fixture(autouse=True)
 def no_time_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the participant's page stand still, typing be one step, and drafts be due."""
-    for module in ("place.editing", "participant.preview", "participant.live_page"):
+    for module in ("document.document", "place.editing", "participant.preview", "participant.live_page"):
         monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
     monkeypatch.setattr("study_app.designer.place.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
 

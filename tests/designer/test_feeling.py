@@ -67,11 +67,11 @@ def test_a_liquid_is_felt_with_unsaved_values_and_put_back_as_one_step(qtbot: An
     lab.place.changed.emit("effects.added_mass", "on", False)
     qtbot.waitUntil(lambda: lab.place.view.workbench == lab.bench)
     assert lab.place.form.back.isVisible()
-    steps = len(editing.opened.history.done)
+    steps = len(editing.opened.done)
     qtbot.mouseClick(lab.place.form.back, Qt.MouseButton.LeftButton)
     assert visit.window.here == "designer"
     assert editing.selected == ("liquids", "thick")
-    assert [step.words for step in editing.opened.history.done[steps:]] == ["Put Thick back from the lab"]
+    assert [step.words for step in editing.opened.done[steps:]] == ["Put Thick back from the lab"]
     liquid = editing.opened.study.document["liquids"]["thick"]
     assert liquid["density_kg_m3"] == 1234.5
     assert set(liquid["effects"]) == {"drag", "added_mass"}

@@ -6,8 +6,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QLineEdit
 
+from study_app.designer.document.steps import SetValue
 from study_app.designer.place.controller import DesignerController
-from study_app.designer.place.requests import SetValue
 from study_app.workspace import workspace
 
 pytestmark = pytest.mark.slow

@@ -7,8 +7,8 @@ from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt
 from PySide6.QtGui import QDropEvent, QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
+from study_app.designer.document.steps import MoveTo, SetValue
 from study_app.designer.outline.card import ROW_ROLE
-from study_app.designer.place.requests import MoveTo, SetValue
 
 pytestmark = pytest.mark.slow
 

@@ -7,9 +7,9 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.designer.document.steps import SetValue
 from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.place.requests import SetValue
 
 pytestmark = pytest.mark.slow
 
@@ -33,7 +33,7 @@ def test_no_line_moves_while_the_pointer_is_over_the_list(qtbot: Any, designer: 
     first, second, *_ = problems.lines
     places = [line.pos() for line in problems.lines]
     assert first.row.fault.path == ("device", "force_limit_n")
-    designer.editing.type_text("Correct it", "# one more line\n" + designer.text.replace("= 60", "= 6"))
+    designer.editing.make("Correct it", text="# one more line\n" + designer.text.replace("= 60", "= 6"))
     designer.editing.ask(SetValue(("study", "version"), 3))
     assert [line.pos() for line in problems.lines[: len(places)]] == places
     assert (first.isEnabled(), first.mark.name) == (False, "check")
@@ -103,7 +103,7 @@ def test_a_file_that_was_never_readable_is_opened_at_the_line_of_its_fault(desig
     assert not place.outline.add.isEnabled()
     place.ask_to_add()
     assert not place.adding.isVisible()
-    designer.editing.type_text("Correct the file", text)
+    designer.editing.make("Correct the file", text=text)
     designer.controller.show_outline()
     assert place.form.rows
     assert len(place.outline.rows) > 10
@@ -127,7 +127,7 @@ def broken(qtbot: Any, designer: Any) -> Any:
 
 def test_enter_passes_problems_without_a_repair_and_ends_at_a_field_of_one(broken: Any) -> None:
     text = broken.text.replace("delay_ms = 0", 'delay_ms = "a"', 1).replace("min_s = 5 ", 'min_s = "a" ')
-    broken.editing.type_text("Break", text)
+    broken.editing.make("Break", text=text)
     first, unclear, second, last = broken.place.view.problems
     assert broken.hit("F8").problem == first
     assert broken.hit("Return").problem.fault == second.fault

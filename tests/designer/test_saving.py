@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
+from study_app.designer.document.steps import ChangeLanguage, SetText, SetValue
 from study_app.designer.place.header import BannerCard
-from study_app.designer.place.requests import ChangeLanguage, SetText, SetValue
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.drafts import Draft, draft_of, keep
@@ -79,7 +79,7 @@ def test_nothing_is_written_where_the_content_cannot_be_kept(drafted: Any, monke
 
     before = drafted.file.read_bytes()
     with monkeypatch.context() as broken:
-        broken.setattr("study_app.designer.place.editing.keep_content", full)
+        broken.setattr("study_app.designer.document.document.keep_content", full)
         drafted.saving.save()
     assert ("The study was not saved", "the disk is full.") in drafted.messages
     assert drafted.file.read_bytes() == before
@@ -129,7 +129,7 @@ def test_a_file_that_cannot_be_read_is_said_at_once_until_it_can_be(
     designer.open()
     for _ in range(2):
         with monkeypatch.context() as broken:
-            broken.setattr("study_app.designer.place.editing.OpenStudy.changed_outside", unreadable)
+            broken.setattr("study_app.designer.document.document.Document.changed_outside", unreadable)
             designer.saving.look_again()
             designer.saving.look_again()
             assert designer.place.banner_words.text() == "Kitchen.toml cannot be read: Input/output error"
@@ -228,7 +228,7 @@ def test_a_study_that_was_never_saved_is_discarded_once_that_is_confirmed(never_
     never_saved.open()
     assert place.parts.isVisible()
     never_saved.controller.begin("template:compare-liquids", "mine")
-    assert never_saved.editing.opened.history.done == ()
+    assert never_saved.editing.opened.done == []
 
 
 def test_a_study_stays_open_where_its_draft_cannot_be_deleted(never_saved: Any, stuck: pytest.MonkeyPatch) -> None:

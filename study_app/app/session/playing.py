@@ -186,7 +186,7 @@ class Playing(QObject):
             return
         study = opened.study
         try:
-            found = playable(study, opened.history.selected, self.where())
+            found = playable(study, opened.selected, self.where())
         except NotPlayableError as refused:
             names = {str(one): row.name for one, row in zip(study.problems, problem_rows(study), strict=True)}
             named = (replace(one, place=names.get(str(one), one.place)) for one in refused.problems)

@@ -13,45 +13,33 @@ from study_app.protocol.source.document import Path, entries, has, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 
-def switched(study: Study, path: Path, kind: str | None, left: Mapping[str, Any]) -> tuple[Edit, ...]:
-    """Return the edits that change the kind of a table.
+def switched(
+    study: Study, path: Path, kind: str | None, left: Mapping[str, Any]
+) -> tuple[tuple[Edit, ...], dict[str, Any]]:
+    """Return the edits that change the kind of a table, None for the kind without the key, and the values removed.
 
     Keys of both kinds keep their values, the others are removed; keys that the new kind needs get the value that they
-    had before, or an initial one.
+    had before (``left``, removed by earlier switches), or an initial one.
     """
-    key, node = _of_kind(study, path, kind)
-    table = _table(study, path)
-    edits: list[Edit] = [Unset((*path, name)) for name in table if name != key and name not in node["properties"]]
-    if kind is not None:
-        edits.insert(0, Set((*path, key), kind))
-    elif key in table:
-        edits.insert(0, Unset((*path, key)))
-    after, _ = study.edited(*edits)
-    wanted = [name for name in left if name in node["properties"] and name not in table]
-    needed = [name for name in node.get("required", ()) if name not in {*table, *wanted, key}]
-    return (
-        *edits,
-        *(Set((*path, name), left[name]) for name in wanted),
-        *(Set((*path, name), initial(after.document, (*path, name))) for name in needed),
-    )
-
-
-def left_by(study: Study, path: Path, kind: str | None) -> dict[str, Any]:
-    """Return the values that `switched` removes, for a switch back."""
-    key, node = _of_kind(study, path, kind)
-    return {
-        name: value for name, value in _table(study, path).items() if name != key and name not in node["properties"]
-    }
-
-
-def _of_kind(study: Study, path: Path, kind: str | None) -> tuple[str, Mapping[str, Any]]:
     key, named = tags(node_at(study.document, path))
     if not key or kind not in named:
         raise Refused(f"there is no kind {kind!r} here: {', '.join(map(str, named))}")
     node = table_of((named[kind],), {})
     if node is None:
         raise Refused(f"{kind} is not a kind of table")
-    return key, node
+    table = _table(study, path)
+    gone = {name: value for name, value in table.items() if name != key and name not in node["properties"]}
+    edits: list[Edit] = [Unset((*path, name)) for name in gone]
+    if kind is not None:
+        edits.insert(0, Set((*path, key), kind))
+    elif key in table:
+        edits.insert(0, Unset((*path, key)))
+    after, _ = study.edited(*edits)
+    wanted = [name for name in left if name in node["properties"] and name not in table]
+    edits += [Set((*path, name), left[name]) for name in wanted]
+    needed = [name for name in node.get("required", ()) if name not in {*table, *wanted, key}]
+    edits += [Set((*path, name), initial(after.document, (*path, name))) for name in needed]
+    return tuple(edits), gone
 
 
 def _table(study: Study, path: Path) -> Mapping[str, Any]:

@@ -138,6 +138,17 @@ def _texts(value: Any) -> Iterator[str]:
             yield from _texts(inner)
 
 
+def element_of(study: Study, path: Path) -> Path:
+    """Return the element of the outline that a place of the file belongs to."""
+    if not path or not has(study.document, path[0]):
+        return path[:1] or FIRST
+    section = row_at(study.document, path[:1])
+    tables = section is not None and section.kind == "tables"
+    if len(path) >= 4 and path[2] == "items" and isinstance(path[3], int):
+        return path[:4]
+    return path[:2] if tables and has(study.document[str(path[0])], path[1] if len(path) > 1 else "") else path[:1]
+
+
 def step_of(document: Mapping[str, Any], path: Path) -> Path | None:
     """Return the place of an element in the list that orders it: its own entry, or the step that names it."""
     if path and isinstance(path[-1], int):

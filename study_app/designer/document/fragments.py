@@ -3,7 +3,6 @@
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 from study_app.designer.document.additions import added
@@ -11,22 +10,13 @@ from study_app.designer.document.changes import short_of
 from study_app.designer.document.fields import label_of, row_at
 from study_app.designer.document.names import references_to, renamed
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_edits import Edit, Rename, Set, WriterError, apply, insert_block, same
+from study_app.designer.document.toml_edits import Rename, Set, WriterError, apply, insert_block, same
 from study_app.designer.document.toml_text import Editor, Refused, applied, spans_of, tables
 from study_app.ids import MAX_FROM_TEXT, free_id, id_of
 from study_app.protocol.source.document import Path, entries, frozen, names, value_at
 
 MOST_LINES: Final = 200
 _BULLET: Final = re.compile(r"^\s*(?:[-*•]|\d{1,3}[.)])\s+")
-
-
-@dataclass(frozen=True, slots=True)
-class Pasted:
-    """A study's text after pasting, the additional edits, and the paths of the new elements."""
-
-    text: str
-    edits: tuple[Edit, ...]
-    paths: tuple[Path, ...]
 
 
 def copied(study: Study, paths: Sequence[Path]) -> str:
@@ -46,8 +36,8 @@ def copied(study: Study, paths: Sequence[Path]) -> str:
     return "\n".join(found)
 
 
-def pasted(study: Study, selected: Path, text: str) -> Pasted:
-    """Return a study after elements, as TOML, are pasted after the selected one of their kind.
+def pasted(study: Study, selected: Path, text: str) -> tuple[str, tuple[Path, ...]]:
+    """Return a text with elements, as TOML, pasted after the selected one of their kind, and the paths of these.
 
     Names already in use get a number, also in references within the pasted text. Lines that are not TOML become
     questions of the selected questionnaire.
@@ -76,7 +66,7 @@ def pasted(study: Study, selected: Path, text: str) -> Pasted:
     return _tables(study, selected, text, document)
 
 
-def _tables(study: Study, selected: Path, text: str, document: Mapping[str, Any]) -> Pasted:
+def _tables(study: Study, selected: Path, text: str, document: Mapping[str, Any]) -> tuple[str, tuple[Path, ...]]:
     paths: list[Path] = []
     for section in document:
         taken = set(names(study.document, section))
@@ -91,10 +81,10 @@ def _tables(study: Study, selected: Path, text: str, document: Mapping[str, Any]
     for section, inner in tomllib.loads(text).items():
         meant[section] = {**meant.get(section, {}), **inner}
     after = [path for path in (selected[:2], *_last(study, paths[0][0])) if path[:1] == paths[0][:1]]
-    return Pasted(_inserted(study, after, text, meant), (), tuple(paths))
+    return _inserted(study, after, text, meant), tuple(paths)
 
 
-def _items(study: Study, selected: Path, text: str, document: Mapping[str, Any]) -> Pasted:
+def _items(study: Study, selected: Path, text: str, document: Mapping[str, Any]) -> tuple[str, tuple[Path, ...]]:
     """Paste questions into the selected questionnaire, or into that of their own name."""
     [name] = document["questionnaires"]
     form = str(selected[1]) if selected[:1] == ("questionnaires",) and len(selected) > 1 else name
@@ -122,8 +112,8 @@ def _items(study: Study, selected: Path, text: str, document: Mapping[str, Any])
     items = spans_of(study.text).node(("questionnaires", form, "items"))
     if items is not None:  # an array of inline tables
         made, _ = study.edited(Set(("questionnaires", form, "items"), meant["questionnaires"][form]["items"]))
-        return Pasted(made.text, (), paths)
-    return Pasted(_inserted(study, after, text, meant), (), paths)
+        return made.text, paths
+    return _inserted(study, after, text, meant), paths
 
 
 def _inserted(study: Study, after: Sequence[Path], text: str, meant: Mapping[str, Any]) -> str:
@@ -145,7 +135,7 @@ def _inserted(study: Study, after: Sequence[Path], text: str, meant: Mapping[str
     return made
 
 
-def _questions_of(study: Study, selected: Path, pasted_text: str) -> Pasted:
+def _questions_of(study: Study, selected: Path, pasted_text: str) -> tuple[str, tuple[Path, ...]]:
     """Return a study with a question for each line, of the kind of the selected one, in the first language."""
     if selected[:1] != ("questionnaires",) or len(selected) < 2:
         raise Refused("this is not TOML: select a questionnaire to paste its lines as questions")
@@ -169,7 +159,7 @@ def _questions_of(study: Study, selected: Path, pasted_text: str) -> Pasted:
         now, _ = now.edited(*edits)
         paths.append(path)
         at = int(path[-1])
-    return Pasted(now.text, (), tuple(paths))
+    return now.text, tuple(paths)
 
 
 def _ids(study: Study, form: str) -> set[str]:

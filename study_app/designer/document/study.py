@@ -9,7 +9,7 @@ from pathlib import Path as File
 from typing import Any, Final
 
 from study_app.designer.document.toml_edits import Edit, Unset, apply, check_encodable, meaning
-from study_app.designer.document.toml_text import Refused, Splice, Splices, applied, common_ends, reverted
+from study_app.designer.document.toml_text import Refused, Splice, Splices, applied, common_ends
 from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import examined, located, read_document
 from study_app.protocol.model import Protocol
@@ -165,63 +165,6 @@ def read(source: bytes, folder: File = File()) -> Study:
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
         raise Refused(f"line {line} is not UTF-8 text: save the file as UTF-8") from error
-
-
-MOST_STEPS: Final = 500
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One step: its words ("Move Honey up"), its splices, and what was selected before and after it."""
-
-    words: str
-    splices: tuple[Splices, ...]
-    before: Path = ()
-    after: Path = ()
-
-
-@dataclass(frozen=True, slots=True)
-class History:
-    """A study with the steps that led to it, newest last, and those that were undone, next to be redone last."""
-
-    study: Study
-    selected: Path = ()
-    done: tuple[Step, ...] = ()
-    undone: tuple[Step, ...] = ()
-
-    def edited(self, words: str, *edits: Edit, select: Path | None = None, joins: bool = False) -> History:
-        """Return the history after a step of some edits."""
-        return self._after(*self.study.edited(*edits), words, select, joins=joins)
-
-    def typed(self, words: str, text: str, *, joins: bool = False) -> History:
-        """Return the history after a step that gives the file another text: typed, reverted or read again."""
-        return self._after(*self.study.typed(text), words, None, joins=joins)
-
-    def _after(
-        self, study: Study, splices: tuple[Splices, ...], words: str, select: Path | None, *, joins: bool
-    ) -> History:
-        selected = self.selected if select is None else select
-        if not splices:
-            return replace(self, selected=selected)
-        step = Step(words, splices, self.selected, selected)
-        done = self.done
-        if joins and done and not self.undone:
-            last, done = done[-1], done[:-1]
-            step = Step(words, (*last.splices, *splices), last.before, selected)
-        return History(study, selected, (*done, step)[-MOST_STEPS:])
-
-    def undo(self) -> History:
-        if not self.done:
-            return self
-        *done, step = self.done
-        study = self.study.spliced(tuple(reverted(splices) for splices in reversed(step.splices)))
-        return History(study, step.before, tuple(done), (*self.undone, step))
-
-    def redo(self) -> History:
-        if not self.undone:
-            return self
-        *undone, step = self.undone
-        return History(self.study.spliced(step.splices), step.after, (*self.done, step), tuple(undone))
 
 
 def with_value(node: Any, path: Path, value: Any) -> Any:

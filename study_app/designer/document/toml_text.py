@@ -109,6 +109,32 @@ def reverted(splices: Splices) -> Splices:
     return tuple(found)
 
 
+_ENDS: Final = re.compile("\r\n|\r|\u2029")
+"""What an editor takes as the end of a line beyond line feeds."""
+
+
+def shown(text: str) -> str:
+    """Return a text with line feeds alone."""
+    return _ENDS.sub("\n", text)
+
+
+def retyped(text: str, typed: str) -> str:
+    """Return a text with its own ends of lines after what was typed in the pane."""
+    old, newline = shown(text), "\r\n" if "\r\n" in text else "\n"
+    first, last = common_ends(old, typed)
+    begin, end = _original(text, first), _original(text, len(old) - last)
+    return text[:begin] + typed[first : len(typed) - last].replace("\n", newline) + text[end:]
+
+
+def _original(text: str, place: int) -> int:
+    """Return where a place of the shown text is in the file's text."""
+    for match in _ENDS.finditer(text):
+        if match.start() >= place:
+            break
+        place += len(match[0]) - 1
+    return place
+
+
 _RULER: Final = re.compile(r"\s*#\s*[-=*#~]{3,}")
 _COMMENT: Final = re.compile(r"[ \t]*#")
 _REST: Final = re.compile(r"[ \t]*(?:#[^\r\n]*)?(\r?\n|\Z)")

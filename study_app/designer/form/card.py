@@ -9,13 +9,13 @@ from PySide6.QtCore import QEvent, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QLineEdit, QPlainTextEdit, QVBoxLayout, QWidget
 
+from study_app.designer.document.steps import AddKey, LeaveText, RemoveKey, RenameElement, SetValue
 from study_app.designer.form.fields import LanguagesField, add_button, stacked
 from study_app.designer.form.lists import EntryList
 from study_app.designer.form.row_widget import LABEL_PX, RowWidget, is_wide, language_heads, structure_of
 from study_app.designer.form.rows import Form, FormRow, QuestionLine, Section, added_row, shape_of
 from study_app.designer.form.special import Panel, QuestionRow, QuestionRows
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.designer.place.requests import AddKey, LeaveText, RemoveKey, RenameElement, SetValue
 from study_app.designer.problems.card import NameRefusal, RepairButton
 from study_app.designer.problems.problems import ProblemRow
 from study_app.gui.kit.commands import tip

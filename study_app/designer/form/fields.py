@@ -9,10 +9,10 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from study_app.designer.document.fields import Row
+from study_app.designer.document.steps import AddNamed, Do, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
 from study_app.designer.document.study import Study
 from study_app.designer.form.rows import FormRow, choice_words, is_right_to_left, new_words
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.designer.place.requests import AddNamed, Do, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
 from study_app.designer.place.segments import Segments
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import font

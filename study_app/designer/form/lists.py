@@ -12,13 +12,7 @@ from PySide6.QtWidgets import QAbstractItemView, QBoxLayout, QFrame, QLabel, QLi
 
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import Row
-from study_app.designer.document.study import Study
-from study_app.designer.form.fields import Field, SpecialEditor, add_button, kept, written
-from study_app.designer.form.rows import FormRow, new_words
-from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
-from study_app.designer.measures.cards import UNKNOWN
-from study_app.designer.measures.valid_part import valid_part
-from study_app.designer.place.requests import (
+from study_app.designer.document.steps import (
     AddElement,
     AddEntry,
     AddNamed,
@@ -32,6 +26,12 @@ from study_app.designer.place.requests import (
     SetValue,
     Several,
 )
+from study_app.designer.document.study import Study
+from study_app.designer.form.fields import Field, SpecialEditor, add_button, kept, written
+from study_app.designer.form.rows import FormRow, new_words
+from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
+from study_app.designer.measures.cards import UNKNOWN
+from study_app.designer.measures.valid_part import valid_part
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox

@@ -10,6 +10,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 
+from study_app.designer.document.steps import RemoveKey, SwitchKey
 from study_app.designer.form.fields import (
     ChecksField,
     ChoiceField,
@@ -28,7 +29,6 @@ from study_app.designer.form.special import DESCRIPTION, ORDER, POINTS, QUESTION
 from study_app.designer.form.targets import TARGETS
 from study_app.designer.form.trial_strip import TRIAL
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText, removes_key
-from study_app.designer.place.requests import RemoveKey, SwitchKey
 from study_app.designer.place.segments import Segments
 from study_app.designer.place.tab_order import lead_by_tab, stops
 from study_app.designer.problems.card import RepairButton

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEve
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QSizePolicy, QWidget
 
 from study_app.designer.document.fields import Row
+from study_app.designer.document.steps import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import ChoiceField, Field, LanguagesField, SpecialEditor, add_button
 from study_app.designer.form.rows import (
@@ -20,7 +21,6 @@ from study_app.designer.form.rows import (
     question_lines,
 )
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedSentence
-from study_app.designer.place.requests import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.place.segments import Segments
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import Tone, TypeRole, font

@@ -8,11 +8,11 @@ from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent, QLinearGradient, QMous
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QSizePolicy, QWidget
 
 from study_app.designer.document.fields import Row, row_at
+from study_app.designer.document.steps import AddEntry, RemoveKey, SetValue
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import Field, SpecialEditor, add_button, kept
 from study_app.designer.form.rows import FormRow
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
-from study_app.designer.place.requests import AddEntry, RemoveKey, SetValue
 from study_app.gui.theme.theme import RADIUS_CONTROL, TANK, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import add_layout, hbox

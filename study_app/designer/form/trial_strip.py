@@ -8,10 +8,10 @@ from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPainterPath, QPaintEv
 from PySide6.QtWidgets import QAbstractButton, QBoxLayout, QWidget
 
 from study_app.designer.document.fields import Row, label_of
+from study_app.designer.document.steps import GoTo
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import ChoiceField, SpecialEditor
 from study_app.designer.form.rows import FormRow
-from study_app.designer.place.requests import GoTo
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed

@@ -104,7 +104,7 @@ class MeasuresController(QObject):
         if opened is None or not self._place.isVisible():
             self._want(None)
             return
-        path, problems = opened.history.selected, problem_rows(opened.study)
+        path, problems = opened.selected, problem_rows(opened.study)
         study = self._measured(opened.study, path)
         valid = valid_part(study)
         protocol = valid.protocol

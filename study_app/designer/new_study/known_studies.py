@@ -3,6 +3,7 @@
 from functools import cache, lru_cache
 from pathlib import Path
 
+from study_app.designer.document.document import Document
 from study_app.designer.document.elements import study_title
 from study_app.designer.document.study import read
 from study_app.designer.new_study.new_study import taken_names, template
@@ -16,7 +17,6 @@ from study_app.designer.new_study.template_choices import (
 )
 from study_app.designer.new_study.templates import templates
 from study_app.designer.place.designer_view import HeaderState, StudyChoice, problems_chip
-from study_app.designer.place.editing import OpenStudy
 from study_app.designer.versions.version_rows import VersionChip
 from study_app.errors import StudyError
 from study_app.gui.home.study_facts import holds_liquids_alone, is_shipped, sources
@@ -27,7 +27,7 @@ from study_app.store.study_settings import kept_original
 from study_app.workspace import workspace
 
 
-def studies(opened: OpenStudy | None) -> tuple[StudyChoice, ...]:
+def studies(opened: Document | None) -> tuple[StudyChoice, ...]:
     """Return what can be opened: the open file, drafts that were never saved, recent files, names at hand.
 
     They are in the order of their titles; studies that ship with the program come last.
@@ -70,12 +70,11 @@ def _title_of_file(file: Path, _changed_ns: int, _size: int) -> str:
 
 
 def header_state(
-    opened: OpenStudy | None, choices: tuple[StudyChoice, ...], warnings: int, version: VersionChip
+    opened: Document | None, choices: tuple[StudyChoice, ...], warnings: int, version: VersionChip
 ) -> HeaderState:
     """Return the header's state of the open study; ``warnings`` is how many it has."""
     if opened is None:
         return HeaderState(choices)
-    history = opened.history
     draft = "Saved" if not opened.edited and opened.base else "Not saved yet"
     if opened.kept is not None and (opened.edited or not opened.base):
         draft = f"Draft kept {opened.kept:%H:%M}"
@@ -84,8 +83,8 @@ def header_state(
         source_of(opened.file),
         problems_chip(len(opened.study.faults), warnings),
         "" if opened.read_only else draft,
-        history.done[-1].words if history.done else "",
-        history.undone[-1].words if history.undone else "",
+        opened.done[-1].words if opened.done else "",
+        opened.undone[-1].words if opened.undone else "",
         not opened.read_only and (opened.edited or not opened.base),
         bool(opened.read_only),
         version,

@@ -14,9 +14,9 @@ from study_app.designer.document.changes import languages_of
 from study_app.designer.document.elements import found_fields, title_of, words_sought
 from study_app.designer.document.fields import label_of, node_at, row_at, rows, singular, tags
 from study_app.designer.document.names import named_at
+from study_app.designer.document.steps import AddElement, AddInstrument, ChangeLanguage, Do, GoTo
 from study_app.designer.document.study import Study
 from study_app.designer.outline.outline_rows import icon_of
-from study_app.designer.place.requests import AddElement, AddInstrument, ChangeLanguage, Do, GoTo
 from study_app.gui.theme.icons import icon
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed

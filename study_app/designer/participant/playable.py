@@ -7,13 +7,13 @@ from pathlib import Path as Folder
 from typing import Any, Final
 
 from study_app.designer.document.additions import is_unknown_name
+from study_app.designer.document.document import Document
 from study_app.designer.document.fields import initial
 from study_app.designer.document.names import named_at
 from study_app.designer.document.study import Study, read, with_value, without_value
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.participant.shown_step import StepPosition, first_step, graph_of, reached, step_name, step_words
-from study_app.designer.place.editing import OpenStudy
 from study_app.errors import Problem, ProtocolError, StudyError
 from study_app.protocol.groups import numbered_parts
 from study_app.protocol.load import examined, read_document
@@ -61,7 +61,7 @@ def sound_part(study: Study, before: Mapping[str, Any]) -> Protocol | None:
     return None
 
 
-def last_valid(opened: OpenStudy) -> Study | None:
+def last_valid(opened: Document) -> Study | None:
     """Return the study as its file or the newest kept version of it has it, of those without faults."""
     earlier = (kept_content(version.hash) or b"" for version in reversed(kept_versions(opened.file)[-MOST_EARLIER:]))
     for text in (opened.saved.encode(), *(unbundled(content)[0] for content in earlier)):

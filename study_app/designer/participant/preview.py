@@ -263,7 +263,7 @@ class ParticipantPreview(Card):
         opened = self.editing.opened
         if opened is None:
             return
-        study, selected = opened.study, opened.history.selected
+        study, selected = opened.study, opened.selected
         if study is not self._study:
             self._study, before = study, self._protocol
             if study.protocol is not None:

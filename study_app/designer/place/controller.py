@@ -10,8 +10,10 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtGui import QGuiApplication
 
+from study_app.designer.document.document import Document, open_file, open_new, open_unsaved
 from study_app.designer.document.fragments import copied
 from study_app.designer.document.names import named_at, renamed
+from study_app.designer.document.steps import DeleteElement, Do, Paste, RenameElement, Request, Step, Task
 from study_app.designer.document.study import read
 from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_text import Refused, free_in
@@ -24,12 +26,10 @@ from study_app.designer.outline.outline_rows import outline_rows
 from study_app.designer.participant.feeling import Feeling
 from study_app.designer.participant.preview import ParticipantPreview
 from study_app.designer.place.designer_view import DesignerView, HeaderState, StudyChoice
-from study_app.designer.place.editing import Editing, OpenStudy, open_file, open_new, open_unsaved
+from study_app.designer.place.editing import Editing
 from study_app.designer.place.file import file_text
-from study_app.designer.place.prompts import DeleteCard, SeriesCard
-from study_app.designer.place.requests import DeleteElement, Do, Paste, RenameElement, Request, Task
+from study_app.designer.place.prompts import DeleteCard, SeriesCard, delete_prompt, series_prompt, series_titles
 from study_app.designer.place.saving import Saving
-from study_app.designer.place.steps import Step, delete_prompt, series_prompt, series_titles
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
 from study_app.designer.versions.changes import Changes
@@ -57,7 +57,7 @@ class DesignerController(QObject):
         self.changes = Changes(editing, place, self.runs)
         self.feeling = Feeling(editing, place)
         Renaming(editing, place, self.runs)
-        self._others: dict[Path, OpenStudy] = {}
+        self._others: dict[Path, Document] = {}
         self._warnings: tuple[str, ...] = ()
         self._find = ""
         self._choices: tuple[StudyChoice, ...] = ()
@@ -159,7 +159,7 @@ class DesignerController(QObject):
             return
         self.place.show_new(choices, source)
 
-    def _take(self, opened: OpenStudy) -> None:
+    def _take(self, opened: Document) -> None:
         if (before := self.editing.opened) is not None:
             self._others[before.file.resolve()] = before
         self._choices = studies(opened)
@@ -246,11 +246,11 @@ class DesignerController(QObject):
 
     def _show_addable(self) -> None:
         if (opened := self.editing.writable) is not None:
-            self.place.show_addable(addable(opened.study, opened.history.selected))
+            self.place.show_addable(addable(opened.study, opened.selected))
 
     def _offer_fields(self, words: str) -> None:
         if (opened := self.editing.opened) is not None:
-            self.place.adding.offer_fields(fields_to_go_to(opened.study, words, opened.history.selected))
+            self.place.adding.offer_fields(fields_to_go_to(opened.study, words, opened.selected))
 
     def _judge_id(self, path: Place, name: str) -> None:
         """Say at once why an id cannot be taken, and which one could be."""
@@ -277,7 +277,7 @@ class DesignerController(QObject):
         if opened is None:
             self.place.show_view(DesignerView(self._header()))
             return
-        study, selected = opened.study, opened.history.selected
+        study, selected = opened.study, opened.selected
         problems = problem_rows(study)
         self.place.show_view(
             DesignerView(

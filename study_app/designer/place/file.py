@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Final
 
 from PySide6.QtCore import QEvent, QRect, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
@@ -25,7 +24,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QFrame, QPlainTextEdit, QWidget
 
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_text import common_ends, spans_of
+from study_app.designer.document.toml_text import common_ends, shown, spans_of
 from study_app.designer.form.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
@@ -49,10 +48,6 @@ def visible_lines(text: QPlainTextEdit) -> list[tuple[int, float, float]]:
     return found
 
 
-_ENDS: Final = re.compile("\r\n|\r|\u2029")
-"""What an editor takes as the end of a line beyond line feeds."""
-
-
 @dataclass(frozen=True, slots=True)
 class FileText:
     """The text of the pane; lines count from 0."""
@@ -74,28 +69,6 @@ def file_text(study: Study, name: str, path: Path) -> FileText:
         ]
         selected = tuple(lines)
     return FileText(name, shown(study.text), selected, faulty)
-
-
-def shown(text: str) -> str:
-    """Return a text with line feeds alone."""
-    return _ENDS.sub("\n", text)
-
-
-def retyped(text: str, typed: str) -> str:
-    """Return a text with its own ends of lines after what was typed in the pane."""
-    old, newline = shown(text), "\r\n" if "\r\n" in text else "\n"
-    first, last = common_ends(old, typed)
-    begin, end = _original(text, first), _original(text, len(old) - last)
-    return text[:begin] + typed[first : len(typed) - last].replace("\n", newline) + text[end:]
-
-
-def _original(text: str, place: int) -> int:
-    """Return where a place of the shown text is in the file's text."""
-    for match in _ENDS.finditer(text):
-        if match.start() >= place:
-            break
-        place += len(match[0]) - 1
-    return place
 
 
 def _line(text: str, place: int) -> int:

@@ -1,6 +1,7 @@
 """Cards over the place: questions before a step (deletion, discarding, series), and the list of keys."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from PySide6.QtCore import QRect, QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
@@ -16,15 +17,21 @@ from PySide6.QtWidgets import (
 )
 from shiboken6 import isValid
 
-from study_app.designer.place.requests import DeleteElement, MakeSeries
-from study_app.designer.place.steps import DeletePrompt, SeriesPrompt
+from study_app.designer.document.additions import check_values, number_row, number_rows, titles_with
+from study_app.designer.document.elements import element_of, kind_and_title, title_of
+from study_app.designer.document.fields import label_of
+from study_app.designer.document.names import left_without, references_to, with_references
+from study_app.designer.document.steps import DeleteElement, MakeSeries, index_of, titles_of
+from study_app.designer.document.study import Study
+from study_app.designer.document.toml_text import Refused
 from study_app.gui.kit.commands import COMMANDS, GROUPS, Command
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Cap, Choice, IconButton
 from study_app.gui.widgets.labels import label
-from study_app.number_text import typed_numbers
+from study_app.number_text import exact_text, typed_numbers
+from study_app.protocol.source.document import Path, names, value_at
 
 HIGHEST = 560
 PLACES_PX = 200
@@ -52,6 +59,41 @@ class Prompt(Card):
             self.given_up.emit()
         else:
             super().keyPressEvent(event)
+
+
+@dataclass(frozen=True, slots=True)
+class DeletePrompt:
+    """What refers to an element that is to be deleted."""
+
+    path: Path  # the element
+    title: str  # what it is called
+    references: tuple[str, ...]  # the places that name it, in words
+    others: tuple[tuple[str, str], ...] = ()  # id and title of what could be named in its place
+    also: tuple[Path, ...] = ()  # others that are deleted with it
+    together: tuple[str, ...] = ()  # elements that cannot be without it, with kind and title
+
+
+def delete_prompt(study: Study, paths: Sequence[Path]) -> DeletePrompt:
+    """Return what names elements that are to be deleted, and what could be named in the place of a single one."""
+    document, path = study.document, paths[0]
+    named = (place for one in paths for place in references_to(document, one))
+    places = (*named, *left_without(document, paths))
+    outside = [place for place in places if not any(place[: len(one)] == one for one in paths)]
+    references = (f"{kind_and_title(document, element_of(study, place))}: {_field(study, place)}" for place in outside)
+    gone = {one: None for each in paths for one in with_references(document, each, study.needs)}
+    elements = (one for one in gone if one not in paths and len(one) == 2 and isinstance(one[1], str))
+    together = tuple(kind_and_title(document, one) for one in elements)
+    others = (name for name in names(document, str(path[0])) if name != path[-1] and len(path) == 2)
+    titles = tuple((name, title_of(document, (path[0], name))) for name in others) if len(paths) == 1 else ()
+    words = tuple(dict.fromkeys(references))
+    return DeletePrompt(path, titles_of(study, paths), words, titles, tuple(paths[1:]), together)
+
+
+def _field(study: Study, place: Path) -> str:
+    inside = ", ".join(label_of(step) for step in place[len(element_of(study, place)) :])
+    if value_at(study.document, place) is None:
+        return f"{inside} (the only one)"
+    return inside or f"entry {index_of(place) + 1}"
 
 
 class DeleteCard(Prompt):
@@ -105,6 +147,39 @@ class DiscardCard(Prompt):
         self.buttons.addWidget(self.go_on)
         add_layout(self.column, self.buttons)
         self.first: QWidget = self.cancel
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesPrompt:
+    """What a series is asked for with: the element, its title, and its numbers with their words and units."""
+
+    path: Path
+    title: str
+    fields: tuple[tuple[Path, str], ...]
+
+
+def series_prompt(study: Study, path: Path) -> SeriesPrompt | None:
+    """Return what a series is asked for with; None where an element has no number."""
+    fields = []
+    for row in number_rows(study.document, path):
+        words = ", ".join(label_of(step) for step in row.path[2:])
+        fields.append((row.path, f"{words} [{row.unit}]" if row.unit else words))
+    return SeriesPrompt(path, title_of(study.document, path), tuple(fields)) if fields else None
+
+
+def series_titles(study: Study, asked: MakeSeries) -> tuple[tuple[str, ...], str]:
+    """Return the title of each copy of a series; where there can be no copies with these values, why."""
+    row = number_row(study.document, asked.path, asked.field)
+    try:
+        check_values(study.document, row, asked.values)
+    except Refused as refusal:
+        return (), f"{str(refusal)[:1].upper()}{str(refusal)[1:]}."
+    own = title_of(study.document, asked.path)
+    shown = []
+    for value in asked.values:
+        titles = dict(titles_with(study.document, asked.path, row, value))
+        shown.append(next(iter(titles.values()), f"{own}, {exact_text(value)} {row.unit}".rstrip()))
+    return tuple(shown), ""
 
 
 class SeriesCard(Prompt):

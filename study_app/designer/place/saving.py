@@ -6,15 +6,17 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from study_app.designer.document.document import Document, Standing, check_version
+from study_app.designer.document.toml_edits import Set
 from study_app.designer.document.toml_text import Refused, free_in
 from study_app.designer.new_study.known_studies import source_of
 from study_app.designer.place.designer_view import Banner, BannerAction
-from study_app.designer.place.editing import Editing, OpenStudy, why_read_only
+from study_app.designer.place.editing import Editing
 from study_app.designer.place.prompts import DiscardCard
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.versions.changes import SaveCard, compare, newest, version_of
 from study_app.designer.versions.known_runs import FileWatch, KnownRuns
-from study_app.designer.versions.version_rows import FILE, Comparison, Standing, check_version
+from study_app.designer.versions.version_rows import FILE, Comparison
 from study_app.errors import StudyError
 from study_app.gui.home.study_facts import time_words
 from study_app.number_text import counted
@@ -89,7 +91,7 @@ class Saving(QObject):
         if opened is not None and self._notice is not None and self._lasts is (not opened.edited):
             self._close_notice(opened)
 
-    def _close_notice(self, opened: OpenStudy) -> None:
+    def _close_notice(self, opened: Document) -> None:
         self._note(None)
         opened.draft = None  # it is not announced again
         self.banner = _banner(opened)
@@ -104,7 +106,7 @@ class Saving(QObject):
         if opened is None:
             return
         before = opened.read_only, self.banner
-        opened.read_only = why_read_only(opened, self.editing.results)
+        opened.read_only = opened.why_read_only(self.editing.results)
         if not opened.edited and opened.file.exists() and _changed_outside(opened):
             self._try(opened, opened.take_outside)
         self.banner = _banner(opened) or self._notice
@@ -167,7 +169,7 @@ class Saving(QObject):
         opened = self.editing.writable
         if opened is None or (opened.base and not opened.edited):
             return
-        opened.read_only = why_read_only(opened, self.editing.results)
+        opened.read_only = opened.why_read_only(self.editing.results)
         if opened.read_only:
             self._show_banner(opened)
             return
@@ -178,7 +180,7 @@ class Saving(QObject):
         else:
             self._write(opened)
 
-    def _ask(self, opened: OpenStudy, standing: Standing) -> None:
+    def _ask(self, opened: Document, standing: Standing) -> None:
         """Show what differs from what was run, and ask under which version or name the study is saved."""
         run = newest(self.runs.known)
         found = Comparison() if run is None else compare(version_of(opened, run), opened.study)
@@ -197,7 +199,7 @@ class Saving(QObject):
             return
         try:
             check_version(version, self.runs.read())
-            opened.set_version(version)
+            opened.edit(f"Set version {version}", Set(("study", "version"), version))
         except Refused as refusal:
             if self.card is not None:
                 self.card.refuse(f"{refusal}.")
@@ -222,7 +224,7 @@ class Saving(QObject):
         self.continued.emit(made)
         self._write(made)
 
-    def _write(self, opened: OpenStudy) -> None:
+    def _write(self, opened: Document) -> None:
         try:
             opened.save(self.runs.read())
         except ChangedOutsideError:
@@ -269,19 +271,19 @@ class Saving(QObject):
         if written:
             self.kept.emit()
 
-    def _try(self, opened: OpenStudy, act: Callable[[], object]) -> None:
+    def _try(self, opened: Document, act: Callable[[], object]) -> None:
         try:
             act()
         except StudyError as error:
             self.place.message.emit("This was not done", f"{error}.")
         self._show_banner(opened)
 
-    def _show_banner(self, opened: OpenStudy) -> None:
+    def _show_banner(self, opened: Document) -> None:
         self.banner = _banner(opened) or self._notice
         self.editing.announce()
 
 
-def _banner(opened: OpenStudy) -> Banner | None:
+def _banner(opened: Document) -> Banner | None:
     """Return why a study is read-only, or what another program did to its file; None where there is neither."""
     if opened.read_only:
         return Banner(opened.read_only, (("copy", "Make a copy …"),))
@@ -300,7 +302,7 @@ def _banner(opened: OpenStudy) -> Banner | None:
     )
 
 
-def _changed_outside(opened: OpenStudy) -> bool:
+def _changed_outside(opened: Document) -> bool:
     """Return whether the file can be read and has another content than the one that is edited."""
     try:
         return opened.changed_outside()

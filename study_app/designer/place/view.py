@@ -8,6 +8,19 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
+from study_app.designer.document.steps import (
+    Do,
+    DuplicateElement,
+    GoTo,
+    LeaveText,
+    MoveElement,
+    MoveTo,
+    RetypeFile,
+    SetText,
+    SetValue,
+    Task,
+    with_path,
+)
 from study_app.designer.form.card import FormCard
 from study_app.designer.form.typed_fields import TypedLine, TypedText
 from study_app.designer.measures.measures_page import MeasuresPage
@@ -21,19 +34,6 @@ from study_app.designer.place.designer_view import DesignerView
 from study_app.designer.place.file import FileCard
 from study_app.designer.place.header import BannerCard, DesignerHeader
 from study_app.designer.place.prompts import KeysCard, Prompt
-from study_app.designer.place.requests import (
-    Do,
-    DuplicateElement,
-    GoTo,
-    LeaveText,
-    MoveElement,
-    MoveTo,
-    RetypeFile,
-    SetText,
-    SetValue,
-    Task,
-    with_path,
-)
 from study_app.designer.place.tab_order import go_on, lead_by_tab
 from study_app.designer.problems.card import ProblemsCard, RepairButton
 from study_app.designer.problems.problems import ProblemRow

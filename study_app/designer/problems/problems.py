@@ -9,11 +9,11 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.designer.document.additions import Repair, additions_for, repairs
-from study_app.designer.document.elements import FIRST, kind_and_title, place_words
-from study_app.designer.document.fields import label_of, row_at
+from study_app.designer.document.elements import FIRST, element_of, kind_and_title, place_words
+from study_app.designer.document.fields import label_of
 from study_app.designer.document.study import Study
 from study_app.designer.outline.outline_rows import icon_of
-from study_app.protocol.source.document import Path, has, names, places_of
+from study_app.protocol.source.document import Path, names, places_of
 from study_app.protocol.source.problems import Fault
 
 _PLACE: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
@@ -92,17 +92,6 @@ def _placed(study: Study, sentence: str) -> tuple[Path, str]:
             if word in names(study.document, section):
                 return (section, word), sentence
     return FIRST, sentence
-
-
-def element_of(study: Study, path: Path) -> Path:
-    """Return the element of the outline that a place of the file belongs to."""
-    if not path or not has(study.document, path[0]):
-        return path[:1] or FIRST
-    section = row_at(study.document, path[:1])
-    tables = section is not None and section.kind == "tables"
-    if len(path) >= 4 and path[2] == "items" and isinstance(path[3], int):
-        return path[:4]
-    return path[:2] if tables and has(study.document[str(path[0])], path[1] if len(path) > 1 else "") else path[:1]
 
 
 def _row(study: Study, fault: Fault, line: int | None) -> ProblemRow:

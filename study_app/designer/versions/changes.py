@@ -12,15 +12,16 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QFontDatabase, QSyntaxHighlighter, QTextCharFormat
 from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget
 
+from study_app.designer.document.document import Document, Standing
 from study_app.designer.document.study import Study
+from study_app.designer.document.toml_text import shown
 from study_app.designer.place.arrangement import PanePage
-from study_app.designer.place.editing import Editing, OpenStudy
-from study_app.designer.place.file import shown
+from study_app.designer.place.editing import Editing
 from study_app.designer.place.prompts import Prompt
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems.card import NameRefusal
 from study_app.designer.versions.known_runs import KnownRuns
-from study_app.designer.versions.version_rows import FILE, Comparison, Standing, counts, version_choices
+from study_app.designer.versions.version_rows import FILE, Comparison, counts, version_choices
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
@@ -246,7 +247,7 @@ class Version(NamedTuple):
         return None if self.source is None else unbundled(self.source.encode())[0].decode()
 
 
-def version_of(opened: OpenStudy, run: Run) -> Version:
+def version_of(opened: Document, run: Run) -> Version:
     """Return a version that was run: its copy is kept, or it is what the file holds."""
     source = source_of(run)
     if source is None:
@@ -374,7 +375,7 @@ class Changes(Card):
         self.difference.show_lines(found.lines)
         self.restore.setEnabled(not opened.read_only and version.text not in {None, opened.study.text})
 
-    def _found_choices(self, opened: OpenStudy) -> tuple[tuple[str, str], ...]:
+    def _found_choices(self, opened: Document) -> tuple[tuple[str, str], ...]:
         file = ""
         with suppress(StoreError):  # a file that cannot be read is no version to compare with
             if opened.base and opened.file.exists():
@@ -391,7 +392,7 @@ class Changes(Card):
         asked = self._asked
         return known if asked is None or any(run.hash == asked.hash for run in known) else (asked, *known)
 
-    def _version(self, opened: OpenStudy, key: str) -> Version:
+    def _version(self, opened: Document, key: str) -> Version:
         if key == FILE:
             return file_version(opened.file)
         run = next((one for one in self._known() if one.hash == key), None)
@@ -402,5 +403,5 @@ class Changes(Card):
         opened = self.editing.writable
         text = None if opened is None else self._version(opened, self.chosen).text
         if text is not None:
-            self.editing.type_text(f"Restore {dict(self._choices)[self.chosen]}", text)
+            self.editing.make(f"Restore {dict(self._choices)[self.chosen]}", text=text)
             self.compare_now()

@@ -9,8 +9,9 @@ from typing import Final
 from PySide6.QtCore import QFileSystemWatcher, QObject, Qt, Signal
 from PySide6.QtGui import QGuiApplication
 
+from study_app.designer.document.document import Standing
 from study_app.designer.place.editing import Editing
-from study_app.designer.versions.version_rows import Standing, VersionChip, version_chip
+from study_app.designer.versions.version_rows import VersionChip, version_chip
 from study_app.errors import StoreError
 from study_app.gui.widgets.background import Background, delayed
 from study_app.store.study_runs import Run, keep_what_was_run, recorded_items, runs

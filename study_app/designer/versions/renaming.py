@@ -5,9 +5,9 @@ from typing import Final
 from PySide6.QtCore import QObject
 
 from study_app.designer.document.names import references_to
+from study_app.designer.document.steps import RenameElement, Request
 from study_app.designer.document.toml_text import Comment, comments_naming
 from study_app.designer.place.editing import Editing
-from study_app.designer.place.requests import RenameElement, Request
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.versions.changes import CommentsCard, UnlockCard, title_of
 from study_app.designer.versions.known_runs import KnownRuns

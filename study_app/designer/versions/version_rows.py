@@ -8,82 +8,16 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-from study_app.designer.document.elements import study_title, title_of
+from study_app.designer.document.document import Standing
+from study_app.designer.document.elements import element_of, study_title, title_of
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_text import Refused
-from study_app.designer.problems.problems import element_of
 from study_app.gui.sessions.session_facts import started_words
 from study_app.gui.theme.theme import Tone
 from study_app.number_text import counted
 from study_app.protocol.differences import document_differences
 from study_app.store.study_runs import Run
 from study_app.store.study_versions import Kept, kept_content
-
-_VERSION: Final = re.compile(r"[0-9A-Za-z.+-]+")
-
-
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """How a study's content stands to those that participants were run with."""
-
-    version: str  # to save it as: its own, or the next free one
-    was: str = ""  # the version that was run last, "" where none was
-    sessions: int = 0  # were run with this very content
-    asks: bool = False  # whether saving asks first: the content differs from the one that was run
-    others: int = 0  # sessions that were run with the study's own version and another content
-
-
-def standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Standing:
-    """Return how a study's content stands to what was run; pilots and rehearsals protect nothing.
-
-    ``hash_`` and ``base`` are the ``protocol_hash`` of the study as it is edited, and of the file that it is edited
-    from, "" for a new study; ``version`` is what the study states.
-    """
-    ran = [run for run in known if run.sessions]
-    if not ran:
-        return Standing(version)
-    same = sum(run.sessions for run in ran if run.hash == hash_)
-    others = sum(run.sessions for run in ran if run.version == version and run.hash != hash_)
-    asks = not same and bool(others or any(run.hash == base for run in ran))
-    free = version
-    while not same and any(run.version == free for run in ran):
-        free = next_version(free)
-    return Standing(free, ran[-1].version, same, asks, others)
-
-
-def check_saving(hash_: str, version: str, known: tuple[Run, ...]) -> None:
-    """Refuse to save a version under the number of another content that participants were run with.
-
-    ``hash_`` is the ``protocol_hash`` of what is to be saved; pilots and rehearsals protect nothing. Raises Refused if
-    the version was run with another content.
-    """
-    others = sum(run.sessions for run in known if run.version == version and run.hash != hash_)
-    if others:
-        raise Refused(
-            f"version {version} was run by {counted(others, 'session')} with another content: "
-            f"save it as version {next_version(version)}"
-        )
-
-
-def check_version(version: str, known: Iterable[Run]) -> None:
-    """Refuse what cannot be the version of a content that was not run.
-
-    Raises Refused if it is not letters, digits, dots, plus and minus, or participants were run with it.
-    """
-    if not _VERSION.fullmatch(version):
-        raise Refused(f'"{version}" cannot be a version: write letters, digits, dots, plus and minus, such as 1.2')
-    if any(run.sessions and run.version == version for run in known):
-        raise Refused(f"version {version} was run with another content: choose another number")
-
-
-def next_version(version: str) -> str:
-    """Return a version with its last number raised: 1.2 of 1.1; of one without a number, with ".1" added."""
-    last = re.search(r"(\d+)(\D*)$", version)
-    if last is None:
-        return f"{version}.1"
-    return f"{version[: last.start()]}{int(last[1]) + 1}{last[2]}"
-
 
 FILE: Final = "file"
 """The key of what the file holds."""

@@ -3,7 +3,7 @@
 import pytest
 
 from study_app.designer.document.additions import added
-from study_app.designer.document.changes import left_by, switched
+from study_app.designer.document.changes import switched
 from study_app.designer.document.fields import initial
 from study_app.designer.document.study import Study, read
 from study_app.designer.new_study.new_study import template
@@ -30,13 +30,13 @@ TASK = ("tasks", "explore")
 @pytest.mark.parametrize("kind", ["reach", "follow"])
 def test_switched_keeps_what_both_kinds_have_and_gives_back_the_rest(kind: str) -> None:
     study = study_of("slime")
-    left = left_by(study, TASK, kind)
+    edits, left = switched(study, TASK, kind, {})
     assert set(left) == {"min_s", "max_s"}
-    other, _ = study.edited(*switched(study, TASK, kind, {}))
+    other, _ = study.edited(*edits)
     table = other.document["tasks"]["explore"]
     assert table["kind"] == kind
     assert table["instruction"] == study.document["tasks"]["explore"]["instruction"]
     assert not {"min_s", "max_s"} & set(table)
     assert not [fault for fault in other.faults if "missing" in fault.message or "unknown" in fault.message]
-    back, _ = other.edited(*switched(other, TASK, "explore", left))
+    back, _ = other.edited(*switched(other, TASK, "explore", left)[0])
     assert back.document == study.document

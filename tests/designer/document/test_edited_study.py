@@ -1,11 +1,13 @@
 """An edited study: its document and faults are those of its text, in a trial too; undo, redo, and what is refused."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from study_app.designer.document.document import Document
 from study_app.designer.document.fields import rows
-from study_app.designer.document.study import History, read
+from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset
 from study_app.designer.document.toml_text import Refused
 from study_app.errors import ProtocolError
@@ -32,31 +34,58 @@ def test_problems_are_those_of_check(old: str, new: str) -> None:
 
 
 def test_undo_and_redo_restore_text_and_selection() -> None:
-    first = History(DEMO, ("liquids", "thin"))
-    title = first.edited("Change the title", Set(("study", "title"), "New"), select=("study",))
-    both = title.edited("Remove the limits", Unset(("limits",)), select=())
-    assert both.undo() == title.__class__(title.study, title.selected, title.done, (both.done[-1],))
-    assert both.undo().undo().study.text == DEMO.text
-    assert both.undo().undo().selected == ("liquids", "thin")
-    assert both.undo().undo().redo().redo() == both
-    assert both.undo().edited("Other", Set(("study", "title"), "Other")).undone == ()
-    assert first.undo() == first.redo() == first
+    opened = Document(DEMO, ("liquids", "thin"))
+    opened.undo()
+    opened.redo()
+    found = [(DEMO.text, ("liquids", "thin"))]
+    for words, edit, select in (
+        ("Change the title", Set(("study", "title"), "New"), ("study",)), ("Remove the limits", Unset(("limits",)), ()),
+    ):  # fmt: skip
+        opened.edit(words, edit, select=select)
+        found.append((opened.study.text, opened.selected))
+    for at in (1, 0):
+        opened.undo()
+        assert (opened.study.text, opened.selected) == found[at]
+    for at in (1, 2):
+        opened.redo()
+        assert (opened.study.text, opened.selected) == found[at]
+    opened.undo()
+    opened.edit("Other", Set(("study", "title"), "Other"))
+    assert ([step.words for step in opened.done], opened.undone) == (["Change the title", "Other"], [])
+
+
+def test_steps_of_one_key_join_until_the_keyboard_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 0.0
+    monkeypatch.setattr("study_app.designer.document.document.time", SimpleNamespace(monotonic=lambda: now_s))
+    opened = Document(DEMO)
+    for now_s, key in ((1.0, "title"), (1.5, "title"), (3.0, "title"), (3.1, "other"), (3.2, None), (3.3, None)):
+        opened.edit("Type", Set(("study", "title"), f"New at {now_s}"), key=key)
+    assert len(opened.done) == 5
+    for _ in range(5):
+        opened.undo()
+    assert opened.study.text == DEMO.text
 
 
 def test_a_step_that_changes_nothing_is_none() -> None:
-    same = History(DEMO).edited("Same", Set(("format",), 1), select=("study",))
-    assert (same.done, same.selected) == ((), ("study",))
+    same = Document(DEMO, ())
+    same.edit("Same", Set(("format",), 1), select=("study",))
+    assert (same.done, same.selected) == ([], ("study",))
 
 
 def test_a_text_that_is_not_toml_keeps_its_last_document_and_is_typed_on() -> None:
-    broken = History(DEMO).typed("Type", DEMO.text.replace("format = 1", "format = "))
+    broken = Document(DEMO)
+    broken.edit("Type", text=DEMO.text.replace("format = 1", "format = "))
     assert not broken.study.is_toml
     assert broken.study.document == DEMO.document
     assert "not TOML" in broken.study.problems[0].message
     with pytest.raises(Refused, match="correct its text first"):
-        broken.edited("Change", Set(("format",), 2))
-    assert broken.typed("Type", DEMO.text).study.protocol == DEMO.protocol
-    assert broken.undo().study.text == DEMO.text
+        broken.edit("Change", Set(("format",), 2))
+    assert len(broken.done) == 1
+    broken.edit("Type", text=DEMO.text)
+    assert broken.study.protocol == DEMO.protocol
+    broken.undo()
+    broken.undo()
+    assert broken.study.text == DEMO.text
 
 
 def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> None:

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
+from study_app.designer.document.elements import element_of
 from study_app.designer.document.fields import Row, rows, unit_of
 from study_app.designer.document.study import Study, read
 from study_app.designer.form.form import form
 from study_app.designer.form.rows import Form
-from study_app.designer.problems.problems import element_of
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.problems import Fault, shown

@@ -10,10 +10,7 @@ import pytest
 from study_app.designer.document.additions import number_rows
 from study_app.designer.document.fields import Row, row_at, rows
 from study_app.designer.document.fragments import copied
-from study_app.designer.document.study import Study, read
-from study_app.designer.document.toml_text import Refused
-from study_app.designer.outline.add_list import addable
-from study_app.designer.place.requests import (
+from study_app.designer.document.steps import (
     AddElement,
     AddEntry,
     AddInstrument,
@@ -30,10 +27,13 @@ from study_app.designer.place.requests import (
     Request,
     SetText,
     SetValue,
+    Situation,
     SwitchKey,
     SwitchKind,
 )
-from study_app.designer.place.steps import Steps
+from study_app.designer.document.study import Study, read
+from study_app.designer.document.toml_text import Refused
+from study_app.designer.outline.add_list import addable
 from study_app.protocol.source.document import Path, entries
 from tests.designer.document.grown import PROTOCOLS
 from tests.golden import compare
@@ -162,7 +162,7 @@ def kind_of(study: Study, request: Request, place: Path, *, coarse: bool) -> Any
 def said(study: Study, selected: Path, request: Request) -> Iterator[str]:
     """Yield what a step says and changes, or why it is refused."""
     try:
-        step = Steps().step(study, request, selected)
+        step = request.step(Situation(study, selected))
         before = study.typed(step.text)[0] if step.text else study
         after, _ = before.edited(*step.edits)
     except Refused as refusal:

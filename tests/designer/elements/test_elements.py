@@ -5,9 +5,8 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 
+from study_app.designer.document.steps import ChangeLanguage, RenameElement, SetText, Situation
 from study_app.designer.document.study import read
-from study_app.designer.place.requests import ChangeLanguage, RenameElement, SetText
-from study_app.designer.place.steps import Steps
 from study_app.protocol.source.document import value_at
 from tests.designer.document.grown import PROTOCOLS
 
@@ -81,7 +80,7 @@ def test_a_typed_text_leaves_its_copies_in_other_languages() -> None:
     text = (*ITEMS, 0, "text")
     study = read((PROTOCOLS / "demo.toml").read_bytes(), PROTOCOLS)
     for asked in (ChangeLanguage("add", "nl"), ChangeLanguage("copy", "nl")):
-        study, _ = study.edited(*Steps().step(study, asked).edits)
+        study, _ = study.edited(*asked.step(Situation(study)).edits)
     before = value_at(study.document, text)
-    study, _ = study.edited(*Steps().step(study, SetText(text, "en", "Warm")).edits)
+    study, _ = study.edited(*SetText(text, "en", "Warm").step(Situation(study)).edits)
     assert value_at(study.document, text) == {**before, "en": "Warm"}

@@ -6,8 +6,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
+from study_app.designer.document.steps import AddElement, AddNamed, RenameElement, SetText
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.place.requests import AddElement, AddNamed, RenameElement, SetText
 from study_app.protocol.source.document import value_at
 
 pytestmark = pytest.mark.slow
@@ -47,7 +47,7 @@ def test_a_new_block_gets_the_id_of_its_title_once_and_undo_gives_every_byte_bac
     designer.editing.ask(SetText(("blocks", "second_part", "title"), "en", "Third part"))
     designer.place.outline.chosen.emit(("blocks", "liquids"))
     assert "second_part" in designer.editing.opened.study.document["blocks"]
-    while designer.editing.opened.history.done:
+    while designer.editing.opened.done:
         designer.editing.undo()
     assert designer.text == before
 

@@ -4,9 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from study_app.designer.document.elements import element_of
 from study_app.designer.document.study import Study, read
-from study_app.designer.place.file import file_text, retyped, shown
-from study_app.designer.problems.problems import element_of
+from study_app.designer.document.toml_text import retyped, shown
+from study_app.designer.place.file import file_text
 from study_app.protocol.source.files import shipped_file
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from study_app.designer.document.additions import additions_for, repairs
 from study_app.designer.document.elements import brief, found_fields, outline, position_of, used_by
+from study_app.designer.document.steps import MakeSeries
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.study_facts import facts
 from study_app.designer.form.form import form
@@ -28,8 +29,7 @@ from study_app.designer.measures.simulation import Controls
 from study_app.designer.outline.add_list import addable, fields_to_go_to
 from study_app.designer.outline.outline_rows import outline_rows
 from study_app.designer.place.file import file_text
-from study_app.designer.place.requests import MakeSeries
-from study_app.designer.place.steps import series_prompt, series_titles
+from study_app.designer.place.prompts import series_prompt, series_titles
 from study_app.designer.problems.problems import problem_rows
 from study_app.protocol.source.document import Path
 from tests.designer.document.test_study_transcripts import elements, generic, studies

@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QWidget
 
-from study_app.designer.place.requests import SetValue
+from study_app.designer.document.steps import SetValue
 from study_app.designer.place.tab_order import stops
 from study_app.gui.kit.commands import COMMANDS
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.designer.place.requests import ChangeLanguage
+from study_app.designer.document.steps import ChangeLanguage
 from study_app.designer.place.tab_order import stops
 
 pytestmark = pytest.mark.slow

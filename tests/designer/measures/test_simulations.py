@@ -9,6 +9,7 @@ import pytest
 from PySide6.QtCore import QSize, Qt
 
 from study_app.analysis.planning.threshold_studies import plans, sweep
+from study_app.designer.document.steps import RetypeFile
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.cards import UNKNOWN
@@ -26,7 +27,6 @@ from study_app.designer.measures.simulation import (
     start_measure_worker,
 )
 from study_app.designer.new_study.new_study import template
-from study_app.designer.place.requests import RetypeFile
 from study_app.gui.participant.page_widgets import parts_of
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.protocol.checks.expected_precision import imprecise

@@ -13,9 +13,9 @@ from PySide6.QtGui import QCursor, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from study_app.designer.document.steps import ChangeLanguage, DuplicateElement, SetText
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.place.requests import ChangeLanguage, DuplicateElement, SetText
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage, TextPage

@@ -13,8 +13,8 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.app.main_controller import MainController
+from study_app.designer.document.steps import SetText, SetValue
 from study_app.designer.place.controller import DesignerController
-from study_app.designer.place.requests import SetText, SetValue
 from study_app.errors import StoreError
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.protocol.source.files import protocol_hash, shipped_file
@@ -105,7 +105,7 @@ def test_another_study_that_cannot_be_saved_keeps_its_edits_as_a_draft(
     def full(*_args: object) -> str:
         raise StoreError("the disk is full")
 
-    monkeypatch.setattr("study_app.designer.place.editing.save", full)
+    monkeypatch.setattr("study_app.designer.document.document.save", full)
     keep_setting(ran.file.with_name("pantry.toml"), "participants", 7)  # of a study that was deleted
     ran.editing.ask(SetValue(REPETITIONS, 3))
     ran.saving.save_as_another("pantry")
@@ -217,7 +217,7 @@ from pathlib import Path
 from PySide6.QtTest import QTest
 from study_app.designer.place.controller import DesignerController
 from study_app.gui.application import application_here
-from study_app.designer.place.requests import SetText
+from study_app.designer.document.steps import SetText
 application = application_here()
 designer = DesignerController(Path(sys.argv[1]))
 designer.open("kitchen")

@@ -5,10 +5,9 @@ from typing import Any
 import pytest
 
 from study_app.designer.document.additions import check_values, number_row, titles_with
+from study_app.designer.document.steps import MakeSeries, Situation
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.place.requests import MakeSeries
-from study_app.designer.place.steps import make_series
 from study_app.protocol.source.document import value_at
 from tests.designer.document.grown import PROTOCOLS
 
@@ -60,7 +59,7 @@ def test_the_number_of_the_element_is_replaced_in_each_title_and_else_added(titl
 
 
 def test_copies_are_listed_after_the_original_where_the_block_can_take_them(study: Study) -> None:
-    step = make_series(study, MakeSeries(NO_DELAY, (*NO_DELAY, "delay_ms"), (30, 60)))
+    step = MakeSeries(NO_DELAY, (*NO_DELAY, "delay_ms"), (30, 60)).step(Situation(study))
     after, _ = study.edited(*step.edits)
     assert after.faults == ()
     assert step.several == (("conditions", "delay_30"), ("conditions", "delay_60"))

@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
+from study_app.designer.document.document import Document, check_version, next_version, standing
+from study_app.designer.document.study import read
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.versions.version_rows import check_saving, check_version, next_version, standing
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.receipt import without_conditions
@@ -82,13 +83,13 @@ def test_what_cannot_be_a_version_is_refused(version: str) -> None:
         check_version("1.0", [Run("abc", "1.0", sessions=1)])
 
 
-def test_a_version_that_was_run_is_never_overwritten_with_other_content() -> None:
-    known = (Run("abc", "1.0", sessions=2), Run("def", "1.1", pilots=3))
-    check_saving("abc", "1.0", known)
-    check_saving("new", "1.1", known)
-    check_saving("new", "2.0", known)
+def test_a_version_that_was_run_is_never_overwritten_with_other_content(tmp_path: Path) -> None:
+    opened = Document(read(TEXT.encode(), tmp_path), file=tmp_path / "study.toml")
+    own = content_hash(opened.source())
+    for harmless in (Run(own, "1.0", sessions=2), Run("other", "1.0", pilots=3), Run("other", "2.0", sessions=1)):
+        opened.save((harmless,))
     with pytest.raises(Refused, match=r"version 1\.0 was run by 2 sessions with another content: .* version 1\.1$"):
-        check_saving("new", "1.0", known)
+        opened.save((Run("other", "1.0", sessions=2),))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
-from study_app.designer.document.study import History, Study
+from study_app.designer.document.document import Document
+from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import Refused
 from tests.designer.document.grown import texts
 from tests.designer.document.random_edits import check_edit, edit_of, holds_nothing
@@ -24,50 +25,50 @@ class Edited(RuleBasedStateMachine):
 
     @initialize(name=st.sampled_from([*TEXTS, *["grown", "grown, \\r\\n"] * 8]))
     def open(self, name: str) -> None:
-        self.history = History(Study(TEXTS[name]))
+        self.document = Document(Study(TEXTS[name]))
         self.texts, self.undone = [TEXTS[name]], list[str]()
 
     @rule(seed=st.integers(0, 2**32))
     def edit(self, seed: int) -> None:
         edit = edit_of(Random(seed), self.texts[-1])  # noqa: S311
-        study, before = self.history.study, self.history
+        study, done = self.document.study, len(self.document.done)
         try:
-            self.history = before.edited("Edit", edit)
+            self.document.edit("Edit", edit)
         except Refused:
             return
-        check_edit(study.text, self.history.study.text, edit)
-        if self.history.done != before.done:
-            self.texts.append(self.history.study.text)
+        check_edit(study.text, self.document.study.text, edit)
+        if len(self.document.done) > done:
+            self.texts.append(self.document.study.text)
             self.undone.clear()
 
     @precondition(lambda self: len(self.texts) > 1)
     @rule()
     def undo(self) -> None:
-        self.history = self.history.undo()
+        self.document.undo()
         self.undone.append(self.texts.pop())
-        assert self.history.study.text == self.texts[-1]
+        assert self.document.study.text == self.texts[-1]
 
     @precondition(lambda self: self.undone)
     @rule()
     def redo(self) -> None:
-        self.history = self.history.redo()
+        self.document.redo()
         self.texts.append(self.undone.pop())
-        assert self.history.study.text == self.texts[-1]
+        assert self.document.study.text == self.texts[-1]
 
     @rule()
     def type(self) -> None:
         """Add a comment line, as a person who types into the file."""
         text = self.texts[-1]
         newline = "\r\n" if "\r\n" in text else "\n"
-        self.history = self.history.typed("Type", f"{text}{newline}# typed{newline}")
-        self.texts.append(self.history.study.text)
+        self.document.edit("Type", text=f"{text}{newline}# typed{newline}")
+        self.texts.append(self.document.study.text)
         self.undone.clear()
-        assert self.history.study.document == Study(text).document
+        assert self.document.study.document == Study(text).document
 
     @rule(seed=st.integers(0, 2**32))
     def try_edit(self, seed: int) -> None:
         """A trial has the document and the faults of the edited text, and changes nothing."""
-        study, edit = self.history.study, edit_of(Random(seed), self.texts[-1])  # noqa: S311
+        study, edit = self.document.study, edit_of(Random(seed), self.texts[-1])  # noqa: S311
         document = repr(study.document)
         try:
             written, tried = study.edited(edit)[0], study.trial.edited(edit)[0]
@@ -78,9 +79,9 @@ class Edited(RuleBasedStateMachine):
 
     def teardown(self) -> None:
         """Undo everything."""
-        while self.history.done:
-            self.history = self.history.undo()
-        assert self.history.study.text == self.texts[0]
+        while self.document.done:
+            self.document.undo()
+        assert self.document.study.text == self.texts[0]
 
 
 @pytest.mark.slow

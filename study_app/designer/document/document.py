@@ -1,0 +1,354 @@
+"""A study that is open: its text with the steps of undo and redo, its file, its draft and its version."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+from study_app.designer.document.elements import FIRST, first_element, study_title
+from study_app.designer.document.study import Study, read
+from study_app.designer.document.toml_edits import Edit
+from study_app.designer.document.toml_text import Refused, Splices, reverted
+from study_app.designer.new_study.new_study import check_free, copy_of
+from study_app.errors import StoreError
+from study_app.number_text import counted
+from study_app.protocol.source.document import Path as Place
+from study_app.protocol.source.document import value_at
+from study_app.protocol.source.files import file_hash, hashes_in, shipped, shipped_file, unbundled, with_liquid_files
+from study_app.store.atomic import cannot_write
+from study_app.store.drafts import Draft, Keeper, draft_of
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.folder_lock import is_open
+from study_app.store.study_runs import Run
+from study_app.store.study_versions import content_hash, keep_content, save, write_whole
+
+MOST_STEPS: Final = 500
+JOIN_S: Final = 1.0  # typing in one field is one step until the keyboard rests for so long
+DEFAULT_VERSION: Final = "1"
+_VERSION: Final = re.compile(r"[0-9A-Za-z.+-]+")
+
+
+@dataclass(frozen=True, slots=True)
+class DoneStep:
+    """A step that was made: its words ("Move Honey up"), its splices, and what was selected before and after it."""
+
+    words: str
+    splices: tuple[Splices, ...]
+    before: Place = ()
+    after: Place = ()
+
+
+class Document:
+    """A study that is open in the designer, with what was done in it.
+
+    ``base`` is the hash of the file's content that is edited and ``saved`` its text, "" for a new file; ``read_only``
+    says why it cannot be changed, "" where it can; ``draft`` was found when it was opened, ``kept`` is when it was
+    written last.
+    """
+
+    def __init__(
+        self, study: Study, selected: Place = FIRST, file: Path = Path(), base: str = "", draft: Draft | None = None
+    ) -> None:
+        self.study, self.selected, self.file = study, selected, file
+        self.base, self.saved = base, study.text if base else ""
+        self.done: list[DoneStep] = []
+        self.undone: list[DoneStep] = []
+        self.read_only = ""
+        self.draft = draft
+        self.kept: datetime | None = None
+        self.keeper = Keeper(file, base)
+        self._last: tuple[object, float] = (None, 0.0)
+
+    # steps
+
+    def edit(
+        self, words: str, *edits: Edit, text: str | None = None, select: Place | None = None, key: object = None
+    ) -> None:
+        """Make a step of another text, of edits one after the other, or of both; an edit without effect is none.
+
+        It continues the last step where that was made with the same ``key`` not long ago. Refused edits change nothing.
+        """
+        study, splices = (self.study, ()) if text is None else self.study.typed(text)
+        if edits or text is None:
+            study, more = study.edited(*edits)
+            splices = (*splices, *more)
+        before, selected = self.selected, self.selected if select is None else select
+        self.selected = selected
+        if not splices:
+            return
+        last, then = self._last
+        if key is not None and key == last and time.monotonic() - then < JOIN_S and self.done:
+            joined = self.done.pop()
+            splices, before = (*joined.splices, *splices), joined.before
+        self.study, self.undone, self._last = study, [], (key, time.monotonic())
+        self.done = [*self.done, DoneStep(words, splices, before, selected)][-MOST_STEPS:]
+
+    @property
+    def last_key(self) -> object:
+        """The key of the last step, None where another step cannot continue it."""
+        return self._last[0]
+
+    def rest(self) -> None:
+        """Let the next edit be a step of its own."""
+        self._last = (None, 0.0)
+
+    def undo(self) -> None:
+        if self.done:
+            step = self.done.pop()
+            self.study = self.study.spliced(tuple(reverted(splices) for splices in reversed(step.splices)))
+            self.selected = step.before
+            self.undone.append(step)
+            self.rest()
+
+    def redo(self) -> None:
+        if self.undone:
+            step = self.undone.pop()
+            self.study, self.selected = self.study.spliced(step.splices), step.after
+            self.done.append(step)
+            self.rest()
+
+    # what it is called
+
+    @property
+    def title(self) -> str:
+        """Its title in its first language; "" where it has none."""
+        return study_title(self.study.document)
+
+    @property
+    def name(self) -> str:
+        """The name of the study, which its results folder has, too."""
+        return str(value_at(self.study.document, ("study", "name")) or "")
+
+    @property
+    def version(self) -> str:
+        """The version that the study states, or the one that counts where it states none."""
+        stated = value_at(self.study.document, ("study", "version"))
+        return str(stated) if stated is not None else DEFAULT_VERSION
+
+    # file and draft
+
+    @property
+    def edited(self) -> bool:
+        """Whether it differs from the file."""
+        return self.study.text != self.saved
+
+    def note_edit(self, now_s: float) -> None:
+        """Let the draft follow an edit; a text that is the file's again needs none."""
+        if self.edited or not self.base:
+            self.keeper.edited(self.study.text, self.selected, now_s)
+        else:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Forget the draft: the text is the file's."""
+        self.keeper.saved(self.base)
+        self.kept = None
+
+    def write_draft(self, now_s: float | None = None) -> bool:
+        """Write the draft if it is due, without a time at once; return whether it was written."""
+        written = self.keeper.write() if now_s is None else self.keeper.write_if_due(now_s)
+        if written:
+            self.kept = datetime.now().astimezone()
+        return written
+
+    def discard_draft(self) -> None:
+        """Go back to the file as one step, and forget the draft."""
+        self.edit("Discard the draft", text=self.saved)
+        self.draft = None
+        self._settle()
+
+    def give_up(self) -> None:
+        """Delete the draft of a study that was never saved; nothing of it is left."""
+        self.keeper.saved("")
+        self.keeper.write()
+
+    def changed_outside(self) -> bool:
+        """Return whether the file has another content than the one that is edited."""
+        return content_hash(_content(self.file)) != self.base if self.file.exists() else bool(self.base)
+
+    def take_outside(self) -> None:
+        """Take the file's content as one step."""
+        content = _content(self.file)
+        self.saved = read(content, self.file.parent).text
+        self._rebase(content_hash(content))
+        self.edit("Take the file's content", text=self.saved)
+        self._settle()
+
+    def keep_mine(self, now_s: float) -> None:
+        """Let the next saving replace what another program wrote."""
+        content = _content(self.file) if self.file.exists() else b""
+        self.saved = content.decode("utf-8", "replace")
+        self._rebase(content_hash(content) if self.file.exists() else "")
+        self.note_edit(now_s)
+
+    def _rebase(self, base: str) -> None:
+        """Take edits as made from the content of another hash."""
+        self.base = self.keeper.base = base
+
+    def continue_draft(self) -> None:
+        """Restore the draft of the file that was not saved, as one step."""
+        if (draft := draft_of(self.file)) is None:
+            return
+        self.keeper.take(draft)
+        if draft.text != self.saved:
+            self.draft = draft
+            self.edit("Restore the draft", text=draft.text)
+            if draft.selected and value_at(self.study.document, draft.selected) is not None:
+                self.selected = draft.selected
+            self._rebase(draft.base)
+
+    def why_read_only(self, results: Path) -> str:
+        """Return why the study cannot be changed at this moment, "" where it can."""
+        if any(self.file.resolve() == shipped_file(name).resolve() for name in shipped()):
+            return "This study ships with the program. Make a copy to change it."
+        if self.file.exists() and not os.access(self.file, os.W_OK):
+            return "You may not write this file. Make a copy to change it."
+        if any(is_open(session.path) for session in StudyFolder(results / self.name).sessions()):
+            return "A session of this study is under way. Make a copy, or wait until it has ended."
+        return ""
+
+    # versions
+
+    def source(self) -> bytes:
+        """Return what a session would be run with: the text, and the liquid files that it names."""
+        return with_liquid_files(self.study.text.encode(), self.study.folder)
+
+    def standing(self, known: tuple[Run, ...]) -> Standing:
+        """Return how the study stands to what was run."""
+        if not any(run.sessions for run in known):
+            return standing("", "", self.version, known)
+        base = content_hash(with_liquid_files(self.saved.encode(), self.study.folder)) if self.base else ""
+        return standing(content_hash(self.source()), base, self.version, known)
+
+    def save(self, known: tuple[Run, ...]) -> None:
+        """Write the file, and keep what sessions will be run with.
+
+        It is refused where sessions were run with this version and another content, or the file was changed outside.
+        """
+        source = self.source()
+        hash_ = content_hash(source)
+        others = sum(run.sessions for run in known if run.version == self.version and run.hash != hash_)
+        if others:
+            raise Refused(
+                f"version {self.version} was run by {counted(others, 'session')} with another content: "
+                f"save it as version {next_version(self.version)}"
+            )
+        self._bring_files(source)
+        keep_content(source)
+        self.base = save(self.file, self.study.text, self.base)
+        self.saved, self.draft = self.study.text, None
+        self._settle()
+
+    def _bring_files(self, source: bytes) -> None:
+        """Write the files that the study names into its own folder, where it was copied from another one."""
+        folder = self.file.resolve().parent
+        if self.study.folder.resolve() == folder:
+            return
+        for name, text in unbundled(source)[1].items():
+            path = folder / name
+            if path.exists() and _content(path) != text.encode():
+                raise Refused(f"{path} exists and holds another liquid: rename one of the two files")
+            write_whole(path, text.encode())
+        for name, digest in hashes_in(source).items():
+            if (there := file_hash(folder / name)) is None:
+                try:
+                    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                    shutil.copyfile(self.study.folder / name, folder / name)
+                except OSError as error:
+                    raise cannot_write(folder / name, error) from error
+            elif there != digest:
+                raise Refused(f"{folder / name} exists and holds another video: rename one of the two files")
+        self.study = replace(self.study, folder=folder)
+
+    def saved_as(self, name: str) -> Document:
+        """Return the study with its edits under another name, as one step; this one goes back to its file."""
+        made = Document(self.study, self.selected, check_free(name))
+        made.done = [*self.done]
+        made.edit(f"Save as {name}", text=copy_of(self.study, name).text)
+        made.note_edit(0.0)
+        made.write_draft()
+        self.discard_draft()
+        return made
+
+
+def open_file(file: Path, results: Path) -> Document:
+    """Open a study's file, with the draft of it that was not saved."""
+    content = _content(file)
+    study = read(content, file.parent)
+    opened = Document(study, first_element(study.document), file, content_hash(content))
+    opened.read_only = opened.why_read_only(results)
+    if not opened.read_only:
+        opened.continue_draft()
+    return opened
+
+
+def open_new(study: Study, name: str) -> Document:
+    """Open a copy of a study under another name; nothing is written before it is saved."""
+    file, made = check_free(name), copy_of(study, name)
+    return Document(made, first_element(made.document), file)
+
+
+def open_unsaved(file: Path, draft: Draft) -> Document:
+    """Open a study that was never saved, from its draft."""
+    opened = Document(Study(draft.text, file.parent), draft.selected or FIRST, file, draft=draft)
+    opened.keeper.take(draft)
+    return opened
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise StoreError(f"{file} cannot be read: {error.strerror}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How a study's content stands to those that participants were run with."""
+
+    version: str  # to save it as: its own, or the next free one
+    was: str = ""  # the version that was run last, "" where none was
+    sessions: int = 0  # were run with this very content
+    asks: bool = False  # whether saving asks first: the content differs from the one that was run
+    others: int = 0  # sessions that were run with the study's own version and another content
+
+
+def standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Standing:
+    """Return how a study's content stands to what was run; pilots and rehearsals protect nothing.
+
+    ``hash_`` and ``base`` are the ``protocol_hash`` of the study as it is edited, and of the file that it is edited
+    from, "" for a new study; ``version`` is what the study states.
+    """
+    ran = [run for run in known if run.sessions]
+    if not ran:
+        return Standing(version)
+    same = sum(run.sessions for run in ran if run.hash == hash_)
+    others = sum(run.sessions for run in ran if run.version == version and run.hash != hash_)
+    asks = not same and bool(others or any(run.hash == base for run in ran))
+    free = version
+    while not same and any(run.version == free for run in ran):
+        free = next_version(free)
+    return Standing(free, ran[-1].version, same, asks, others)
+
+
+def check_version(version: str, known: Iterable[Run]) -> None:
+    """Refuse what cannot be the version of a content that was not run."""
+    if not _VERSION.fullmatch(version):
+        raise Refused(f'"{version}" cannot be a version: write letters, digits, dots, plus and minus, such as 1.2')
+    if any(run.sessions and run.version == version for run in known):
+        raise Refused(f"version {version} was run with another content: choose another number")
+
+
+def next_version(version: str) -> str:
+    """Return a version with its last number raised: 1.2 of 1.1; of one without a number, with ".1" added."""
+    last = re.search(r"(\d+)(\D*)$", version)
+    if last is None:
+        return f"{version}.1"
+    return f"{version[: last.start()]}{int(last[1]) + 1}{last[2]}"

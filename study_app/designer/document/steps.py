@@ -1,0 +1,546 @@
+"""What is asked for in the study designer: requests, each of which makes one step of undo, and other tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, Literal, TypeAlias
+
+from study_app.designer.document.additions import (
+    added,
+    check_values,
+    copy_with,
+    duplicated,
+    fitted,
+    listings,
+    number_row,
+)
+from study_app.designer.document.changes import (
+    filled_in,
+    followed,
+    languages_of,
+    moved,
+    switched,
+    with_language,
+    without_language,
+)
+from study_app.designer.document.elements import step_of, title_of
+from study_app.designer.document.fields import counted_elements, initial, label_of, row_at, rows, singular
+from study_app.designer.document.fragments import pasted
+from study_app.designer.document.names import deletions, named_at, renamed, replaced, with_references
+from study_app.designer.document.study import Study
+from study_app.designer.document.toml_edits import Edit, Insert, Move, Set, Unset
+from study_app.designer.document.toml_text import Refused, retyped
+from study_app.ids import free_id
+from study_app.protocol.questionnaires import written_out
+from study_app.protocol.source.document import Path, entries, names, value_at
+from study_app.protocol.wording.languages import language_name
+
+Recorded: TypeAlias = Callable[[Path], frozenset[str]]
+"""Returns the ids beside an element under which answers are recorded: its own then stays."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of a study."""
+
+    words: str  # what it does
+    edits: tuple[Edit, ...]  # its edits
+    select: Path | None = None  # what is selected after it; None stands for the same
+    continues: object = None  # what it may continue: typing in one field is one step
+    text: str | None = None  # the file's text that the edits are made in, None for the text that there is
+    several: tuple[Path, ...] = ()  # elements that are selected together after it
+    said: str = ""  # what a screen reader says of it
+    fresh: bool = False  # whether what is selected after it is new: its first text takes the keyboard
+
+
+@dataclass(slots=True)
+class Situation:
+    """The study that a step is made in, what is selected, and the values that switches of kinds removed meanwhile."""
+
+    study: Study
+    selected: Path = ()
+    left: dict[Path, dict[str, Any]] = field(default_factory=dict)
+    recorded: Recorded = lambda _element: frozenset()
+
+
+class Request:
+    """What is asked for; `step` refuses what makes no sense in a study."""
+
+    __slots__ = ()
+
+    def step(self, at: Situation) -> Step:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class SetValue(Request):
+    """Give a key or entry a value; several while one field is typed in are one step."""
+
+    path: Path
+    value: Any
+    typing: bool = False
+
+    def step(self, at: Situation) -> Step:
+        edits = (Set(self.path, self.value),)
+        return Step(f"Change {label_of(self.path[-1])}", edits, continues=self.path if self.typing else None)
+
+
+@dataclass(frozen=True, slots=True)
+class SetText(Request):
+    """Give a text in one language."""
+
+    path: Path
+    language: str
+    text: str
+
+    def step(self, at: Situation) -> Step:
+        languages = [str(code) for _, code in entries(at.study.document, "study.languages.*")] or [self.language]
+        value = value_at(at.study.document, self.path)
+        if isinstance(value, Mapping):
+            edit = Set((*self.path, self.language), self.text)
+        elif len(languages) == 1:
+            edit = Set(self.path, self.text)
+        else:
+            before = {languages[0]: value} if isinstance(value, str) else {}
+            edit = Set(self.path, {**before, self.language: self.text})
+        edits = (edit, *followed(at.study, self.path, self.language, self.text))
+        return Step(f"Type {label_of(self.path[-1])}", edits, continues=(self.path, self.language))
+
+
+@dataclass(frozen=True, slots=True)
+class LeaveText(Request):
+    """Say that a text is left: a new element takes the id of its text."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveKey(Request):
+    """Remove a key or an entry of a list."""
+
+    path: Path
+
+    def step(self, at: Situation) -> Step:
+        return Step(f"Remove {label_of(self.path[-1])}", (Unset(self.path),))
+
+
+@dataclass(frozen=True, slots=True)
+class AddKey(Request):
+    """Write an optional key with its default or an initial value."""
+
+    path: Path
+
+    def step(self, at: Situation) -> Step:
+        return Step(f"Add {label_of(self.path[-1])}", (Set(self.path, _first_value(at.study, self.path)),))
+
+
+@dataclass(frozen=True, slots=True)
+class AddEntry(Request):
+    """Add an entry at the end of a list: the value, or where it is None an initial one."""
+
+    path: Path
+    value: Any = None
+
+    def step(self, at: Situation) -> Step:
+        row = row_at(at.study.document, self.path)
+        there = row.value if row is not None and isinstance(row.value, tuple) else ()
+        value = self.value
+        if value is None:
+            if row is None:
+                raise Refused("nothing can be added here")
+            if row.kind == "list":
+                return Step(f"Add {singular(self.path[-1])}", added(at.study, self.path)[0])
+            first = initial({}, self.path) if not there else there[-1]
+            value = _listed(first[0] if not there and isinstance(first, list | tuple) else first)
+        edit: Edit = Insert((*self.path, len(there)), value) if there else Set(self.path, [value])
+        return Step(f"Add to {label_of(self.path[-1])}", (edit,))
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchKind(Request):
+    """Give a table another kind."""
+
+    path: Path
+    kind: str | None
+
+    def step(self, at: Situation) -> Step:
+        kept = at.left.get(self.path, {})
+        edits, gone = switched(at.study, self.path, self.kind, kept)
+        at.left[self.path] = {**kept, **gone}
+        return Step(f"Switch to {label_of(self.kind or 'nothing').lower()}", edits)
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchKey(Request):
+    """Give one key in place of another one of the same table, of two of which exactly one is given."""
+
+    path: Path
+    to: str
+
+    def step(self, at: Situation) -> Step:
+        table, name = self.path[:-1], str(self.path[-1])
+        before = value_at(at.study.document, self.path)
+        kept = {**at.left.get(table, {}), **({} if before is None else {name: before})}
+        gone: tuple[Edit, ...] = () if before is None else (Unset(self.path),)
+        after, _ = at.study.edited(*gone)
+        value = _listed(kept[self.to]) if self.to in kept else _first_value(after, (*table, self.to))
+        if value in ("", []):
+            raise Refused(f"there is nothing that {label_of(self.to)} can name: add it first")
+        at.left[table] = kept
+        return Step(f"Give {label_of(self.to)}", (*gone, Set((*table, self.to), value)))
+
+
+@dataclass(frozen=True, slots=True)
+class AddElement(Request):
+    """Add an element to a section or list of tables, after the selected one of its kind.
+
+    ``kind`` is the key that tells kinds apart with its value; () leaves it out.
+    """
+
+    section: Path
+    kind: tuple[()] | tuple[str, str] = ()
+
+    def step(self, at: Situation) -> Step:
+        section, selected = self.section, at.selected
+        inside = selected[: len(section)] == section and len(selected) > len(section)
+        behind = selected[len(section)] if inside else None
+        edits, path = added(at.study, section, dict([self.kind]) if self.kind else None, behind=behind)
+        return Step(f"Add {singular(section[-1])}", _beside(at.study, edits, selected, path), path, fresh=True)
+
+
+@dataclass(frozen=True, slots=True)
+class AddNamed(Request):
+    """Add an element to a section and name it: in the reference at ``path``, or at the end of the list there."""
+
+    path: Path
+    section: str
+
+    def step(self, at: Situation) -> Step:
+        row = row_at(at.study.document, self.path)
+        edits, path = added(at.study, (self.section,))
+        if row is not None and row.kind == "references":
+            listed = value_at(at.study.edited(*edits)[0].document, self.path) or ()
+            if path[1] not in listed:
+                end = (*self.path, len(listed))
+                edits = (*edits, Insert(end, path[1]) if listed else Set(self.path, [path[1]]))
+        else:
+            edits = (*edits, Set(self.path, path[1]))
+        return Step(f"Add {singular(self.section)}", edits, path, fresh=True)
+
+
+@dataclass(frozen=True, slots=True)
+class AddInstrument(Request):
+    """Add a questionnaire that is a standard one; where texts are missing, the study writes what is known."""
+
+    name: str
+
+    def step(self, at: Situation) -> Step:
+        table, scales = written_out(self.name, languages_of(at.study))
+        taken, there = names(at.study.document, "questionnaires"), names(at.study.document, "scales")
+        path = ("questionnaires", free_id(taken, self.name.replace("-", "_")))
+        edits = (Set(("scales", name), scale) for name, scale in scales.items() if name not in there)
+        return Step(f"Add {self.name}", (*edits, Set(path, table)), path)
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeLanguage(Request):
+    """Add a language to every text, copy the first language's texts where it has none, or take it away."""
+
+    how: Literal["add", "copy", "remove"]
+    language: str
+
+    def step(self, at: Situation) -> Step:
+        words = {"add": "Add", "copy": "Fill in", "remove": "Remove"}[self.how]
+        edits = {"add": with_language, "copy": filled_in, "remove": without_language}[self.how](at.study, self.language)
+        return Step(f"{words} {language_name(self.language)}", edits)
+
+
+@dataclass(frozen=True, slots=True)
+class DuplicateElement(Request):
+    """Copy an element right after itself; ``also`` are others that are copied with it.
+
+    The step of each in the session comes right after that of the original. ``stays`` says that the form stays at its
+    element, as where entries of a list in it are copied.
+    """
+
+    path: Path
+    also: tuple[Path, ...] = ()
+    stays: bool = False
+
+    def step(self, at: Situation) -> Step:
+        edits: tuple[Edit, ...] = ()
+        copies: list[Path] = []
+        now = at.study
+        for path in sorted((self.path, *self.also), key=lambda path: -path[-1] if isinstance(path[-1], int) else 0):
+            value = value_at(now.document, path)
+            if isinstance(value, Mapping) or not isinstance(path[-1], int):
+                made, copy = duplicated(now, path)
+            else:
+                copy = (*path[:-1], path[-1] + 1)
+                made = (Insert(copy, list(value) if isinstance(value, tuple) else value),)
+            made = _beside(now, made, path, copy)
+            copies = [*(_after_insert(one, copy) for one in copies), copy]
+            edits = (*edits, *made)
+            now, _ = now.edited(*made)
+        words = f"Duplicate {titles_of(at.study, (self.path, *self.also))}"
+        if self.stays:
+            return Step(words, edits)
+        return Step(words, edits, copies[0], several=tuple(copies), fresh=len(copies) == 1)
+
+
+@dataclass(frozen=True, slots=True)
+class MakeSeries(Request):
+    """Copy an element once for each value of the number ``field``.
+
+    A copy is listed in the blocks that list the element, unless the block would then have a problem.
+    """
+
+    path: Path
+    field: Path
+    values: tuple[int | float, ...]
+
+    def step(self, at: Situation) -> Step:
+        study = at.study
+        check_values(study.document, number_row(study.document, self.path, self.field), self.values)
+        edits: tuple[Edit, ...] = ()
+        paths, now = [self.path], study
+        for value in self.values:
+            row = number_row(now.document, paths[-1], (*paths[-1], *self.field[2:]))
+            made, copy = copy_with(now, paths[-1], row, value)
+            made = _beside(now, made, paths[-1], copy)
+            now, _ = now.edited(*made)
+            for listing in listings(now, paths[-1], copy):
+                listed, _ = now.edited(listing)
+                if len(listed.faults) <= len(now.faults):
+                    now, made = listed, (*made, listing)
+            edits = (*edits, *made)
+            paths.append(copy)
+        words = f"Make {counted_elements(len(self.values), self.path[0])} of {title_of(study.document, self.path)}"
+        said = ", ".join(title_of(now.document, one) for one in paths[1:])
+        return Step(words, edits, paths[1], several=tuple(paths[1:]), said=said)
+
+
+@dataclass(frozen=True, slots=True)
+class MoveElement(Request):
+    """Move an element among its neighbours, by so many places; ``also`` are others that move with it."""
+
+    path: Path
+    by: int
+    also: tuple[Path, ...] = ()
+
+    def step(self, at: Situation) -> Step:
+        document = at.study.document
+        first = step_of(document, self.path)
+        if first is None:
+            raise Refused(f"{title_of(document, self.path)} is not in an order, so it cannot be moved")
+        steps = {path: step_of(document, path) for path in (self.path, *self.also)}
+        together = {path: step for path, step in steps.items() if step is not None and step[:-1] == first[:-1]}
+        title, indices = titles_of(at.study, tuple(together)), [index_of(step) for step in together.values()]
+        to = min(indices) + self.by if self.by < 0 else max(indices) + 1 + self.by
+        if not 0 <= to <= len(value_at(document, first[:-1])):
+            raise Refused(f"{title} is the {'first' if self.by < 0 else 'last'} already")
+        words = f"Move {title} {'up' if self.by < 0 else 'down'}"
+        return _moved(at.study, tuple(together), tuple(together.values()), to, words)
+
+
+@dataclass(frozen=True, slots=True)
+class MoveTo(Request):
+    """Move entries of a list together before the one at the index ``to``; its length stands for the end.
+
+    ``stays`` says that the form stays at its element.
+    """
+
+    entries: tuple[Path, ...]
+    to: int
+    stays: bool = False
+
+    def step(self, at: Situation) -> Step:
+        things = tuple((named_at(at.study.document, entry) or entry) for entry in self.entries)
+        step = _moved(at.study, things, self.entries, self.to, f"Move {titles_of(at.study, things)}")
+        return replace(step, select=None, several=()) if self.stays else step
+
+
+@dataclass(frozen=True, slots=True)
+class Paste(Request):
+    """Paste a text after an element: elements as TOML, or lines that become questions."""
+
+    path: Path
+    text: str
+
+    def step(self, at: Situation) -> Step:
+        if not at.study.is_toml:
+            raise Refused("the file cannot be read: correct its text first")
+        text, paths = pasted(at.study, self.path, self.text)
+        after, _ = at.study.typed(text)
+        edits: tuple[Edit, ...] = ()
+        now = after
+        for path in paths:
+            if len(path) == 2:
+                more = _beside(now, fitted(at.study, now, path), self.path, path)
+                edits = (*edits, *more)
+                now, _ = now.edited(*more)
+        return Step(f"Paste {titles_of(after, paths)}", edits, paths[0], text=text, several=paths)
+
+
+@dataclass(frozen=True, slots=True)
+class DeleteElement(Request):
+    """Delete an element: with all that needs it, with another one in its place, or leaving gaps.
+
+    ``also`` are others that are deleted with it.
+    """
+
+    path: Path
+    how: Literal["all", "other", "gaps"] = "gaps"
+    other: str = ""
+    also: tuple[Path, ...] = ()
+
+    def step(self, at: Situation) -> Step:
+        path, document = self.path, at.study.document
+        paths = (path, *self.also)
+        words = f"Delete {titles_of(at.study, paths)}"
+        if self.how == "other":
+            return Step(words, replaced(document, path, self.other), (*path[:-1], self.other))
+        if isinstance(path[-1], int):
+            select: Path = path[:2]
+        else:
+            others = [name for name in names(document, str(path[0])) if (path[0], name) not in paths]
+            select = (path[0], others[0]) if others else path[:1]
+        if self.how == "gaps":
+            return Step(words, deletions(paths), select)
+        gone = tuple(one for each in paths for one in with_references(document, each, at.study.needs))
+        if any(select[: len(one)] == one for one in gone):
+            select = ("study",)
+        return Step(words, deletions(gone), select)
+
+
+@dataclass(frozen=True, slots=True)
+class RenameElement(Request):
+    """Give an element another id, and all that name it."""
+
+    path: Path
+    name: str
+
+    def step(self, at: Situation) -> Step:
+        edits = renamed(at.study.document, self.path, self.name, at.recorded(self.path))
+        after = self.path if isinstance(self.path[-1], int) else (*self.path[:-1], self.name)
+        return Step(f"Rename to {self.name}", edits, after)
+
+
+@dataclass(frozen=True, slots=True)
+class RetypeFile(Request):
+    """Give the file another text, as the pane shows it."""
+
+    text: str
+
+    def step(self, at: Situation) -> Step:
+        return Step("Edit the file", (), continues="file", text=retyped(at.study.text, self.text))
+
+
+@dataclass(frozen=True, slots=True)
+class Several(Request):
+    """Several requests, one after the other, as one step."""
+
+    words: str
+    requests: tuple[Request, ...]
+
+    def step(self, at: Situation) -> Step:
+        edits: tuple[Edit, ...] = ()
+        study = at.study
+        for one in self.requests:
+            step = one.step(replace(at, study=study))
+            study, _ = study.edited(*step.edits)
+            edits += step.edits
+        return Step(self.words, edits)
+
+
+Task: TypeAlias = Literal[
+    "select", "join", "write", "back", "find", "undo", "redo", "save", "open", "new", "begin", "banner", "add", "copy",
+    "paste", "delete", "series", "judge id", "repair", "repairs",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Do:
+    """A task that is no step of the study, and what it takes: ``Do("select", (path,))``."""
+
+    what: Task
+    arguments: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class GoTo:
+    """Select an element and give the keyboard to one of its fields; a step of the place, not of the study."""
+
+    element: Path
+    field: Path
+
+
+def with_path(asked: Any, before: Path, after: Path) -> Any:
+    """Return a request, or a path, in which the path of an element is another one, as after a new id."""
+    if isinstance(asked, tuple):
+        if asked[: len(before)] == before:
+            return (*after, *asked[len(before) :])
+        return tuple(with_path(one, before, after) for one in asked)
+    if is_dataclass(asked) and not isinstance(asked, type):
+        parts = {part.name: getattr(asked, part.name) for part in fields(asked)}
+        return replace(asked, **{name: with_path(value, before, after) for name, value in parts.items()})
+    return asked
+
+
+def _beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -> tuple[Edit, ...]:
+    """Return edits that add an element, with its step in the session right after that of another one."""
+    after, _ = study.edited(*edits)
+    first, step = step_of(after.document, original), step_of(after.document, copy)
+    if first is None or step is None or step == copy or step[:-1] != first[:-1]:
+        return edits
+    to = index_of(first) + (index_of(step) > index_of(first))
+    return edits if index_of(step) == to else (*edits, Move(step, to))
+
+
+def _moved(study: Study, things: Sequence[Path], entries: Sequence[Path], to: int, words: str) -> Step:
+    edits, after = moved(study, entries, to)
+    by_entry = dict(zip(sorted(entries, key=index_of), after, strict=True))
+    paths = tuple(by_entry[entry] if thing == entry else thing for thing, entry in zip(things, entries, strict=True))
+    entry = by_entry[entries[0]]
+    count = len(value_at(study.document, entry[:-1]))
+    said = f"{title_of(study.document, things[0])}, now {index_of(entry) + 1} of {count}"
+    return Step(words, edits, paths[0], several=paths, said=said)
+
+
+def _after_insert(path: Path, new: Path) -> Path:
+    """Return where a path is after an entry came into its list."""
+    last, at = path[-1], new[-1]
+    if path[:-1] == new[:-1] and isinstance(last, int) and isinstance(at, int) and last >= at:
+        return (*path[:-1], last + 1)
+    return path
+
+
+def titles_of(study: Study, paths: Sequence[Path]) -> str:
+    """Return the title of an element, or how many there are."""
+    return title_of(study.document, paths[0]) if len(paths) == 1 else f"{len(paths)} elements"
+
+
+def index_of(path: Path) -> int:
+    """Return the index of an entry of a list."""
+    last = path[-1]
+    if not isinstance(last, int):
+        raise Refused(f"{label_of(last)} is not an entry of a list")
+    return last
+
+
+def _first_value(study: Study, path: Path) -> Any:
+    """Return the default of a key, or an initial value; of a table with the keys that it needs."""
+    value = _listed(initial(study.document, path))
+    if value != {}:
+        return value
+    after, _ = study.edited(Set(path, {}))
+    needed = (row for row in rows(after.document, path) if row.required)
+    return {str(row.path[-1]): _listed(initial(after.document, row.path)) for row in needed}
+
+
+def _listed(value: Any) -> Any:
+    """Return a value as it is written: lists in place of tuples, and no keys of tables that are left out."""
+    if isinstance(value, Mapping):
+        return {key: _listed(part) for key, part in value.items() if part is not None}
+    return [_listed(part) for part in value] if isinstance(value, list | tuple) else value
