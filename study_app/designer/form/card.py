@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 
-from PySide6.QtCore import QEvent, QRectF, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QLineEdit, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QGridLayout, QWidget
 
 from study_app.designer.document.steps import AddKey, LeaveText, RemoveKey, RenameElement, SetValue
 from study_app.designer.form.fields import LanguagesField, add_button, stacked
 from study_app.designer.form.lists import EntryList
-from study_app.designer.form.row_widget import LABEL_PX, RowWidget, is_wide, language_heads, structure_of
-from study_app.designer.form.rows import Form, FormRow, QuestionLine, Section, added_row, shape_of
+from study_app.designer.form.row_widget import LABEL_PX, LanguageHeads, RowWidget, is_wide, structure_of
+from study_app.designer.form.rows import Form, FormRow, Section, added_row
 from study_app.designer.form.special import Panel, QuestionRow, QuestionRows
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.designer.problems.card import NameRefusal, RepairButton
@@ -21,12 +21,13 @@ from study_app.designer.problems.problems import ProblemRow
 from study_app.gui.kit.commands import tip
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
-from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, label
+from study_app.protocol.source.document import Path
 
 TILE = 40
 
@@ -216,40 +217,9 @@ class FormHead(QWidget):
 
 
 ACROSS = 2
-ROW_PX = FIELD_PX + 7
 FOOT_FROM = 460
 """The height of the form from which it has a foot [px]."""
-SHOWN_OR_HIDDEN = Qt.WidgetAttribute.WA_WState_ExplicitShowHide
 WORDS_PX = 50
-
-
-@dataclass(frozen=True, slots=True)
-class Caret:
-    """The name of an editor of text, and before which of its letters the next one is typed."""
-
-    editor: str
-    at: int
-
-    @classmethod
-    def of(cls, editor: QWidget | None) -> Caret | None:
-        """Return where the keyboard is; None where no text is edited."""
-        if isinstance(editor, QLineEdit):
-            return cls(editor.accessibleName(), editor.cursorPosition())
-        if isinstance(editor, QPlainTextEdit):
-            return cls(editor.accessibleName(), editor.textCursor().position())
-        return None
-
-    def put_into(self, row: QWidget) -> None:
-        """Give the keyboard to the editor of that name in a row; where there is none, nothing changes."""
-        for editor in row.findChildren(QWidget):
-            if isinstance(editor, QLineEdit | QPlainTextEdit) and editor.accessibleName() == self.editor:
-                editor.setFocus(Qt.FocusReason.OtherFocusReason)
-                if isinstance(editor, QLineEdit):
-                    editor.setCursorPosition(self.at)
-                else:
-                    cursor = editor.textCursor()
-                    cursor.setPosition(min(self.at, editor.document().characterCount() - 1))
-                    editor.setTextCursor(cursor)
 
 
 class FormFoot(Themed, QWidget):
@@ -278,8 +248,24 @@ class FormFoot(Themed, QWidget):
         painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
 
 
+class AddKeys(QWidget):
+    """Buttons that add keys to a section; ``keys`` are paths within the element, labels and descriptions."""
+
+    def __init__(self, keys: Iterable[tuple[Path, str, str]], add: Callable[[Path], None]) -> None:
+        super().__init__()
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(0)
+        self.buttons: dict[Path, QWidget] = {}
+        for at, (inner, words, help_) in enumerate(keys):
+            made = self.buttons[inner] = add_button(f"Add {words}", words)
+            made.setToolTip(help_)
+            made.clicked.connect(lambda _checked=False, inner=inner: add(inner))
+            grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
+
+
 class FormCard(Card):
-    """Draws a `Form`.
+    """Draws a `Form`; a part that stays, of this or another element, keeps its widget with caret, focus and place.
 
     Signals: ``asked`` (a request), ``repair_asked`` (problem, words).
     """
@@ -292,26 +278,23 @@ class FormCard(Card):
         self.setAccessibleName("Form")
         self.form: Form | None = None
         self.read_only = False
-        self._made: list[RowWidget] = []
-        self._unmade: Iterator[int] | None = None
+        self.rows: list[RowWidget] = []
+        self.adds: dict[Path, QWidget] = {}
+        self._parts: dict[object, QWidget] = {}
         self._known: Mapping[ProblemRow, tuple[str, ...]] = {}
-        self._together: tuple[tuple[str | int, ...], ...] = ()
-        self._later = QTimer(self)
-        self._later.setSingleShot(True)
-        self._later.setInterval(0)
-        self._later.timeout.connect(self._finish)
-        self.others: list[QuestionRow] = []
-        self.adds: dict[tuple[str | int, ...], QWidget] = {}
+        self._together: tuple[Path, ...] = ()
         self._focused: RowWidget | None = None
-        self._may_rename = False
-        self._chosen: tuple[tuple[str | int, ...], tuple[int, ...]] | None = None
+        self._renames = False
         self.head = FormHead()
         self.head.asked.connect(self._ask)
         self.own = label("", "label", "bad", wraps=True)
+        self.above, self.panel, self.below = QuestionRows(), Panel(), QuestionRows()
+        for questions in (self.above, self.below):
+            questions.asked.connect(self.asked)
+        self.sections = vbox(spacing=7, parent=self.panel)
         self.inside = QWidget()
-        host = QWidget()
-        self._host = vbox(self.inside, margins=0, parent=host)
-        self.area = scrolled(host)
+        vbox(self.above, self.panel, self.below, STRETCH, spacing=7, margins=(0, 2, 8, 2), parent=self.inside)
+        self.area = scrolled(self.inside)
         self.foot = FormFoot()
         add_parts(self.column, self.head, Rule(), self.own, (self.area, 1), self.foot)
 
@@ -320,199 +303,148 @@ class FormCard(Card):
         self.foot.setVisible(self.height() >= FOOT_FROM)
 
     def _ask(self, asked: object) -> None:
-        """Ask for a step; the form of an element that it renames keeps its editors."""
-        before, self._may_rename = self._may_rename, isinstance(asked, RenameElement | LeaveText)
+        """Ask for a step; a rename leaves the form at its element."""
+        before, self._renames = self._renames, isinstance(asked, RenameElement | LeaveText)
         self.asked.emit(asked)
-        self._may_rename = before
+        self._renames = before
+
+    @property
+    def others(self) -> list[QuestionRow]:
+        """The questions above and below the one that is edited."""
+        return [*self.above.rows, *self.below.rows]
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
-        """Show a form: in place where its rows stay the same, else anew."""
-        before, was_read_only = self.form, self.read_only
+        """Show a form: parts that it has already stay as they are, others are made, the rest goes."""
+        before = self.form
+        stays = before is not None and (
+            form.path == before.path or (self._renames and form.path[:-1] == before.path[:-1])
+        )
+        if before is not None and not stays:
+            self.flush()
+            if self.form is not before:  # what was typed is in a later form, which is shown by now
+                return
+        if read_only != self.read_only:
+            self._drop(self._parts)
+            self._parts = {}
         self.form, self.read_only = form, read_only
         self.head.show_form(form, read_only=read_only)
         self.own.setText("\n".join(form.faults))
         self.own.setVisible(bool(form.faults))
-        stays = before is not None and (
-            form.path == before.path or (self._may_rename and form.path[:-1] == before.path[:-1])
-        )
-        same = before is not None and stays and shape_of(before) == shape_of(form) and was_read_only == read_only
-        if same and [row.key for row in self.rows] == [structure_of(row) for row in form.rows]:
-            for widget, row in zip(self.rows, form.rows, strict=True):
-                widget.show_row(row)
-        else:
-            self._make(form, before if stays else None)
+        self._show_parts(form, before if stays else None)
+        if not stays:
+            self.area.verticalScrollBar().setValue(0)
+        self.show_repairs(self._known)
+        self.show_selected(self._together)
         self.show_help()
 
-    def _make(self, form: Form, before: Form | None) -> None:
-        """Make the editors anew; ``before`` is the form of the same element before, None for another element."""
-        keyboard = QApplication.focusWidget()
+    def _show_parts(self, form: Form, before: Form | None) -> None:
+        """Show what a form is made of; ``before`` is the form of the same element before, None for another element."""
+        lines = form.questions.lines
+        at = next((at for at, line in enumerate(lines) if line.path == form.path), 0)
+        self.above.show_lines(lines[:at], form.questions.languages if lines else ())
+        self.below.show_lines(lines[at + 1 :])
+        self.panel.tinted = bool(lines)
+        self.sections.setContentsMargins(*((10, 8, 4, 8) if lines else (0, 0, 0, 0)))
+        keyboard = self.window().focusWidget()
         inside_form = keyboard is not None and self.inside.isAncestorOf(keyboard)
-        held = next((row for row in self._made if keyboard is not None and row.isAncestorOf(keyboard)), None)
-        added = added_row(form, before) if inside_form and held is None and before is not None else None
-        if held is None and added is None and self.isAncestorOf(self.window().focusWidget()):
-            held = self._focused  # a list that drops down, or another window, has the keyboard for a while
-        focused = added
-        if held is not None and before is not None:
-            focused = (*form.path, *held.row.row.path[len(before.path) :])
-        caret = None if held is None else Caret.of(held.focusWidget())
-        down_px = 0 if before is None else self.area.verticalScrollBar().value()
-        self._focused = None
-        self.flush()
-        inside = QWidget()
-        whole = vbox(spacing=7, margins=(0, 2, 8, 2), parent=inside)
-        self._made, self.adds, self.others = [], {}, []
-        self._unmade = self._fill(form, whole)
-        room = self.area.viewport().height() if before is None else QWIDGETSIZE_MAX
-        for height in self._unmade:
-            room -= height
-            if room < 0:
-                self._later.start()
-                break
-        else:
-            self._unmade = None
-        apply_theme_within(inside, self.theme)
-        self._replace(inside)
-        self.area.verticalScrollBar().setValue(down_px)
-        QTimer.singleShot(0, self.area, lambda: self._settle(down_px, other=before is None))
-        if (focused is None or not self.focus(focused, caret)) and inside_form:
+        old, self._parts, self.rows, self.adds = self._parts, {}, [], {}
+        for key, make, row in self._wanted(form):
+            part = old.pop(key, None) or make()
+            self._parts[key] = part
+            if isinstance(part, RowWidget) and row is not None:
+                part.show_row(row)
+                self.rows.append(part)
+            elif isinstance(part, AddKeys):
+                self.adds |= {(*form.path, *inner): made for inner, made in part.buttons.items()}
+        gone = next((part for part in old.values() if inside_form and part.isAncestorOf(keyboard)), None)
+        if gone is not None and keyboard is not None:
+            keyboard.clearFocus()  # else Qt hands the keyboard on
+        self._drop(old)
+        for place, part in enumerate(self._parts.values()):
+            if self.sections.indexOf(part) != place:
+                self.sections.insertWidget(place, part)
+                apply_theme_within(part, self.theme)
+                part.show()  # at once: a layout shows it later, and what is hidden takes no keyboard
+        if gone is not None:
+            self._refocus(form, before, gone)
+
+    def _refocus(self, form: Form, before: Form | None, gone: QWidget) -> None:
+        """Give the keyboard of a part that is gone to the row in its place, or that it added; else to the first row."""
+        path: Path | None = None
+        if before is not None and isinstance(gone, RowWidget):
+            path = (*form.path, *gone.row.row.path[len(before.path) :])
+        elif before is not None:
+            path = added_row(form, before)
+        if path is None or not self.focus(path):
             self.focus_first()
 
-    def _settle(self, down_px: int, *, other: bool) -> None:
-        """Scroll once the editors have their places: in another element to the row that got the keyboard meanwhile."""
-        if other and self._focused is not None:
-            self._reveal(self._focused)
-        else:
-            self.area.verticalScrollBar().setValue(down_px)
+    @staticmethod
+    def _drop(parts: Mapping[object, QWidget]) -> None:
+        for part in parts.values():
+            remove_widget(part)
 
-    def _reveal(self, row: RowWidget) -> None:
-        """Scroll to a row, and in a high row to the part with the keyboard; rows made just now are laid out before."""
-        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
-        self.area.ensureWidgetVisible(row, 0, 40)
-        keyboard = self.window().focusWidget()
-        if keyboard is not None and row.isAncestorOf(keyboard):
-            self.area.ensureWidgetVisible(keyboard, 0, 40)
-
-    def _fill(self, form: Form, whole: QVBoxLayout) -> Iterator[int]:
-        """Make the editors from top to bottom; yield how high each part is, about [px]."""
-        lines, sections = form.questions.lines, whole
-        at = next((at for at, line in enumerate(lines) if line.path == form.path), 0)
-        if lines:
-            panel = Panel()
-            sections = vbox(spacing=7, margins=(10, 8, 4, 8), parent=panel)
-            add_parts(whole, self._others(lines[:at], form.questions.languages), panel)
-            yield ROW_PX * at
+    def _wanted(self, form: Form) -> Iterator[tuple[object, Callable[[], QWidget], FormRow | None]]:
+        """Yield the parts of a form from top to bottom: what tells each apart, what makes it, and its row."""
         for number, section in enumerate(form.sections):
+            at = form.path[:1], number, section.path[len(form.path) :]
             if number:
-                sections.addWidget(Rule())
+                yield ("rule", at), Rule, None
             if section.title:
-                add_layout(sections, self._heading(section, removable=section.path != form.path))
+                removable = section.path != form.path and not self.read_only
+                yield ("title", at, section.title), partial(self._heading, section, removable=removable), None
             if section.faults:
-                sections.addWidget(label("\n".join(section.faults), "label", "bad", wraps=True))
+                words = "\n".join(section.faults)
+                yield ("faults", at, words), partial(label, words, "label", "bad", wraps=True), None
             heads: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
                 beside = () if stacked(row) or is_wide(row) else row.languages
                 if len(beside) > 1 and beside != heads:
-                    add_layout(sections, language_heads(beside, (LABEL_PX + 8, FIELD_PX + 8)))
+                    names = tuple(language for _, language in beside)
+                    yield (
+                        ("heads", at, row.row.path[-1], names),
+                        partial(LanguageHeads, names, (LABEL_PX + 8, FIELD_PX + 8)),
+                        None,
+                    )
                 heads = beside
-                sections.addWidget(self._row(row))
-                yield ROW_PX * (1 + len(row.entries))
+                yield (at, row.row.path[len(form.path) :], structure_of(row)), partial(self._row, row), row
             if section.absent and not self.read_only:
-                add_layout(sections, self._adds(section))
-                yield ROW_PX
-        if lines:
-            whole.addWidget(self._others(lines[at + 1 :], ()))
-        whole.addStretch(1)
+                added = tuple((one.path[len(form.path) :], one.label, one.help) for one in section.absent)
+                yield ("adds", at, added), partial(AddKeys, added, self._add), None
 
-    def _adds(self, section: Section) -> QGridLayout:
-        grid = QGridLayout()
-        grid.setSpacing(0)
-        for at, absent in enumerate(section.absent):
-            made = add_button(f"Add {absent.label}", absent.label)
-            made.setToolTip(absent.help)
-            made.clicked.connect(lambda _checked=False, path=absent.path: self.asked.emit(AddKey(self._now(path))))
-            grid.addWidget(made, at // ACROSS, at % ACROSS, Qt.AlignmentFlag.AlignLeft)
-            self.adds[absent.path] = made
-        return grid
+    def _add(self, inner: Path) -> None:
+        self.asked.emit(AddKey(self._now(inner)))
 
-    def _finish(self) -> None:
-        """Make the editors that are below what is seen at first."""
-        self._later.stop()
-        unmade, self._unmade = self._unmade, None
-        if unmade is not None:
-            for _height in unmade:
-                pass
-            apply_theme_within(self.inside, self.theme)
-            for around in (self.inside, *self.inside.findChildren(Panel)):
-                for part in around.children():  # Qt shows them later: what is hidden takes no keyboard and no room
-                    if isinstance(part, QWidget) and not part.testAttribute(SHOWN_OR_HIDDEN):
-                        part.show()
-            self.show_repairs(self._known)
-            self.show_selected(self._together)
+    def _now(self, inner: Path) -> Path:
+        """Return the path of a part of the element that is shown."""
+        return inner if self.form is None else (*self.form.path, *inner)
 
-    @property
-    def rows(self) -> list[RowWidget]:
-        self._finish()
-        return self._made
-
-    def _replace(self, inside: QWidget) -> None:
-        """Show other editors; those before stay where they are until they are deleted: to move them takes long."""
-        old, self.inside = self.inside, inside
-        held = self.window().focusWidget()
-        if held is not None and old.isAncestorOf(held):
-            held.clearFocus()  # else Qt hands the keyboard on
-        old.hide()
-        self._host.removeWidget(old)
-        self._host.addWidget(inside)
-        inside.show()  # at once: a layout shows it later, and what is hidden takes no keyboard
-        old.deleteLater()
-
-    def _now(self, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
-        """Return the path of a part of the element, which may have been renamed since its editor was made."""
-        return path if self.form is None else (*self.form.path, *path[len(self.form.path) :])
-
-    def _others(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...]) -> QuestionRows:
-        made = QuestionRows(lines, languages)
-        made.asked.connect(self.asked)
-        self.others += made.rows
-        return made
-
-    def show_selected(self, paths: tuple[tuple[str | int, ...], ...]) -> None:
+    def show_selected(self, paths: tuple[Path, ...]) -> None:
         self._together = paths
         for row in self.others:
             row.show_chosen(row.line.path in paths)
 
-    def _heading(self, section: Section, *, removable: bool) -> QHBoxLayout:
-        heading = hbox(label(section.title, "strong"), STRETCH)
-        if removable:
+    def _heading(self, section: Section, *, removable: bool) -> QWidget:
+        made, inner = QWidget(), () if self.form is None else section.path[len(self.form.path) :]
+        heading = hbox(label(section.title, "strong"), STRETCH, margins=0, parent=made)
+        if section.path != (() if self.form is None else self.form.path):
             away = IconButton("cross", f"Remove {section.title} from the file", size=FIELD_PX, role="plain")
-            away.clicked.connect(lambda: self.asked.emit(RemoveKey(self._now(section.path))))
-            away.setEnabled(not self.read_only)
+            away.clicked.connect(lambda: self.asked.emit(RemoveKey(self._now(inner))))
+            away.setEnabled(removable)
             heading.addWidget(away)
-        return heading
+        return made
 
     def _row(self, row: FormRow) -> RowWidget:
         made = RowWidget(row)
         made.field.asked.connect(self._ask)
         made.repair_asked.connect(self.repair_asked)
-        if isinstance(made.field, EntryList):
-            made.field.changes.connect(lambda asked, after: self._change_entries(made.row.row.path, asked, after))
-            if self._chosen is not None and self._chosen[0] == row.row.path:
-                made.field.choose(self._chosen[1])
-            if self.read_only:
-                made.field.freeze()
+        if isinstance(made.field, EntryList) and self.read_only:
+            made.field.freeze()
         made.field.came.connect(lambda: self._come(made))
         made.field.setEnabled(not self.read_only or row.row.kind in {"list", "tables", "references", "reference"})
         for part in (made.remove, made.keys):
             if part is not None:
                 part.setEnabled(not self.read_only)
-        self._made.append(made)
         return made
-
-    def _change_entries(self, path: tuple[str | int, ...], asked: object, after: tuple[int, ...]) -> None:
-        """Ask for a step of a list's entries; those at ``after`` are selected where the list is made anew."""
-        self._chosen = (path, after)
-        self.asked.emit(asked)
-        self._chosen = None
 
     def flush(self) -> None:
         self.head.id.flush()
@@ -520,21 +452,31 @@ class FormCard(Card):
             if isinstance(part, TypedLine | TypedText):
                 part.flush()
 
-    def focus(self, path: tuple[str | int, ...], caret: Caret | None = None) -> bool:
-        """Give the keyboard to the row of a place, or to an editor in it, and scroll; return whether there is one.
+    def _reveal(self, row: QWidget) -> None:
+        """Scroll to a row, and in a high row to the part with the keyboard; rows made just now are laid out before."""
+        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
+        self.area.ensureWidgetVisible(row, 0, 40)
+        keyboard = self.window().focusWidget()
+        if keyboard is not None and row.isAncestorOf(keyboard):
+            self.area.ensureWidgetVisible(keyboard, 0, 40)
+
+    def _row_of(self, path: Path) -> RowWidget | None:
+        """Return the row of a place, or the one that it is in."""
+        around = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
+        return max(around, key=lambda row: len(row.row.row.path), default=None)
+
+    def focus(self, path: Path) -> bool:
+        """Give the keyboard to the row of a place and scroll; return whether there is one.
 
         A key that the file does not have has a button that adds it instead.
         """
-        inner = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
-        found = max(inner, key=lambda row: len(row.row.row.path), default=None)
+        found = self._row_of(path)
         if found is None:
-            if (button := {self._now(key): made for key, made in self.adds.items()}.get(path)) is not None:
+            if (button := self.adds.get(path)) is not None:
                 button.setFocus(Qt.FocusReason.OtherFocusReason)
                 self.area.ensureWidgetVisible(button)
             return button is not None
         found.field.take_keyboard()
-        if caret is not None:
-            caret.put_into(found)
         self._come(found)
         self._reveal(found)
         return True
@@ -562,10 +504,9 @@ class FormCard(Card):
         self._come(row)
         self._reveal(row)
 
-    def refuse(self, path: tuple[str | int, ...], sentence: str) -> None:
-        inner = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
-        found = max(inner, key=lambda row: len(row.row.row.path), default=None)
-        if found is not None:
+    def refuse(self, path: Path, sentence: str) -> None:
+        """Say at the field of a place why it was not changed."""
+        if (found := self._row_of(path)) is not None:
             found.refusal = sentence
             found.say()
         else:
@@ -575,19 +516,19 @@ class FormCard(Card):
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
         """Offer repairs at the rows that their problems are in."""
         self._known = {} if self.read_only else known
-        for row in self._made:
+        for row in self.rows:
             row.show_repairs(self._known)
 
     def repairs_of(self, problem: ProblemRow) -> list[RepairButton]:
-        return [button for row in self._made for button in row.repairs if button.problem == problem]
+        return [button for row in self.rows for button in row.repairs if button.problem == problem]
 
     def _come(self, row: RowWidget) -> None:
-        self._focused = row if row in self._made else self._focused  # its own step may just have replaced it
+        self._focused = row if row in self.rows else self._focused  # its own step may just have replaced it
         row.say()
         self.show_help()
 
     def show_help(self) -> None:
-        row = self._focused if self._focused in self._made else next(iter(self._made), None)
+        row = self._focused if self._focused in self.rows else next(iter(self.rows), None)
         if row is None:
             self.foot.show_help("", "", "")
         else:

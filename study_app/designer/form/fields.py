@@ -16,6 +16,7 @@ from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
 from study_app.designer.place.segments import Segments
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label
@@ -25,7 +26,7 @@ MOST_SEGMENTS, SEGMENT_LETTERS = 4, 34
 NUMBER_PX = 96
 
 
-class Field(QWidget):
+class Field(Themed, QWidget):
     """Edits the value of one row.
 
     ``asked`` carries a request, ``came`` says that it is focused; ``caption`` stands above an editor that takes the

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from PySide6.QtCore import QEvent, QItemSelectionModel, QSize, Qt, Signal
 from PySide6.QtGui import QDropEvent, QFocusEvent, QGuiApplication, QKeyEvent, QKeySequence, QResizeEvent
-from PySide6.QtWidgets import QAbstractItemView, QBoxLayout, QFrame, QLabel, QListWidget, QListWidgetItem, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QBoxLayout, QFrame, QListWidget, QListWidgetItem, QWidget
 
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import Row
@@ -34,6 +34,7 @@ from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.valid_part import valid_part
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Elided, figures
@@ -56,8 +57,7 @@ class ConditionLine:
 
 def condition_lines(study: Study, row: Row) -> tuple[ConditionLine, ...]:
     """Return a line for each condition that a block presents."""
-    names = row.value if isinstance(row.value, tuple) else ()
-    return tuple(_line(study, name) for name in names)
+    return tuple(_line(study, name) for name in (row.value if isinstance(row.value, tuple) else ()))
 
 
 def _line(study: Study, name: Any) -> ConditionLine:
@@ -156,9 +156,7 @@ class EntryRow(QFrame):
 
 
 class EntryList(Field):
-    """Entries in rows; ``changes`` carries a request and the indexes of the entries that are selected after it."""
-
-    changes = Signal(object, object)
+    """Entries in rows, each made anew where they are others; the list with its selection and the keyboard stays."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -166,6 +164,8 @@ class EntryList(Field):
         self.box.setSpacing(6)
         self.ordered = row.row.kind != "tables"
         self.rows: list[EntryRow] = []
+        self._after: tuple[int, ...] | None = None
+        self._filled: object = None
         self.list = Rows()
         self.list.setAccessibleName(row.row.label)
         self.list.dropped.connect(self.move_entries)
@@ -185,17 +185,38 @@ class EntryList(Field):
             self.list.itemClicked.connect(lambda item: self.open(self.list.row(item)))
         self.box.addWidget(self.list)
 
+    def filled_with(self) -> object:
+        """Return what makes other rows necessary."""
+        return self.row.entries
+
+    def fill(self) -> None:
+        """Add a row for each entry."""
+        raise NotImplementedError
+
+    def show_value(self) -> None:
+        if self._filled == (filled := self.filled_with()):
+            return
+        self._filled, held = filled, self.window().focusWidget()
+        inside = held is not None and held is not self.list and self.list.isAncestorOf(held)
+        chosen, self._after = self.chosen if self._after is None else self._after, None
+        if inside:
+            held.clearFocus()
+        self.rows = []
+        self.list.clear()
+        self.fill()
+        self.list.setFixedHeight(len(self.rows) * (FIELD_PX + 6) + 4)
+        self.choose(at for at in chosen if at < len(self.rows))
+        apply_theme_within(self.list, self.theme)
+        if inside:
+            self.take_keyboard()
+
     def add_row(self, words: str, *parts: QWidget | tuple[QWidget, int], faulty: bool = False) -> EntryRow:
         made, item = EntryRow(words, parts, faulty=faulty), QListWidgetItem(self.list)
         item.setData(Qt.ItemDataRole.AccessibleTextRole, words)
         item.setSizeHint(QSize(0, FIELD_PX + 2))
         self.list.setItemWidget(item, made)
         self.rows.append(made)
-        self.list.setFixedHeight(len(self.rows) * (FIELD_PX + 6) + 4)
         return made
-
-    def show_value(self) -> None:
-        """Do nothing: other entries make another field."""
 
     def freeze(self) -> None:
         """Change nothing from now on; entries can still be opened and copied."""
@@ -205,6 +226,7 @@ class EntryList(Field):
 
     @property
     def chosen(self) -> tuple[int, ...]:
+        """The entries that are selected."""
         return tuple(sorted(index.row() for index in self.list.selectedIndexes()))
 
     def choose(self, indexes: Iterable[int]) -> None:
@@ -218,7 +240,8 @@ class EntryList(Field):
         (self.list if self.chosen else self).setFocus(Qt.FocusReason.OtherFocusReason)
 
     def place(self, at: int) -> tuple[str | int, ...]:
-        return (*self.row.row.path, at)
+        """Return the place of an entry in the study."""
+        return self.row.entries[at].path if self.row.entries else (*self.row.row.path, at)
 
     def open(self, at: int) -> None:
         if at < len(self.row.entries) and (target := self.row.entries[at].target):
@@ -226,6 +249,12 @@ class EntryList(Field):
 
     def _open_current(self) -> None:
         self.open(self.list.currentRow())
+
+    def _change(self, asked: Request, after: Iterable[int]) -> None:
+        """Ask for a step, after which the entries at ``after`` are selected."""
+        self._after = tuple(after)
+        self.asked.emit(asked)
+        self._after = None
 
     def _move_by(self, by: int) -> None:
         if self.chosen:
@@ -237,7 +266,7 @@ class EntryList(Field):
         first = to - sum(index < to for index in indexes)
         after = tuple(range(first, first + len(indexes)))
         if 0 <= to <= len(self.rows) and after != indexes:
-            self.changes.emit(MoveTo(tuple(map(self.place, indexes)), to, stays=True), after)
+            self._change(MoveTo(tuple(map(self.place, indexes)), to, stays=True), after)
 
     def remove(self, indexes: tuple[int, ...]) -> None:
         """Ask to remove entries, the last first."""
@@ -246,13 +275,13 @@ class EntryList(Field):
         gone: tuple[Request, ...] = tuple(RemoveKey(self.place(index)) for index in reversed(indexes))
         near = min(indexes[0], len(self.rows) - len(indexes) - 1)
         words = f"Remove {len(gone)} entries of {self.row.row.label}"
-        self.changes.emit(gone[0] if len(gone) == 1 else Several(words, gone), () if near < 0 else (near,))
+        self._change(gone[0] if len(gone) == 1 else Several(words, gone), () if near < 0 else (near,))
 
     def _duplicate(self) -> None:
         if self.row.row.kind != "references":  # a name that is listed twice is a fault
-            after = tuple(index + rank for rank, index in enumerate(self.chosen, start=1))
+            after = (index + rank for rank, index in enumerate(self.chosen, start=1))
             first, *others = map(self.place, self.chosen)
-            self.changes.emit(DuplicateElement(first, tuple(others), stays=True), after)
+            self._change(DuplicateElement(first, tuple(others), stays=True), after)
 
     def _copy(self) -> None:
         self.asked.emit(Do("copy", (tuple(map(self.place, self.chosen)),)))
@@ -262,27 +291,30 @@ class EntryList(Field):
             self.asked.emit(Paste(self.place(self.list.currentRow()), text))
 
 
-def names_list(
-    name: str, placeholder: str, items: Iterable[tuple[str, Any]], choose: Callable[[Any], object]
-) -> Choice:
-    """Return a list of what can be added: it shows no choice of its own."""
-    made = Choice()
-    made.setProperty("dense", "true")
-    made.setFont(font("label", weight=400))
-    made.setFixedHeight(FIELD_PX)
-    made.setAccessibleName(name)
-    made.setPlaceholderText(placeholder)
-    for words, data in items:
-        made.addItem(words, data)
-    made.setCurrentIndex(-1)
-    made.setEnabled(bool(made.count()))
+class NamesList(Choice):
+    """A list of what can be added, which shows no choice of its own; ``chosen`` carries what an entry stands for."""
 
-    def take(at: int) -> None:
-        made.setCurrentIndex(-1)
-        choose(made.itemData(at))
+    chosen = Signal(object)
 
-    made.activated.connect(take)
-    return made
+    def __init__(self, name: str, placeholder: str) -> None:
+        super().__init__()
+        self.setProperty("dense", "true")
+        self.setFont(font("label", weight=400))
+        self.setFixedHeight(FIELD_PX)
+        self.setAccessibleName(name)
+        self.setPlaceholderText(placeholder)
+        self.activated.connect(self._take)
+
+    def show_items(self, items: Iterable[tuple[str, Any]]) -> None:
+        self.clear()
+        for words, data in items:
+            self.addItem(words, data)
+        self.setCurrentIndex(-1)
+        self.setEnabled(bool(self.count()))
+
+    def _take(self, at: int) -> None:
+        self.setCurrentIndex(-1)
+        self.chosen.emit(self.itemData(at))
 
 
 class EntriesField(EntryList):
@@ -290,12 +322,35 @@ class EntriesField(EntryList):
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
-        label, path, count = row.row.label, row.row.path, len(row.entries)
-        for at, entry in enumerate(row.entries):
+        name = f"Add to {row.row.label}"
+        self.names = NamesList(name, "Add …") if row.row.kind == "references" else None
+        if self.names is not None:
+            self.names.chosen.connect(self.asked)
+            self.add: QWidget = self.names
+        else:
+            self.add = add_button(name, "Add")
+            self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.row.path)))
+        self.foot = hbox(self.add, STRETCH)
+        add_layout(self.box, self.foot)
+        self.setFocusProxy(self.add)
+        self.show_value()
+
+    def show_value(self) -> None:
+        super().show_value()
+        if self.names is not None:
+            row = self.row.row
+            items: list[tuple[str, Request]]
+            items = [(str(choice.value), AddEntry(row.path, str(choice.value))) for choice in row.choices]
+            items += [(new_words(section), AddNamed(row.path, section)) for section in row.sections]
+            self.names.show_items(items)
+
+    def fill(self) -> None:
+        label, count = self.row.row.label, len(self.row.entries)
+        for at, entry in enumerate(self.row.entries):
             title = Elided("label", "bad" if entry.faults else "text")
             title.show_text(entry.title)
             shown = self.add_row(f"{label}, {entry.title}, {at + 1} of {count}", (title, 1), faulty=bool(entry.faults))
-            self.fill(shown, at)
+            self.add_facts(shown, at)
             if self.ordered:
                 for by, icon, word in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
                     move = partial(self.move_entries, at - 1 if by < 0 else at + 2, (at,))
@@ -305,28 +360,15 @@ class EntriesField(EntryList):
             opens.setEnabled(bool(entry.target))
             if self.ordered:
                 shown.add_button("cross", f"Remove {entry.title} from {label}", partial(self.remove, (at,)), "delete")
-        if row.row.kind == "references":
-            known = [(str(choice.value), AddEntry(path, str(choice.value))) for choice in row.row.choices]
-            new = [(new_words(section), AddNamed(path, section)) for section in row.row.sections]
-            self.add: QWidget = names_list(f"Add to {label}", "Add …", (*known, *new), self.asked.emit)
-        else:
-            self.add = add_button(f"Add to {label}", "Add")
-            self.add.clicked.connect(lambda: self.asked.emit(AddElement(path)))
-        self.foot = hbox(self.add, STRETCH)
-        add_layout(self.box, self.foot)
-        self.setFocusProxy(self.add)
 
-    def fill(self, shown: EntryRow, at: int) -> None:
-        """Show what is known of an entry beside its title."""
+    def add_facts(self, shown: EntryRow, at: int) -> None:
+        """Show what is known of an entry after its title."""
         entry = self.row.entries[at]
         if entry.note and entry.note.replace("_", " ") != entry.title.lower():
             note = Elided("small", "text2")
             note.show_text(entry.note)
             note.setAlignment(RIGHT)
             shown.line.addWidget(note)
-
-    def place(self, at: int) -> tuple[str | int, ...]:
-        return self.row.entries[at].path
 
 
 class ConditionsField(EntriesField):
@@ -335,14 +377,15 @@ class ConditionsField(EntriesField):
     caption = CAPTION
 
     def __init__(self, row: FormRow) -> None:
-        self.lines: list[tuple[Elided, QLabel, IconButton]] = []
         super().__init__(row)
-        self.show_value()
         self.series = add_button(f"Series of {row.row.label.lower()}", "Series …")
         self.series.setToolTip(tip("series"))
         self.series.setEnabled(bool(row.entries))
         self.series.clicked.connect(self._ask_for_series)
         self.foot.insertWidget(1, self.series)
+
+    def filled_with(self) -> object:
+        return self.row.entries, self.row.facts
 
     def _ask_for_series(self) -> None:
         """Ask for a series of the selected condition, or of the last one."""
@@ -350,22 +393,17 @@ class ConditionsField(EntriesField):
         if path:
             self.asked.emit(Do("series", (path,)))
 
-    def fill(self, shown: EntryRow, at: int) -> None:
+    def add_facts(self, shown: EntryRow, at: int) -> None:
         """Show liquid and delay, force, and a button that opens the liquid."""
-        note, force = Elided("small", "text2"), figures()
+        line = self.row.facts[at]
+        note, force = Elided("small", "text2"), figures(f"{line.force}, clipped" if line.clipped else line.force)
+        note.show_text(line.note)
         force.setMinimumWidth(52)
         for part in (note, force):
             part.setAlignment(RIGHT)
             shown.line.addWidget(part)
-        name = f"Open the liquid of {self.row.entries[at].title}"
-        liquid = shown.add_button("drop", name, lambda: self.asked.emit(Do("select", (self.row.facts[at].liquid,))))
-        self.lines.append((note, force, liquid))
-
-    def show_value(self) -> None:
-        for (note, force, liquid), line in zip(self.lines, self.row.facts, strict=True):
-            note.show_text(line.note)
-            force.setText(f"{line.force}, clipped" if line.clipped else line.force)
-            liquid.setEnabled(line.liquid is not None)
+        name, select = f"Open the liquid of {self.row.entries[at].title}", Do("select", (line.liquid,))
+        shown.add_button("drop", name, partial(self.asked.emit, select)).setEnabled(bool(line.liquid))
 
 
 class LinesField(EntryList):
@@ -374,21 +412,28 @@ class LinesField(EntryList):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.lines: list[TypedLine] = []
-        count = len(row.row.value or ())
-        for at in range(count):
-            line = TypedLine(f"{row.row.label} {at + 1}")
-            line.typed.connect(partial(self._take, at))
-            line.came.connect(self.came)
-            shown = self.add_row(f"{row.row.label} {at + 1} of {count}", (line, 1))
-            shown.add_button("cross", f"Remove {line.accessibleName()}", partial(self.remove, (at,)), "delete")
-            self.lines.append(line)
         self.add = add_button(f"Add to {row.row.label}")
         self.add.clicked.connect(lambda: self.asked.emit(AddEntry(self.row.row.path)))
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
-        self.setFocusProxy(self.lines[0] if self.lines else self.add)
         self.show_value()
 
+    def filled_with(self) -> object:
+        return len(self.row.row.value or ())
+
+    def fill(self) -> None:
+        self.lines, row = [], self.row.row
+        count = len(row.value or ())
+        for at in range(count):
+            line = TypedLine(f"{row.label} {at + 1}")
+            line.typed.connect(partial(self._take, at))
+            line.came.connect(self.came)
+            shown = self.add_row(f"{row.label} {at + 1} of {count}", (line, 1))
+            shown.add_button("cross", f"Remove {line.accessibleName()}", partial(self.remove, (at,)), "delete")
+            self.lines.append(line)
+        self.setFocusProxy(self.lines[0] if self.lines else self.add)
+
     def show_value(self) -> None:
+        super().show_value()
         for line, value in zip(self.lines, self.row.row.value or (), strict=False):
             if not line.property("state"):
                 line.show_text(written(value))
@@ -400,8 +445,8 @@ class LinesField(EntryList):
         with suppress(ValueError):  # another text than points
             lines = filter(str.strip, QGuiApplication.clipboard().text().splitlines())
             added = tuple(AddEntry(self.row.row.path, self._value(line)) for line in lines)
-            after = tuple(range(len(self.lines), len(self.lines) + len(added)))
-            self.changes.emit(Several(f"Paste into {self.row.row.label}", added), after)
+            after = range(len(self.lines), len(self.lines) + len(added))
+            self._change(Several(f"Paste into {self.row.row.label}", added), after)
 
     def _value(self, text: str) -> Any:
         """Return the value that a line says; a ValueError says why it is not a point."""
@@ -425,9 +470,17 @@ class LanguageListField(EntryList):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.freeze()
+        self.copies: dict[str, ActionButton] = {}
+        self.names = NamesList("Add a language to every text", "Language …")
+        self.names.chosen.connect(lambda code: self.asked.emit(ChangeLanguage("add", code)))
+        self.box.addWidget(self.names, 0, Qt.AlignmentFlag.AlignLeft)
+        self.setFocusProxy(self.names)
+        self.show_value()
+
+    def fill(self) -> None:
+        row, self.copies = self.row, {}
         codes = [str(code) for code in row.row.value] if isinstance(row.row.value, tuple) else []
         first = row.entries[0].title if row.entries else ""
-        self.copies: dict[str, ActionButton] = {}
         for at, (code, entry) in enumerate(zip(codes, row.entries, strict=True)):
             title, note = Elided("label", "bad" if entry.faults else "text"), Elided("small", "text2")
             title.show_text(entry.title)
@@ -442,11 +495,7 @@ class LanguageListField(EntryList):
             if len(codes) > 1:
                 name = f"Remove {entry.title} from every text"
                 shown.add_button("cross", name, partial(self.asked.emit, ChangeLanguage("remove", code)))
-        others = ((choice.sentence, choice.value) for choice in row.row.choices if choice.value not in codes)
-        add = lambda code: self.asked.emit(ChangeLanguage("add", code))  # noqa: E731
-        self.names = names_list("Add a language to every text", "Language …", others, add)
-        self.box.addWidget(self.names, 0, Qt.AlignmentFlag.AlignLeft)
-        self.setFocusProxy(self.names)
+        self.names.show_items((one.sentence, one.value) for one in row.row.choices if one.value not in codes)
 
 
 CONDITIONS: Final = SpecialEditor((("Block", "conditions"),), ConditionsField, wide=True, facts=condition_lines)

@@ -1,14 +1,14 @@
 """A row of the form: label, editor by its kind or key, faults and repairs."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 
 from study_app.designer.document.steps import RemoveKey, SwitchKey
 from study_app.designer.form.fields import (
@@ -23,14 +23,13 @@ from study_app.designer.form.fields import (
     stacked,
 )
 from study_app.designer.form.levels import LEVELS
-from study_app.designer.form.lists import CONDITIONS, EntriesField, EntryList, LanguageListField, LinesField
+from study_app.designer.form.lists import CONDITIONS, EntriesField, LanguageListField, LinesField
 from study_app.designer.form.rows import STUDY_LANGUAGES, FormRow
 from study_app.designer.form.special import DESCRIPTION, ORDER, POINTS, QUESTION_KIND, QUESTION_LIST, SENTENCES
 from study_app.designer.form.targets import TARGETS
 from study_app.designer.form.trial_strip import TRIAL
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText, removes_key
 from study_app.designer.place.segments import Segments
-from study_app.designer.place.tab_order import lead_by_tab, stops
 from study_app.designer.problems.card import RepairButton
 from study_app.designer.problems.problems import ProblemRow
 from study_app.gui.kit.commands import with_key
@@ -59,8 +58,6 @@ class EitherField(Field):
         self.box.addWidget(self.kinds, 0, Qt.AlignmentFlag.AlignLeft)
         self.inner = field(self._chosen(row))
         self.inner.asked.connect(self.asked)
-        if isinstance(self.inner, EntryList):
-            self.inner.changes.connect(lambda asked, _after: self.asked.emit(asked))
         self.inner.came.connect(self.came)
         self.box.addWidget(self.inner)
         self.setFocusProxy(self.inner)
@@ -117,16 +114,6 @@ def field(row: FormRow) -> Field:
     return LineField(row) if kind not in {"unknown", "table"} else UnknownField(row)
 
 
-def structure(row: FormRow) -> object:
-    """Return what makes another editor of a row necessary."""
-    inner = row.row.either[row.number or 0].kind if row.row.either else ""
-    count = len(row.row.value) if isinstance(row.row.value, tuple) and (row.row.kind, inner) != ("", "") else 0
-    counted = count if row.row.kind in {"texts", "points"} or inner in {"texts", "points"} else 0
-    choices = tuple(choice.value for choice in row.row.choices) if row.row.kind != "reference" else ()
-    within = (row.row.path[:1], row.row.path[2:])  # a renamed element keeps its editors
-    return within, row.row.kind, inner, counted, choices, row.languages, row.entries, row.removable, row.instead
-
-
 LABEL_PX = 116
 MOST_REPAIRS = 3
 EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
@@ -160,7 +147,6 @@ class RowWidget(Themed, QWidget):
     def __init__(self, row: FormRow) -> None:
         super().__init__()
         self.row = row
-        self.key = structure_of(row)
         self.refusal = ""
         special, wide = special_editor_of(row), is_wide(row)
         bare = special is not None and not special.labelled
@@ -207,7 +193,7 @@ class RowWidget(Themed, QWidget):
             insert_layout(column, 0, above)
         if heads:
             of = "" if labelled else f"{row.row.label}, "
-            add_layout(column, language_heads(tuple((code, f"{of}{language}") for code, language in row.languages)))
+            column.addWidget(LanguageHeads(f"{of}{language}" for _, language in row.languages))
         if wide and not bare:
             column.addWidget(self.field)
         add_layout(column, self._buttons)
@@ -286,7 +272,6 @@ class RowWidget(Themed, QWidget):
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
             made.show()  # at once: Tab passes what a layout is still to show
             self.repairs.append(made)
-        lead_by_tab([self.field, *stops(self.field)][-1], self.repairs)
         if held is not None and not self.repairs:
             self.field.take_keyboard()
         elif held is not None:  # the same words again, where they are still offered
@@ -320,11 +305,17 @@ def is_wide(row: FormRow) -> bool:
 
 def structure_of(row: FormRow) -> object:
     """Return what makes another editor of a row necessary."""
-    special = special_editor_of(row)
-    return structure(row), None if special is None else special.structure(row)
+    special, own = special_editor_of(row), row.row
+    inner = own.either[row.number or 0].kind if own.either else ""
+    choices = tuple(choice.value for choice in own.choices) if own.kind in {"choice", "choices", "kind"} else ()
+    extra = None if special is None else special.structure(row)
+    return own.model, own.kind, inner, choices, row.languages, row.removable, row.instead, extra
 
 
-def language_heads(languages: tuple[tuple[str, str], ...], inset: tuple[int, int] = (0, 0)) -> QHBoxLayout:
-    """Return the names of languages above the columns of their texts; ``inset`` is the room left and right [px]."""
-    heads = ((label(language, "small", "text2"), 1) for _code, language in languages)
-    return hbox(*heads, spacing=8, margins=(inset[0], 0, inset[1], 0))
+class LanguageHeads(QWidget):
+    """Names of languages above the columns of their texts; ``inset`` is the room left and right [px]."""
+
+    def __init__(self, languages: Iterable[str], inset: tuple[int, int] = (0, 0)) -> None:
+        super().__init__()
+        heads = ((label(language, "small", "text2"), 1) for language in languages)
+        hbox(*heads, spacing=8, margins=(inset[0], 0, inset[1], 0), parent=self)

@@ -73,8 +73,6 @@ def _note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
 STUDY_LANGUAGES: Final = ("study", "languages")
 NO_QUESTIONS: Final = QuestionLines((), ())
 LEAST, MOST = "at least ", "at most "
-BELOW: Final = 2
-"""Where the keys of an element begin in a path, after its section and its id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,19 +173,6 @@ class Form:
     @property
     def rows(self) -> tuple[FormRow, ...]:
         return tuple(row for section in self.sections for row in section.rows)
-
-
-def shape_of(form: Form) -> object:
-    """Return what makes other editors necessary, beside the rows: other questions, sections, keys to add."""
-    others = [line for line in form.questions.lines if line.path != form.path]
-    return (
-        others,
-        form.questions.languages,
-        [
-            (one.path[BELOW:], one.title, tuple(row.path[BELOW:] for row in one.absent), one.faults)
-            for one in form.sections
-        ],
-    )
 
 
 def added_row(form: Form, before: Form) -> Path | None:

@@ -24,7 +24,7 @@ from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedSente
 from study_app.designer.place.segments import Segments
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import Tone, TypeRole, font
-from study_app.gui.theme.themed import Themed
+from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton
@@ -185,41 +185,50 @@ def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
     return made
 
 
-class QuestionRows(QWidget):
-    """Questions above or below the one that is edited.
+class QuestionRows(Themed, QWidget):
+    """Questions: all of a questionnaire, or those above or below the one that is edited.
 
     ``asked`` carries a request: to write the text of one, or to select it with the others.
     """
 
     asked = Signal(object)
 
-    def __init__(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...] = ()) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        column = vbox(spacing=0, margins=0, parent=self)
-        if len(languages) > 1:
-            column.addWidget(LanguageNames(languages))
+        self.column = vbox(spacing=0, margins=0, parent=self)
         self.rows: list[QuestionRow] = []
+        self._shown: object = ((), ())
+
+    def show_lines(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...] = ()) -> None:
+        """Show questions, each in the languages, whose names are above them."""
+        if self._shown == (lines, languages):
+            return
+        self._shown = (lines, languages)
+        for old in self.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
+            remove_widget(old)
+        self.rows = []
+        if len(languages) > 1:
+            heads = QWidget()
+            columns = ((_column_text(language, "small", "text2"), 1) for language in languages)
+            hbox(*columns, spacing=8, margins=(INSET_PX, 0, OPEN_PX + 8, 0), parent=heads)
+            self.column.addWidget(heads)
         for line in lines:
             made = QuestionRow(line)
             made.opened.connect(lambda path=line.path: self.asked.emit(Do("write", (path,))))
             made.joined.connect(lambda between, path=line.path: self.asked.emit(Do("join", (path, between))))
-            add_parts(column, made, Rule())
+            add_parts(self.column, made, Rule())
             self.rows.append(made)
-
-
-class LanguageNames(QWidget):
-    """Names of languages above the columns of questions."""
-
-    def __init__(self, languages: tuple[str, ...], right: int = OPEN_PX) -> None:
-        super().__init__()
-        heads = ((_column_text(language, "small", "text2"), 1) for language in languages)
-        hbox(*heads, spacing=8, margins=(INSET_PX, 0, right + 8, 0), parent=self)
+        apply_theme_within(self, self.theme)
 
 
 class Panel(Themed, QWidget):
-    """The tinted ground of the question that is edited, with an accent line at its left."""
+    """The ground of the form: tinted, with an accent line at its left, where one of several questions is edited."""
+
+    tinted = False
 
     def paintEvent(self, _event: QPaintEvent) -> None:
+        if not self.tinted:
+            return
         paint_ground(self, self.theme.selected)
         QPainter(self).fillRect(QRectF(0, 2, 3, self.height() - 4), QColor(self.theme.accent))
 
@@ -373,11 +382,13 @@ class PointsField(Field):
         self.asked.emit(Several(f"Remove point {at + 1}", tuple(gone)))
 
 
-def _shown(row: FormRow) -> object:
-    return row.facts.languages, len(row.facts.points)
-
-
-POINTS: Final = SpecialEditor((("Scale", "labels"),), PointsField, wide=True, structure=_shown, facts=scale_points)
+POINTS: Final = SpecialEditor(
+    (("Scale", "labels"),),
+    PointsField,
+    wide=True,
+    structure=lambda row: (row.facts.languages, len(row.facts.points)),
+    facts=scale_points,
+)
 
 
 NARROWEST_LIST = 120
@@ -433,27 +444,20 @@ class QuestionsField(Field):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        self.rows = QuestionRows(row.facts.lines, row.facts.languages)
+        self.rows = QuestionRows()
         self.rows.asked.connect(self.asked)
         self.add = add_button(f"Add to {row.row.label}", "Question")
         self.add.setToolTip(with_key("Add a question", "add"))
         self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.row.path)))
         self.box.addWidget(self.rows)
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
-        self.setFocusProxy(self.rows.rows[0].open if self.rows.rows else self.add)
+        self.show_value()
 
     def show_value(self) -> None:
-        """Do nothing: other questions make another field."""
-
-
-def _shown_questions(row: FormRow) -> object:
-    return row.facts
+        self.rows.show_lines(self.row.facts.lines, self.row.facts.languages)
+        self.setFocusProxy(self.rows.rows[0].open if self.rows.rows else self.add)
 
 
 QUESTION_LIST: Final = SpecialEditor(
-    (("Questionnaire", "items"),),
-    QuestionsField,
-    wide=True,
-    structure=_shown_questions,
-    facts=lambda study, row: question_lines(study, row.path),
+    (("Questionnaire", "items"),), QuestionsField, wide=True, facts=lambda study, row: question_lines(study, row.path)
 )

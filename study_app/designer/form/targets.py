@@ -308,4 +308,10 @@ class TargetsField(Field):
             self.asked.emit(SetValue((*self.row.row.path, number), before, typing=True))
 
 
-TARGETS: Final = SpecialEditor((("Reach", "targets_mm"),), TargetsField, wide=True, facts=targets_in_tank)
+TARGETS: Final = SpecialEditor(
+    (("Reach", "targets_mm"),),
+    TargetsField,
+    wide=True,
+    structure=lambda row: len(row.facts.points),
+    facts=targets_in_tank,
+)

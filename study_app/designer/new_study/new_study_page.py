@@ -1,7 +1,6 @@
 """A new study: what it can begin as at the left, the chosen one with its questions at the right."""
 
 from functools import partial
-from itertools import pairwise
 from typing import Any, Final
 
 from PySide6.QtCore import QPointF, QRectF, Qt, QTimer, Signal
@@ -12,7 +11,6 @@ from study_app.designer.new_study.cards import RING, TemplateButton
 from study_app.designer.new_study.new_study import Answers
 from study_app.designer.new_study.template_choices import KnownAnswer, OwnQuestion, TemplateChoice, languages_offered
 from study_app.designer.place.designer_view import StudyChoice
-from study_app.designer.place.tab_order import lead_by_tab
 from study_app.designer.problems.card import NameRefusal
 from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.kit.dialogs import choose_protocol
@@ -231,7 +229,6 @@ class NoStudyCard(Card):
             apply_theme_within(made, self.theme)
             self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignHCenter)
             self.drafts.append(made)
-        self.new.raise_()  # the last of the children: so Tab goes to it last
 
 
 class ChosenCard(Card):
@@ -286,8 +283,6 @@ class ChosenCard(Card):
             self.inside.insertWidget(at, new)
             remove_widget(old)
         self.questions.show_choice(choice)
-        asked = (*self.questions.languages.values(), *self.questions.own.values())
-        lead_by_tab(self.questions.name, (*asked, self.refusal.use, self.make))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -375,8 +370,6 @@ class NewStudyPage(Themed, QWidget):
         column.addStretch()
         apply_theme_within(inside, self.theme)
         replace_inside(self.area, inside)
-        for before, after in pairwise((self.file, *self.buttons)):  # as they are read: made later, they come last
-            QWidget.setTabOrder(before, after)
         self.refuse("")
         first = next((button for button in self.buttons if button.choice.source == chosen), self.buttons[0])
         for button in self.buttons:  # Tab goes to the chosen one, and arrows to the others

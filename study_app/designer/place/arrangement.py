@@ -12,7 +12,6 @@ from study_app.designer.form.rows import Form
 from study_app.designer.measures.measures_page import FactsRow
 from study_app.designer.outline.card import OutlineCard
 from study_app.designer.place.segments import Segments
-from study_app.designer.place.tab_order import lead_by_tab
 from study_app.designer.problems.card import ProblemsCard
 from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.theme.theme import font
@@ -81,12 +80,6 @@ class RightPane(QWidget):
         self.make_room()
         if changed:
             self.tab_shown.emit(name)
-
-    @property
-    def in_order(self) -> list[QWidget]:
-        """Its parts in the order in which Tab goes through them."""
-        page = next(one for one in self.pages if one.name == self.tab)
-        return [self.tabs, *([] if page.aside is None else [page.aside]), page.body, self.facts]
 
     def _place_aside(self) -> None:
         """Put the controls of the page at the right of the tabs, or below them where there is no room."""
@@ -187,7 +180,6 @@ class PathBar(QWidget):
                 apply_theme_within(part, self.outline.theme)
             self.steps.append(made)
             self._parts += [sign, made]
-        lead_by_tab(self.outline, self.steps)
 
 
 class Arrangement(QWidget):
@@ -206,7 +198,6 @@ class Arrangement(QWidget):
         self.sides.tips = {"form": tip("form"), "pane": tip("views")}
         self.sides.chosen.connect(lambda side: self.show_side(str(side)))
         self.prompts = vbox()
-        self.prompt: QWidget | None = None  # in that layout: its items outlive their widgets in Python
         self._left = vbox((form, 1), spacing=12 - 2 * SHADOW)
         self._across = hbox((self._left, FORM_SHARE), (pane, 100 - FORM_SHARE), spacing=GAP)
         self.top = QWidget()
@@ -217,12 +208,6 @@ class Arrangement(QWidget):
         application = QApplication.instance()
         assert isinstance(application, QApplication)  # noqa: S101 - a window has one
         application.focusChanged.connect(self._follow_focus)
-
-    @property
-    def in_order(self) -> list[QWidget]:
-        """The parts in the order in which Tab goes through them."""
-        beside = [self.form.head, self.form.inside, *self.pane.in_order, self.problems]
-        return [self.outline, self.top, *([] if self.prompt is None else [self.prompt]), *beside]
 
     def show_side(self, side: str) -> None:
         self.side = side

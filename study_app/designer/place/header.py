@@ -84,7 +84,6 @@ class BannerCard(Card):
             apply_theme_within(made, self.theme)
             self._row.insertWidget(self._row.count() - 1, made)
             self.buttons.append(made)
-        self.close_button.raise_()  # the last of the children: so Tab goes to it last
 
 
 NEW, OPEN = "\0new", "\0open"

@@ -86,15 +86,12 @@ class Segments(Themed, QWidget):
         self.setFocusProxy(next((button for button in self.buttons if button.isChecked()), self.buttons[0]))
 
     def _add_button(self) -> None:
-        """Add a button; Tab goes to it from the one before, and to the first where it went when all was made."""
         made, at = _Segment(self._height), len(self.buttons)
         made.setAccessibleName(self._name)  # until it has words
         made.setAccessibleDescription(self._name)
         made.clicked.connect(lambda: self.chosen.emit(self._values[at]))
         apply_theme_within(made, self.theme)
         self._row.addWidget(made)
-        if self.buttons:
-            QWidget.setTabOrder(self.buttons[-1], made)
         self.buttons.append(made)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -1,12 +1,12 @@
 """The study designer: its parts, their keys, the way from problem to problem, and what is asked for."""
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterator
+from functools import cmp_to_key, partial
 from typing import Any
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QStackedWidget, QWidget
+from PySide6.QtWidgets import QApplication, QStackedWidget, QWidget
 
 from study_app.designer.document.steps import (
     Do,
@@ -34,16 +34,31 @@ from study_app.designer.place.designer_view import DesignerView
 from study_app.designer.place.file import FileCard
 from study_app.designer.place.header import BannerCard, DesignerHeader
 from study_app.designer.place.prompts import KeysCard, Prompt
-from study_app.designer.place.tab_order import go_on, lead_by_tab
 from study_app.designer.problems.card import ProblemsCard, RepairButton
 from study_app.designer.problems.problems import ProblemRow
 from study_app.gui.kit.commands import add_commands, press, tip
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
-from study_app.gui.widgets.boxes import vbox
+from study_app.gui.widgets.boxes import add_parts, vbox
 from study_app.gui.widgets.main_view import Place, last_focused
 
 SHORTCUT = Qt.FocusReason.ShortcutFocusReason
+
+
+def stops(part: QWidget) -> Iterator[QWidget]:
+    """Yield what Tab goes to in a part: from top to bottom, parts beside each other from left to right."""
+    if part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.focusProxy() is None and part.isEnabled():
+        yield part
+    inner = (one for one in part.children() if isinstance(one, QWidget) and one.isVisible() and not one.isWindow())
+    for one in sorted(inner, key=cmp_to_key(_read_before)):
+        yield from stops(one)
+
+
+def _read_before(one: QWidget, other: QWidget) -> int:
+    first, second = one.geometry(), other.geometry()
+    if first.bottom() < second.top() or second.bottom() < first.top():
+        return first.top() - second.top()
+    return first.left() - second.left()
 
 
 class FocusAreas:
@@ -161,7 +176,6 @@ class ProblemSteps(QObject):
         self._problems: tuple[ProblemRow, ...] = ()
         self._of_other_study: tuple[ProblemRow, ...] = ()
         self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
-        self._opened_at: QWidget | None = None
         card.opened.connect(self._open)
         card.next.clicked.connect(self.open_next)
         for part in (card, form):
@@ -192,7 +206,6 @@ class ProblemSteps(QObject):
         self._repairs[row] = words
         self._form.show_repairs(self._repairs)
         self._card.show_repairs(row, words)
-        self._lead_to_repairs()
 
     def open_next(self) -> None:
         if coming := self._card.coming:
@@ -222,14 +235,6 @@ class ProblemSteps(QObject):
             self._areas.show_tab("file")
         if row.line is not None:
             self._file.editor.go_to(row.line - 1)
-        self._opened_at = self._card.window().focusWidget()
-        self._lead_to_repairs()
-
-    def _lead_to_repairs(self) -> None:
-        """Let Tab go to the repairs of a problem from where it was opened."""
-        here, row = self._card.window().focusWidget(), self._card.at
-        if here is not None and here is self._opened_at and row is not None:
-            lead_by_tab(here, self._form.repairs_of(row) or self._card.repairs_of(row))
 
     def _repair(self, row: ProblemRow, words: str) -> None:
         """Make a repair; a key leads to the next one, or from the last one to its field, where a click leads."""
@@ -279,10 +284,7 @@ class DesignerPlace(Place):
     def _lay_out(self) -> None:
         main = QWidget()
         column = vbox(spacing=10, margins=0, parent=main)
-        column.addWidget(self.nothing, 1)  # first in the order of Tab
-        column.insertWidget(0, self.header)
-        column.insertWidget(1, self.banner)
-        column.addWidget(self.parts, 1)
+        add_parts(column, self.header, self.banner, (self.nothing, 1), (self.parts, 1))
         self.stack = QStackedWidget()
         self.stack.addWidget(main)
         self.stack.addWidget(self.new_page)
@@ -438,14 +440,13 @@ class DesignerPlace(Place):
         prompt.given_up.connect(self.close_prompt)
         apply_theme_within(prompt, self.theme)
         self.parts.prompts.addWidget(prompt)
-        self.parts.prompt = prompt
         first.setFocus()
 
     def close_prompt(self, *, elsewhere: bool = False) -> None:
         """Close a question that is open; ``elsewhere`` says that another element is selected from now on."""
         if self.prompt is not None:
             closing = self.prompt
-            self.prompt = self.parts.prompt = None
+            self.prompt = None
             held = closing.isAncestorOf(self.focusWidget())
             remove_widget(closing)
             if held:  # else Qt hands the keyboard to the rail
@@ -526,9 +527,22 @@ class DesignerPlace(Place):
         self.left.emit()
 
     def focusNextPrevChild(self, forward: bool) -> bool:
+        """Let Tab go through what is seen, as it is read, then to the beginning of the window, or Shift+Tab back."""
         self.flush()
-        parts = [self.nothing, self.header, self.banner, *self.parts.in_order]
-        return go_on(parts, super().focusNextPrevChild, forward=forward)
+        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)  # parts made just now have their places
+        found, here = list(stops(self)), self.window().focusWidget()
+        if here not in found:
+            if not (forward and found and here is not None and here.isAncestorOf(self.stack)):  # the place itself
+                return super().focusNextPrevChild(forward)
+            at = -1
+        else:
+            at = found.index(here)
+        if not forward and at == 0:
+            return super().focusNextPrevChild(forward)
+        reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
+        to = found[at + (1 if forward else -1)] if at + 1 < len(found) or not forward else next(stops(self.window()))
+        to.setFocus(reason)
+        return True
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() != Qt.Key.Key_Escape or not self.banner.close_by_key():

@@ -7,7 +7,6 @@ from PySide6.QtGui import QFocusEvent, QMouseEvent, QPaintEvent
 from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
 from study_app.designer.place.segments import Segments
-from study_app.designer.place.tab_order import lead_by_tab
 from study_app.designer.problems.problems import ProblemRow, followed
 from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.theme.theme import Theme, font
@@ -137,7 +136,6 @@ class ProblemLine(Themed, QWidget):
             self._repairs.addWidget(made)
             made.show()  # at once: Tab passes what a layout is still to show
             self.repairs.append(made)
-        lead_by_tab(self.go, self.repairs)
 
     def apply_theme(self, theme: Theme) -> None:
         super().apply_theme(theme)

@@ -7,6 +7,7 @@ from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
+from study_app.designer.document.steps import AddKey, RenameElement
 from study_app.gui.widgets.controls import IconButton
 
 pytestmark = pytest.mark.slow
@@ -61,16 +62,22 @@ def _drag(view: QWidget, at: QPoint) -> QMouseEvent:
     )  # fmt: skip
 
 
-def test_the_keyboard_stays_in_a_row_that_is_made_anew(qtbot: Any, designer: Any, editors: None) -> None:
+def test_a_row_that_stays_keeps_its_widget_caret_and_keyboard(qtbot: Any, designer: Any, editors: None) -> None:
     designer.open("kitchen", "blocks", "liquids")
-    path = ("blocks", "liquids", "conditions")
-    before = designer.form_row(*path)
-    count = len(before.field.rows)
-    press(qtbot, next(one for one in before.field.rows[0].findChildren(IconButton) if "Remove" in one.accessibleName()))
-    after = designer.form_row(*path)
-    assert after is not before
-    assert len(after.field.rows) == count - 1
-    assert after.isAncestorOf(designer.keyboard)
+    conditions, title = (designer.form_row("blocks", "liquids", key) for key in ("conditions", "title"))
+    count = len(conditions.field.rows)
+    first = conditions.field.rows[0].findChildren(IconButton)
+    press(qtbot, next(one for one in first if "Remove" in one.accessibleName()))
+    assert designer.form_row("blocks", "liquids", "conditions") is conditions
+    assert len(conditions.field.rows) == count - 1
+    assert conditions.isAncestorOf(designer.keyboard)
+    (line,) = title.field.lines.values()
+    line.setFocus()
+    line.setCursorPosition(2)
+    designer.editing.ask(AddKey(("blocks", "liquids", "setting_label")))
+    designer.editing.ask(RenameElement(("blocks", "liquids"), "fluids"))
+    assert designer.keyboard is line
+    assert (line.cursorPosition(), designer.form_row("blocks", "fluids", "title")) == (2, title)
 
 
 def test_a_question_is_shown_whole_and_typed_as_one_paragraph(qtbot: Any, designer: Any) -> None:

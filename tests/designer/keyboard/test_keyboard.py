@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QWidget
 
 from study_app.designer.document.steps import SetValue
-from study_app.designer.place.tab_order import stops
+from study_app.designer.place.view import stops
 from study_app.gui.kit.commands import COMMANDS
 
 pytestmark = pytest.mark.slow

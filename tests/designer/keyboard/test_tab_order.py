@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.designer.document.steps import ChangeLanguage
-from study_app.designer.place.tab_order import stops
+from study_app.designer.place.view import stops
 
 pytestmark = pytest.mark.slow
 
