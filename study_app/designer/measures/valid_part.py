@@ -6,13 +6,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
+from study_app.designer.document.additions import is_unknown_name
 from study_app.designer.document.fields import initial
+from study_app.designer.document.names import named_at
 from study_app.designer.document.study import Study, with_value, without_value
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.measures.participant_texts import text_keys
 from study_app.protocol.load import examined
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.document import Path, entries, value_at
+from study_app.protocol.source.document import Path, entries, has, value_at
 from study_app.protocol.source.problems import Fault
 
 ROUNDS: Final = 8
@@ -28,6 +30,8 @@ _LEFT_OUT: Final = (("analysis",), ("limits",))
 _OF_FORCES: Final = (("device",), ("scene",))
 """Tables on which every force depends, and no sum over the session."""
 _APART: Final = (*_LEFT_OUT, *_OF_FORCES)
+_MARK: Final = "\u034f"
+"""The combining grapheme joiner: nothing is seen of it, and texts with it are not taken as alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,20 +50,25 @@ class ValidPart:
 @lru_cache(maxsize=2)
 def valid_part(study: Study) -> ValidPart:
     """Return what can be measured of a study."""
-    if study.formed is not None or not study.is_toml:
+    return restored_part(study, {})
+
+
+def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
+    """Return what can be measured or shown of a study: a faulty value is the one of the document ``before``, if any."""
+    if study.formed is not None or not (study.is_toml or before):
         return ValidPart(study.formed, whole=study.formed is not None)
     document: Any = study.document
-    faults: list[Fault] = list(study.faults)
+    faults: list[Fault] = list(study.faults) if study.is_toml else examined(document)[1]
     whole = forces = True
     for number in range(ROUNDS):
         for fault in sorted(faults, key=_place, reverse=True):
-            place, value = _mended(document, fault, of_others=number > 0)
+            place, value = _restored(document, fault, before) or _mended(document, fault, of_others=number > 0)
             known = value is not None or fault.message == "unknown key" or place[:1] in _APART
             if not place:
                 place, value = fault.path[:2], _initial(document, fault.path[:2])
                 if value is None:
                     return ValidPart(None, whole=False)
-            if not _is_there(document, place) and value is None:
+            if value_at(document, place) is None and value is None:
                 continue  # another fault of the same element left it out
             whole = whole and known
             forces = forces and (fault.message == "unknown key" or fault.path[:1] not in _OF_FORCES)
@@ -68,6 +77,39 @@ def valid_part(study: Study) -> ValidPart:
         if protocol is not None:
             return ValidPart(protocol, whole, forces)
     return ValidPart(None, whole=False)
+
+
+def _restored(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[Path, Any] | None:
+    """Return the place to change because of a fault, and the value that it had before; None where it had none."""
+    if not before or fault.missing_language:
+        return None
+    path, value = fault.path, value_at(document, fault.path)
+    sound = value_at(before, _path_before(document, path, before))
+    if fault.in_one_language and isinstance(value, str):
+        return path, dict.fromkeys((str(code) for _, code in entries(document, "study.languages.*")), value)
+    if fault.reads_alike:  # each place gets its number of marks: the text looks the same and reads as no other
+        marks = _MARK * (1 + max((step for step in path if isinstance(step, int)), default=0))
+        texts = value.items() if isinstance(value, Mapping) else ()
+        return path, {code: f"{one}{marks}" for code, one in texts} or f"{value}{marks}"
+    named = named_at(before, path) if is_unknown_name(fault) and sound == value else None
+    if named is not None and value_at(document, named[:1]) is not None:
+        return named, value_at(before, named)
+    return (path, sound) if sound is not None and sound != value else None
+
+
+def _path_before(document: Any, path: Path, before: Any) -> Path:
+    """Return where an element of a document was before: a question is found by its id, not by its number."""
+    found: list[str | int] = []
+    for step in path:
+        document = document[step] if has(document, step) else None
+        name = document.get("id") if isinstance(document, Mapping) and path[-1] != "id" else None
+        if isinstance(step, int) and name is not None:
+            entries_before = before if isinstance(before, list | tuple) else ()
+            same = (at for at, one in enumerate(entries_before) if isinstance(one, Mapping) and one.get("id") == name)
+            step = next(same, len(entries_before))  # noqa: PLW2901 - the step of the other document
+        found.append(step)
+        before = before[step] if has(before, step) else None
+    return tuple(found)
 
 
 def _place(fault: Fault) -> tuple[str, ...]:
@@ -104,11 +146,11 @@ def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]
     if path[:1] in _LEFT_OUT:
         return path[:1], None
     if path[:1] in _OF_FORCES:
-        return path[:2], None if _is_there(document, path[:2]) else _initial(document, path[:2])
+        return path[:2], None if value_at(document, path[:2]) is not None else _initial(document, path[:2])
     listed = len(path) > 1 and isinstance(path[-1], int) and isinstance(value_at(document, path), str)
     if listed:
         return path, None
-    if of_others and len(path) > 2 and _is_there(document, path[:3]):
+    if of_others and len(path) > 2 and value_at(document, path[:3]) is not None:
         return path[:3], None
     return (path[:2], None) if len(path) > 1 and isinstance(value_at(document, path[:2]), Mapping) else ((), None)
 
@@ -124,7 +166,3 @@ def _initial(document: Any, path: Path) -> Any:
 def _text(document: Any) -> Any:
     codes = [str(code) for _, code in entries(document, "study.languages.*")]
     return dict.fromkeys(codes, TEXT) if len(codes) > 1 else TEXT
-
-
-def _is_there(document: Any, path: Path) -> bool:
-    return value_at(document, path) is not None

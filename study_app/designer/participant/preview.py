@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.study import Study
-from study_app.designer.measures.valid_part import valid_part
+from study_app.designer.measures.valid_part import restored_part
 from study_app.designer.participant.live_page import LivePage
-from study_app.designer.participant.playable import last_valid, sound_part
+from study_app.designer.participant.playable import last_valid
 from study_app.designer.participant.shown_step import (
     SIZES,
     STANDALONE,
@@ -271,7 +271,7 @@ class ParticipantPreview(Card):
             elif self._valid is None and before is None:
                 self._valid = last_valid(opened)
             valid = {} if self._valid is None else self._valid.document
-            self._protocol = sound_part(study, valid) or valid_part(study).protocol
+            self._protocol = study.protocol or restored_part(study, valid).protocol
             if self._protocol is None and self._valid is not None:
                 self._protocol = self._valid.protocol
             if self._protocol is not None and before is not None and self._found is not None:

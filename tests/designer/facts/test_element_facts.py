@@ -15,10 +15,11 @@ from study_app.designer.form.form import form
 from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.observers import Simulated
 from study_app.designer.measures.simulation import Controls
+from study_app.designer.measures.valid_part import restored_part
 from study_app.designer.new_study.new_study import template
 from study_app.designer.new_study.templates import FOLDER
 from study_app.designer.outline.outline_rows import outline_rows
-from study_app.designer.participant.playable import NotPlayableError, playable, sound_part
+from study_app.designer.participant.playable import NotPlayableError, playable
 from study_app.designer.participant.shown_step import showing
 from study_app.designer.problems.problems import problem_rows
 from study_app.protocol.source.document import Path, entries, value_at
@@ -94,7 +95,7 @@ def test_a_value_of_a_wrong_type_is_a_fault_that_every_view_shows(name: str, pat
     assert len(problems) == len(study.faults)
     for fault in study.faults:
         repairs(study, fault)
-    protocol = sound_part(study, sound.document)
+    protocol = restored_part(study, sound.document).protocol
     for selected in {("study",), path[:2], path[:4]}:
         if not isinstance(value_at(study.document, selected), dict):
             continue

@@ -4,7 +4,8 @@ import pytest
 
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Edit, Set, Unset
-from study_app.designer.participant.playable import NotPlayableError, playable, sound_part
+from study_app.designer.measures.valid_part import restored_part
+from study_app.designer.participant.playable import NotPlayableError, playable
 from study_app.designer.participant.shown_step import (
     STANDALONE,
     StepPosition,
@@ -89,7 +90,7 @@ def edited(name: str, *edits: Edit) -> Study:
 def test_an_element_that_is_gone_while_it_is_named_is_shown_as_it_was() -> None:
     before = Study(source_bytes("demo").decode())
     study = edited("demo", Unset(("liquids", "thin")))
-    found = sound_part(study, before.document)
+    found = restored_part(study, before.document).protocol
     assert study.protocol is None
     assert found is not None
     assert before.protocol is not None
