@@ -59,7 +59,7 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
         import time
 
         from study_app.designer.document.study import read
-        from study_app.designer.measures.participant_texts import to_translate
+        from study_app.designer.measures.study_facts import to_translate
         from study_app.protocol.source.files import find
         from study_app.store import workstation
         from study_app.video.sources import missing_here

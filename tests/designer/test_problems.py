@@ -8,8 +8,8 @@ from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.designer.document.steps import SetValue
-from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Set
+from study_app.designer.measures.study_facts import facts
 
 pytestmark = pytest.mark.slow
 

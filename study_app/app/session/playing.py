@@ -23,8 +23,7 @@ from study_app.app.failures import Patience
 from study_app.app.session.live_session import BUG, LiveSession
 from study_app.designer.participant import play as shown
 from study_app.designer.participant.play import PlayDevices, PlayState
-from study_app.designer.participant.playable import NotPlayableError, Playable, playable
-from study_app.designer.participant.shown_step import StepPosition
+from study_app.designer.participant.playable import NotPlayableError, Playable, StepPosition, playable
 from study_app.designer.place.controller import DesignerController
 from study_app.designer.problems.problems import problem_rows
 from study_app.devices.registry import descriptor_of, title_of

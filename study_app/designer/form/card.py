@@ -16,8 +16,7 @@ from study_app.designer.form.row_widget import LABEL_PX, LanguageHeads, RowWidge
 from study_app.designer.form.rows import Form, FormRow, Section, added_row
 from study_app.designer.form.special import Panel, QuestionRow, QuestionRows
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.designer.problems.card import NameRefusal, RepairButton
-from study_app.designer.problems.problems import ProblemRow
+from study_app.designer.problems.problems import NameRefusal, ProblemRow, RepairButton
 from study_app.gui.kit.commands import tip
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font

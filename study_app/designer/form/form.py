@@ -11,7 +11,7 @@ from study_app.designer.document.names import named_at
 from study_app.designer.document.study import Study
 from study_app.designer.form.row_widget import EDITORS
 from study_app.designer.form.rows import NO_QUESTIONS, STUDY_LANGUAGES, Entry, Form, FormRow, Section, question_lines
-from study_app.designer.measures.participant_texts import copied_texts, texts_by_language
+from study_app.designer.measures.study_facts import copied_texts, texts_by_language
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.protocol.source.document import Path, Places, entries, places_of, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name

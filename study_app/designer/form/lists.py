@@ -31,7 +31,7 @@ from study_app.designer.form.fields import Field, SpecialEditor, add_button, kep
 from study_app.designer.form.rows import FormRow, new_words
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.designer.measures.cards import UNKNOWN
-from study_app.designer.measures.valid_part import valid_part
+from study_app.designer.measures.study_facts import valid_part
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within

@@ -11,6 +11,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 
 from study_app.designer.document.steps import RemoveKey, SwitchKey
+from study_app.designer.form.drawn_fields import LEVELS, TRIAL
 from study_app.designer.form.fields import (
     ChecksField,
     ChoiceField,
@@ -22,16 +23,13 @@ from study_app.designer.form.fields import (
     UnknownField,
     stacked,
 )
-from study_app.designer.form.levels import LEVELS
 from study_app.designer.form.lists import CONDITIONS, EntriesField, LanguageListField, LinesField
 from study_app.designer.form.rows import STUDY_LANGUAGES, FormRow
 from study_app.designer.form.special import DESCRIPTION, ORDER, POINTS, QUESTION_KIND, QUESTION_LIST, SENTENCES
 from study_app.designer.form.targets import TARGETS
-from study_app.designer.form.trial_strip import TRIAL
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText, removes_key
 from study_app.designer.place.segments import Segments
-from study_app.designer.problems.card import RepairButton
-from study_app.designer.problems.problems import ProblemRow
+from study_app.designer.problems.problems import ProblemRow, RepairButton
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.boxes import add_layout, hbox, insert_layout, vbox

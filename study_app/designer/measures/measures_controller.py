@@ -8,15 +8,14 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.designer.document.study import Study
-from study_app.designer.document.study_facts import facts
 from study_app.designer.measures.levels import LevelWords
 from study_app.designer.measures.measures_view import measures_view
-from study_app.designer.measures.observers import Simulated
 from study_app.designer.measures.simulation import (
     LAPSES,
     Controls,
     Focus,
     MeasureClient,
+    Simulated,
     Simulation,
     advises,
     focus_of,
@@ -27,7 +26,7 @@ from study_app.designer.measures.simulation import (
     start_measure_worker,
     threshold_of,
 )
-from study_app.designer.measures.valid_part import valid_part
+from study_app.designer.measures.study_facts import facts, valid_part
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems.problems import ProblemRow, RepairSearch, problem_rows

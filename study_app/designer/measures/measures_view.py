@@ -9,7 +9,6 @@ from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.names import blocks_using
 from study_app.designer.document.study import Study
-from study_app.designer.document.study_facts import Facts
 from study_app.designer.measures.cards import (
     MOST_LINES,
     NARROW_CODES,
@@ -27,10 +26,15 @@ from study_app.designer.measures.cards import (
     Verdict,
 )  # fmt: skip
 from study_app.designer.measures.levels import LIMIT_NAMES, LevelBlock, LevelWords, level_block, rounded
-from study_app.designer.measures.observers import ENOUGH, Simulated, balance_of
-from study_app.designer.measures.participant_texts import copied_texts, own_texts, revealing, texts_by_language
-from study_app.designer.measures.simulation import Controls, Focus, focus_of
-from study_app.designer.measures.valid_part import valid_part
+from study_app.designer.measures.simulation import ENOUGH, Controls, Focus, Simulated, balance_of, focus_of
+from study_app.designer.measures.study_facts import (
+    Facts,
+    copied_texts,
+    own_texts,
+    revealing,
+    texts_by_language,
+    valid_part,
+)
 from study_app.designer.problems.problems import ProblemRow
 from study_app.haptics.model.gate import calls_for
 from study_app.haptics.model.slope_limits import HAND_MPS, steady

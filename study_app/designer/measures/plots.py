@@ -18,7 +18,7 @@ from study_app.designer.measures.levels import (
     rounded,
 )
 from study_app.designer.measures.measures_view import NO_FORCES
-from study_app.designer.measures.observers import Observed
+from study_app.designer.measures.simulation import Observed
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.live_plots import Floats, Plot, pen

@@ -1,25 +1,226 @@
-"""What is played: the draft's bytes from a step on, if nothing from there to the end is faulty; and its sound part."""
+"""Which step of which session shows an element, and what is played from there on."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as Folder
-from typing import Any, Final
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from study_app.designer.document.document import Document
-from study_app.designer.document.names import named_at
+from study_app.designer.document.names import named_at, named_places
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.participant.shown_step import StepPosition, first_step, graph_of, reached, step_name, step_words
 from study_app.errors import Problem, StudyError
 from study_app.protocol.groups import numbered_parts
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.orders.durations import variants
+from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial, build_schedule
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.files import unbundled, with_liquid_files
-from study_app.session.transitions.page_builder import Preview, preview
+from study_app.protocol.wording.languages import language_name
+from study_app.session.pages import Page
+from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Moment, Preview, preview
 from study_app.store.study_versions import kept_content, kept_versions
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenSize:
+    """A screen that the page is shown for: name, words, size [logical px], and how much larger words are at least."""
+
+    name: str
+    words: str
+    width: int
+    height: int
+    text_scale: float = 1.0
+
+
+SIZES: Final = (
+    ScreenSize("small", "1366 × 768", 1366, 768),
+    ScreenSize("full", "1920 × 1080", 1920, 1080),
+    ScreenSize("touch", "Touch, 1280 × 800", 1280, 800),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ParticipantView:
+    """What the tab shows."""
+
+    page: Page | None = None  # None where it cannot be shown
+    language: str = "en"
+    languages: tuple[str, ...] = ()  # those of the study
+    step: str = ""  # as "Liquids, trial 1 of 6"
+    has_before: bool = False  # whether there is a step before it
+    has_after: bool = False
+    moments: tuple[tuple[Moment, str], ...] = ()  # the pages of the step, with their words
+    moment: Moment | None = None  # the one that is shown
+    focused: str | None = None  # the id of the question that is selected
+    note: str = ""  # what cannot be shown and why, "" where all is
+    photodiode: bool = True  # whether the tank has a corner for one
+    trial: int = 0  # of its block, from 1; 0 where it is none
+    trials: int = 0
+
+    @property
+    def name(self) -> str:
+        """What the page is called for a screen reader."""
+        return f"Participant's page, {language_name(self.language)}"
+
+
+def step_words(shown: Preview, step: Step, language: str) -> str:
+    """Return what a step is called: "Welcome", "Liquids, trial 3 of 6"."""
+    protocol = shown.protocol
+    if isinstance(step, Trial):
+        title = protocol.text(protocol.blocks[step.block].title, language)
+        return title if step.of == 1 else f"{title}, trial {step.index} of {step.of}"
+    if isinstance(step, PageStep):
+        return protocol.text(protocol.pages[step.page_id].title, language)
+    form = protocol.questionnaires[step.form].title
+    return step.form.replace("_", " ").capitalize() if form is None else protocol.text(form, language)
+
+
+def moment_words(moments: tuple[Moment, ...]) -> tuple[tuple[Moment, str], ...]:
+    """Return the pages of a step with their words; none where there is no choice."""
+    tanks = sum(moment.kind == "tank" for moment in moments)
+    named = {
+        "tank": "Tank",
+        "questions": "Questions" if tanks < 2 else "Question",
+        "feedback": "Feedback",
+        "text": "Text",
+    }
+    if len(moments) < 2:
+        return ()
+    return tuple(
+        (moment, f"Interval {moment.interval}" if moment.kind == "tank" and tanks > 1 else named[moment.kind])
+        for moment in moments
+    )
+
+
+Graph: TypeAlias = Mapping[Path, frozenset[Path]]
+"""What each table names, by paths: ``("conditions", "syrup")`` → ``{("liquids", "syrup")}``."""
+
+
+def first_step(shown: Preview, path: Path) -> int | None:
+    """Return the index of the first step that shows an element, or a place within it; None where no step does."""
+    graph = graph_of(shown.protocol.model_dump())
+    tables = (_shown_by(shown, step, graph) for step in shown.schedule.steps)
+    return next((at for at, found in enumerate(tables) if path[:2] in found), None)
+
+
+def graph_of(document: Mapping[str, object]) -> Graph:
+    """Return what each table of a study names."""
+    found: dict[Path, set[Path]] = {}
+    for place, named in named_places(document):
+        found.setdefault(place[:2], set()).add(named[:2])
+    return {table: frozenset(named) for table, named in found.items()}
+
+
+def reached(graph: Graph, first: Iterable[Path]) -> frozenset[Path]:
+    """Return tables and all that they name, directly or not."""
+    found = dict.fromkeys(first)
+    todo = list(found)
+    for table in todo:  # grows while it is read
+        new = [named for named in graph.get(table, ()) if named not in found]
+        found |= dict.fromkeys(new)
+        todo += new
+    return frozenset(found)
+
+
+def _shown_by(shown: Preview, step: Step, graph: Graph) -> frozenset[Path]:
+    """Return the tables that a step presents, and what these name; of a trial only its own condition."""
+    if isinstance(step, PageStep):
+        return reached(graph, [("pages", step.page_id)])
+    if isinstance(step, FormStep):
+        return reached(graph, [("questionnaires", step.form)])
+    block: Path = ("blocks", step.block)
+    parts = [part for part in graph.get(block, ()) if part[0] not in {"conditions", "pages"}]
+    named = (shown.codes[step.block][step.code], shown.protocol.blocks[step.block].standard)
+    presented = [("conditions", name) for name in named if name in shown.protocol.conditions]  # not of a varied number
+    return reached(graph, [*parts, *presented]) | {block}
+
+
+Side: TypeAlias = Literal["tank", "questions"]
+
+STANDALONE: Final = "standalone"
+_SIDES: Final[dict[str, Side]] = {
+    "liquids": "tank", "tasks": "tank", "stimuli": "tank", "methods": "tank",
+    "questionnaires": "questions", "scales": "questions", "designs": "questions",
+}  # fmt: skip
+"""On which page of a trial the elements of a section are seen; others on either."""
+
+
+class StepPosition(NamedTuple):
+    """Where a preview is: a page, form or block by its id, which of the block's trials (from 1), language and seed.
+
+    Without a name it is the first step that shows the selected element.
+    """
+
+    name: str = ""
+    trial: int = 1
+    language: str = ""
+    seed: int = SEED
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A step of a session; ``session`` names the session where it is not the first participant's first, "" there."""
+
+    shown: Preview
+    index: int
+    session: str = ""
+
+
+def step_name(step: Step) -> str:
+    """Return the id of a step's page, form or block."""
+    return step.block if isinstance(step, Trial) else step.page_id if isinstance(step, PageStep) else step.form
+
+
+def previews(study: Protocol) -> Iterator[tuple[str, Preview]]:
+    """Yield each kind of session with what it is called: that of the first participant first, without a name."""
+    first = preview(study)
+    yield "", first
+    for variant in variants(study):
+        if variant.protocol != first.protocol:
+            schedule = build_schedule(variant.protocol, PARTICIPANT, SEED)
+            yield variant.name, replace(first, protocol=variant.protocol, schedule=schedule)
+
+
+def showing(study: Protocol, path: Path) -> Found | None:
+    """Return the first step that shows an element, None where none does.
+
+    A page or questionnaire that is in no session is shown on its own.
+    """
+    for session, shown in previews(study):
+        if (index := first_step(shown, path)) is not None:
+            return Found(shown, index, session)
+    if len(path) > 1 and path[0] in {"pages", "questionnaires"}:
+        name = str(path[1])
+        shown = preview(study)
+        step: Step | None = None
+        if path[0] == "pages" and name in study.pages:
+            step = PageStep(name)
+        elif path[0] == "questionnaires" and name in study.questionnaires:
+            step = FormStep(name, tuple(item.id for item in study.questionnaires[name].items))
+        if step is not None:
+            return Found(replace(shown, schedule=replace(shown.schedule, steps=(step,))), 0, STANDALONE)
+    return None
+
+
+def same_step(study: Protocol, name: str, trial: int, session: str) -> Found | None:
+    """Return the step of a name, of a block the trial of that index or its last; None where it is no longer there."""
+    for called, shown in previews(study):
+        if called != session:
+            continue
+        named = [(at, step) for at, step in enumerate(shown.schedule.steps) if step_name(step) == name]
+        exact = [at for at, step in named if isinstance(step, Trial) and step.index == trial]
+        if named:
+            return Found(shown, (exact or [named[-1][0] if trial > 1 else named[0][0]])[0], session)
+    return None
+
+
+def side_of(path: Path) -> Side | None:
+    """Return on which page of a trial an element is seen; None: on either."""
+    return _SIDES.get(str(path[0])) if path else None
+
 
 MOST_EARLIER: Final = 5
 """So many kept versions are looked at for one without faults."""

@@ -15,26 +15,23 @@ from study_app.designer.document.fragments import copied
 from study_app.designer.document.names import named_at, renamed
 from study_app.designer.document.steps import DeleteElement, Do, Paste, RenameElement, Request, Step, Task
 from study_app.designer.document.study import read
-from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_text import Refused, free_in
 from study_app.designer.form.form import form
 from study_app.designer.measures.measures_controller import MeasuresController
+from study_app.designer.measures.study_facts import facts
 from study_app.designer.new_study.known_studies import header_state, new_choices, source_of, studies
 from study_app.designer.new_study.new_study import NO_ANSWERS, Answers, answered, template
-from study_app.designer.outline.add_list import addable, fields_to_go_to
-from study_app.designer.outline.outline_rows import outline_rows
+from study_app.designer.outline.outline_rows import addable, fields_to_go_to, outline_rows
 from study_app.designer.participant.feeling import Feeling
 from study_app.designer.participant.preview import ParticipantPreview
-from study_app.designer.place.designer_view import DesignerView, HeaderState, StudyChoice
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.file import file_text
+from study_app.designer.place.header import DesignerView, HeaderState, StudyChoice
 from study_app.designer.place.prompts import DeleteCard, SeriesCard, delete_prompt, series_prompt, series_titles
 from study_app.designer.place.saving import Saving
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
-from study_app.designer.versions.changes import Changes
-from study_app.designer.versions.known_runs import KnownRuns
-from study_app.designer.versions.renaming import Renaming
+from study_app.designer.versions.changes import Changes, KnownRuns, Renaming
 from study_app.errors import StudyError
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import find

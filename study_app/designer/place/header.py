@@ -1,21 +1,200 @@
 """The header of the designer (study, problems, draft, undo, redo, save), and the banner below it."""
 
-from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFocusEvent, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from __future__ import annotations
 
-from study_app.designer.new_study.study_list import StudyList
+from dataclasses import dataclass
+from typing import Final, Literal, TypeAlias
+
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFocusEvent, QFontMetrics, QKeyEvent, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import QSizePolicy, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QWidget
+
+from study_app.designer.form.rows import Form
 from study_app.designer.participant.play import PlayControls, PlayStrip
-from study_app.designer.place.designer_view import Banner, HeaderState
+from study_app.designer.place.file import FileText
+from study_app.designer.problems.problems import ProblemRow
+from study_app.designer.versions.version_rows import VersionChip
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.kit.dialogs import choose_protocol
+from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CARD, Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, chip_size, paint_chip
-from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
+from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import label
+from study_app.number_text import counted
+
+BETWEEN: Final = "  ·  "
+"""What is between the title of a study and its file."""
+BEFORE_ORIGIN: Final = "  ("
+"""What is between its file and where it is from."""
+NO_FILE: Final = FileText()
+NO_VERSION: Final = VersionChip()
+BannerAction: TypeAlias = Literal["copy", "keep", "take", "compare", "discard", "problems", "close"]
+
+
+@dataclass(frozen=True, slots=True)
+class StudyChoice:
+    """A study that can be opened."""
+
+    # what it is called, the name of its file, and what it is opened by
+    title: str
+    file: str
+    source: str
+    # whether it ships with the program, and whether a draft of it was kept that is not saved
+    shipped: bool = False
+    drafted: bool = False
+    original: str = ""  # the name of the study that it is a copy of; "" where it is not known to be one
+
+    @property
+    def words(self) -> str:
+        origin = "shipped" if self.shipped else self.original and f"copy of {self.original}"
+        return f"{self.title}{BETWEEN}{self.file}" + (f"{BEFORE_ORIGIN}{origin})" if origin else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Banner:
+    """One line above the form, with its buttons: what each asks for, and its words.
+
+    ``closes`` says that it needs no answer and can be closed.
+    """
+
+    words: str
+    actions: tuple[tuple[BannerAction, str], ...] = ()
+    closes: bool = False
+
+    @property
+    def only_offers_copy(self) -> bool:
+        """Whether it only says why the study is read-only."""
+        return [action for action, _ in self.actions] == ["copy"]
+
+
+@dataclass(frozen=True, slots=True)
+class HeaderState:
+    """The header."""
+
+    studies: tuple[StudyChoice, ...] = ()  # what can be opened
+    chosen: str = ""  # what is open, by its source; "" where nothing is
+    problems: tuple[Tone, str, str] = ("ok", "check", "No problems")  # tone, icon and words of the chip
+    draft: str = ""  # what is said of the draft, "" where nothing is
+    # what would be undone and redone; "" where nothing is
+    undo: str = ""
+    redo: str = ""
+    can_save: bool = False  # whether the file differs and may be written
+    read_only: bool = False  # whether the study cannot be changed
+    version: VersionChip = NO_VERSION  # the chip of the version, and what the button that saves says
+
+
+@dataclass(frozen=True, slots=True)
+class DesignerView:
+    """What the place shows, but the outline, which follows a moment later; without a form no study is open."""
+
+    header: HeaderState = HeaderState()
+    form: Form | None = None
+    file: FileText = NO_FILE
+    problems: tuple[ProblemRow, ...] = ()
+    banner: Banner | None = None
+
+
+def problems_chip(count: int, warnings: int) -> tuple[Tone, str, str]:
+    """Return tone, icon and words of the chip of problems."""
+    if count:
+        return "bad", "warning", counted(count, "problem")
+    if warnings:
+        return "warn", "warning", counted(warnings, "warning")
+    return "ok", "check", "No problems"
+
+
+MARK_PX = 28
+TITLE_ROLE = Qt.ItemDataRole.UserRole + 1
+"""How many letters of a line are the title."""
+OPENS = {
+    Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Home, Qt.Key.Key_End,
+    Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space, Qt.Key.Key_F4,
+}  # fmt: skip
+Index = QModelIndex | QPersistentModelIndex
+
+
+def cut_title(words: str, length: int, metrics: QFontMetrics, room_px: int) -> str:
+    """Return the first letters of words, the title, as many as leave room for the rest."""
+    rest_px = metrics.horizontalAdvance(words[length:])
+    return metrics.elidedText(words[:length], Qt.TextElideMode.ElideRight, max(0, room_px - rest_px))
+
+
+class StudyLine(QStyledItemDelegate):
+    """A study in the list of all: its file is less prominent than its title, and the open one has a check mark."""
+
+    def __init__(self, studies: StudyList) -> None:
+        super().__init__(studies)
+        self._studies = studies
+
+    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
+        wanted = super().sizeHint(option, index) + QSize(MARK_PX, 0)
+        return QSize(min(wanted.width(), self._studies.window().width() * 2 // 3), wanted.height())
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        """Paint the title, cut where it is too long, what follows it in another ink, and the mark at the right."""
+        shown = QStyleOptionViewItem(option)
+        self.initStyleOption(shown, index)
+        style, words, title = self._studies.style(), index.data(), index.data(TITLE_ROLE)
+        room = style.subElementRect(QStyle.SubElement.SE_ItemViewItemText, shown, self._studies.view())
+        room.setLeft(room.left() + style.pixelMetric(QStyle.PixelMetric.PM_FocusFrameHMargin) + 1)  # as Qt does
+        shown.text = "" if title else words  # type: ignore[attr-defined]  # missing in the stubs
+        style.drawControl(QStyle.ControlElement.CE_ItemViewItem, shown, painter, self._studies.view())
+        if title:
+            painter.setFont(shown.font)  # type: ignore[attr-defined]
+            called = cut_title(words, title, painter.fontMetrics(), room.width() - MARK_PX)
+            for part, ink in ((called, "text"), (words[title:], "text2")):
+                painter.setPen(QColor(getattr(self._studies.theme, ink)))
+                painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, part)
+                room.setLeft(room.left() + painter.fontMetrics().horizontalAdvance(part))
+        if index.row() == self._studies.currentIndex():
+            place = QRectF(option.rect)  # type: ignore[attr-defined]  # missing in the stubs
+            mark = QRectF(place.right() - MARK_PX, place.center().y() - 8, 16, 16)
+            draw_icon(painter, "check", mark, self._studies.theme.accent, 2.2)
+
+
+class StudyList(Choice):
+    """The studies that can be opened; keys open the list, none of them opens another study."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setItemDelegate(StudyLine(self))
+
+    def add_study(self, study: StudyChoice, *, opened: bool) -> None:
+        self.addItem(study.words, study.source)
+        self.setItemData(self.count() - 1, len(study.title), TITLE_ROLE)
+        if opened:
+            self.setItemData(self.count() - 1, f"{study.words}, open", Qt.ItemDataRole.AccessibleTextRole)
+
+    def fitted(self, words: str, room_px: int) -> str:
+        """Return title and file; where there is no room for both, the title alone unless another study has it, too."""
+        shown = super().fitted(words, room_px)
+        if shown == words:
+            return shown
+        length = self.currentData(TITLE_ROLE) or len(words)
+        titles = [self.itemText(at)[: self.itemData(at, TITLE_ROLE)] for at in range(self.count())]
+        if titles.count(title := words[:length]) < 2:
+            return super().fitted(title, room_px)
+        file = words[length:].partition(BEFORE_ORIGIN)[0]
+        return super().fitted(cut_title(title + file, length, self.fontMetrics(), room_px) + file, room_px)
+
+    def showPopup(self) -> None:
+        super().showPopup()
+        if self.currentIndex() < 0:
+            self.view().setCurrentIndex(self.model().index(0, self.modelColumn()))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        shift_or_pad = Qt.KeyboardModifier.KeypadModifier | Qt.KeyboardModifier.ShiftModifier
+        letter = event.text().strip() if event.text().isprintable() else ""
+        if (event.key() in OPENS or letter) and not event.modifiers() & ~shift_or_pad:
+            self.showPopup()
+            if letter:
+                self.view().keyboardSearch(letter)
+        else:
+            event.ignore()
 
 
 class BannerCard(Card):

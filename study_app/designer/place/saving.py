@@ -10,12 +10,11 @@ from study_app.designer.document.document import Document, Standing, check_versi
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.document.toml_text import Refused, free_in
 from study_app.designer.new_study.known_studies import source_of
-from study_app.designer.place.designer_view import Banner, BannerAction
 from study_app.designer.place.editing import Editing
+from study_app.designer.place.header import Banner, BannerAction
 from study_app.designer.place.prompts import DiscardCard
 from study_app.designer.place.view import DesignerPlace
-from study_app.designer.versions.changes import SaveCard, compare, newest, version_of
-from study_app.designer.versions.known_runs import FileWatch, KnownRuns
+from study_app.designer.versions.changes import FileWatch, KnownRuns, SaveCard, compare, newest, version_of
 from study_app.designer.versions.version_rows import FILE, Comparison
 from study_app.errors import StudyError
 from study_app.gui.home.study_facts import time_words

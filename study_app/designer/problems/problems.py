@@ -1,18 +1,28 @@
-"""The problems of a study, as ``check`` prints them, each with its element, field and repairs."""
+"""The problems of a study, as ``check`` prints them, with their repairs: found, listed, and pressed."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QFocusEvent, QMouseEvent, QPaintEvent
+from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
 from study_app.designer.document.additions import Repair, additions_for, repairs
 from study_app.designer.document.elements import FIRST, element_of, kind_and_title, place_words
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.study import Study
 from study_app.designer.outline.outline_rows import icon_of
+from study_app.designer.place.segments import Segments
+from study_app.gui.kit.commands import key_cap, tip
+from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
+from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
+from study_app.gui.widgets.labels import Clamped, Elided, Ink, label
 from study_app.protocol.source.document import Path, names, places_of
 from study_app.protocol.source.problems import Fault
 
@@ -153,3 +163,308 @@ class RepairSearch(QObject):
             self.show(self._waiting.pop(0))
         if self._waiting:
             self._timer.start(0)
+
+
+LONGEST = 20
+"""So many letters of a name a button has room for in a narrow card."""
+
+
+class RepairButton(ActionButton):
+    """Makes a repair of ``problem``; ``by_keys`` says whether a key led to it, not a click."""
+
+    def __init__(self, problem: ProblemRow, words: str) -> None:
+        super().__init__("", words, height=32)
+        self.setProperty("dense", "true")
+        self.setFont(font("label"))
+        self.by_keys = False
+        self.offer(problem, words)
+
+    def offer(self, problem: ProblemRow, words: str) -> None:
+        self.problem = problem
+        self.show_action("", words)
+        self.setAccessibleName(f"{words}: {problem.name}")
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self.by_keys = event.reason() != Qt.FocusReason.MouseFocusReason
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self.by_keys = False
+        super().mousePressEvent(event)
+
+
+class NameRefusal(QWidget):
+    """Why a name is not taken, and a button with one that is free, which ``chosen`` carries."""
+
+    chosen = Signal(str)
+
+    def __init__(self, does: str) -> None:
+        super().__init__()
+        self._does, self._free = does, ""
+        self.words = label("", "label", "bad", wraps=True)
+        self.use = ActionButton("", "", height=32)
+        self.use.setProperty("dense", "true")
+        self.use.setFont(font("label"))
+        self.use.clicked.connect(lambda: self.chosen.emit(self._free))
+        hbox((self.words, 1), self.use, spacing=8, margins=0, parent=self)
+        self.show_refusal("")
+
+    def text(self) -> str:
+        return self.words.text()
+
+    def show_refusal(self, sentence: str, free: str = "") -> None:
+        self._free = free
+        self.words.setText(f"{sentence[:1].upper()}{sentence[1:]}")
+        words = f"{self._does} {free}"
+        self.use.show_action("", words if len(free) <= LONGEST else f"{self._does.split()[0]} it")
+        self.use.setAccessibleName(words)
+        self.use.setVisible(bool(free))
+        self.setVisible(bool(sentence))
+
+
+HIGHEST, NARROW_BELOW = 290, 1000
+HEAD_PX, ROW_PX, NAME_PX, NARROW_NAME_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 47, 300, 240, 190, 110
+
+
+class ProblemLine(Themed, QWidget):
+    """One problem; ``opened`` when it is clicked, ``repair_asked`` with the words of a repair."""
+
+    opened = Signal()
+    repair_asked = Signal(str)
+
+    def __init__(self, row: ProblemRow, repairs: tuple[str, ...], *, narrow: bool) -> None:
+        super().__init__()
+        self.row = row
+        self.here = False
+        self.go = PressedByEnter()
+        self.go.setProperty("role", "plain")
+        self.go.setProperty("dense", "true")
+        self.go.setFont(font("label"))
+        self.go.clicked.connect(self.opened)
+        self.go.setFixedSize(NARROW_NAME_PX if narrow else NAME_PX, 24)
+        self._place = Elided("small", "text2")
+        self._place.setFixedWidth(self.go.width())
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.mark = Icon("warning", "warn" if row.warning else "bad", 18)
+        signs = self.mark, Icon(row.icon, "text2", 18)
+        self.said, self._hint = Clamped(row.message, 2, "label", steady=False), Elided("small", "text2")
+        buttons = QWidget()
+        buttons.setMinimumWidth(NARROW_REPAIR_PX if narrow else REPAIR_PX)
+        self._repairs = hbox(STRETCH, spacing=6, margins=0, parent=buttons)
+        parts = (*signs, _column(self.go, self._place), (_column(self.said, self._hint), 1), buttons)
+        hbox(*parts, spacing=10, margins=(10, 2, 6, 2), parent=self)
+        self.repairs: list[RepairButton] = []
+        self.show_repairs(repairs)
+        self.follow(row)
+
+    def follow(self, row: ProblemRow | None) -> None:
+        """Stand for the same problem of the study as it is now; None: it is solved."""
+        if row is not None:
+            self.row = row
+            self.go.setAccessibleName(f"{row.name}: {row.message}")
+            elided = self.go.fontMetrics().elidedText(row.name, Qt.TextElideMode.ElideRight, self.go.width() - 4)
+            self.go.setText(elided)
+            self._place.show_text(row.place)
+            self.said.show_text(row.message)
+            self._hint.show_text(row.hint)
+            self._hint.setVisible(bool(row.hint))
+            self.setToolTip("\n".join(filter(None, (row.name, row.message, row.hint))))
+            for button in self.repairs:
+                button.offer(row, button.text())
+        self.setEnabled(row is not None)
+        ink: Ink = "ok" if row is None else "warn" if row.warning else "bad"
+        self.mark.show_icon("check" if row is None else "warning", ink)
+
+    def show_repairs(self, repairs: tuple[str, ...]) -> None:
+        for button, words in zip(self.repairs, repairs, strict=False):
+            button.offer(self.row, words)
+        for words in repairs[len(self.repairs) : 2]:
+            made = RepairButton(self.row, words)
+            made.clicked.connect(lambda _checked=False, made=made: self.repair_asked.emit(made.text()))
+            apply_theme_within(made, self.theme)
+            self._repairs.addWidget(made)
+            made.show()  # at once: Tab passes what a layout is still to show
+            self.repairs.append(made)
+
+    def apply_theme(self, theme: Theme) -> None:
+        super().apply_theme(theme)
+        own = f"QPushButton {{ text-align: left; padding: 0; color: {theme.text}; }}"
+        self.go.setStyleSheet(f"{own} QPushButton:disabled {{ color: {theme.text3}; }}")
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.opened.emit()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        if self.here:
+            paint_ground(self, self.theme.selected)
+
+
+def _column(*parts: QWidget) -> QVBoxLayout:
+    """Return lines of text, in the middle of their row."""
+    return vbox(STRETCH, *parts, STRETCH, spacing=0)
+
+
+class ProblemsCard(Card):
+    """Signals: ``opened`` (a `ProblemRow`), ``repair_asked`` (row, words), ``close_asked``."""
+
+    opened = Signal(object)
+    repair_asked = Signal(object, str)
+    close_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=16, gap=8)
+        self.setAccessibleName("Problems")
+        self._problems: tuple[ProblemRow, ...] = ()
+        self._warnings: tuple[ProblemRow, ...] = ()
+        self._moved = False
+        self.lines: list[ProblemLine] = []
+        self._element: object = None
+        self._here_only = False
+        self._listed: tuple[ProblemRow, ...] | None = None
+        self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
+        self.at: ProblemRow | None = None
+        self._number = 0
+        self.heading = label("", "card")
+        self.limit = Segments("Problems of")
+        self.limit.chosen.connect(self._limit)
+        self.next = ActionButton("", "Next", cap=key_cap("next problem"), height=36)
+        self.next.setToolTip(tip("next problem"))
+        self.next.setProperty("dense", "true")
+        self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
+        words = self.heading, label("the same as liquid-study check prints", "small", "text2")
+        top = hbox(*words, STRETCH, self.limit, self.next, self.close_button, spacing=10)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        add_parts(self.column, top, (self.area, 1))
+        self.close_button.clicked.connect(self.close_asked)
+
+    def begin(self) -> None:
+        """Begin with the next problems as if there had been none: in their order, from the first one on."""
+        self._problems = self._warnings = ()
+        self.lines, self._listed, self._moved = [], None, False
+        self.at, self._number = None, 0
+        self.area.verticalScrollBar().setValue(0)
+
+    def show_problems(
+        self, rows: tuple[ProblemRow, ...], element: object, repairs: Mapping[ProblemRow, tuple[str, ...]]
+    ) -> None:
+        self._problems, self._element, self._repairs = rows, element, dict(repairs)
+        self._show()
+
+    def show_warnings(self, rows: tuple[ProblemRow, ...]) -> None:
+        self._warnings = rows
+        self._show()
+
+    @property
+    def rows(self) -> tuple[ProblemRow, ...]:
+        """The problems, then the warnings."""
+        return (*self._problems, *self._warnings)
+
+    def _show(self) -> None:
+        rows = self.rows
+        if self.at is not None:
+            self.at = followed([self.at], rows)[0] or self.at
+        counts = ((len(self._problems), "problem"), (len(self._warnings), "warning"))
+        counted = [f"{count} {word}{'s' * (count != 1)}" for count, word in counts if count]
+        self.heading.setText(", ".join(counted) or "No problems")
+        self.limit.show_values(((False, "All"), (True, "Here only")), self._here_only)
+        self.next.setEnabled(bool(rows))
+        listed = tuple(row for row in rows if not self._here_only or row.element == self._element)
+        wanted = min(HIGHEST, HEAD_PX + (ROW_PX + 1) * max(1, len(listed)))
+        self.setFixedHeight(max(wanted, self.height()) if self.under_pointer else wanted)
+        if listed == self._listed:
+            return
+        self._listed = listed
+        if self.under_pointer and self.lines:
+            self._keep_places(listed)
+            return
+        inside = QWidget()
+        self._column = column = vbox(spacing=0, margins=0, parent=inside)
+        if rows and not listed:
+            column.addWidget(label(f"None in this element, {len(rows)} in others", "label", "text2"))
+        column.addStretch()
+        self.lines = []
+        for row in listed:
+            self._add_line(row)
+        apply_theme_within(inside, self.theme)
+        replace_inside(self.area, inside)
+
+    def _add_line(self, row: ProblemRow) -> None:
+        narrow = (self.parentWidget() or self).width() < NARROW_BELOW
+        made = ProblemLine(row, self._repairs.get(row, ()), narrow=narrow)
+        made.opened.connect(lambda: self.open(made.row))
+        made.repair_asked.connect(lambda words: self.repair_asked.emit(made.row, words))
+        made.here = row == self.at
+        for part in (made, Rule()):
+            apply_theme_within(part, self.theme)
+            self._column.insertWidget(self._column.count() - 1, part)
+        self.lines.append(made)
+
+    def _keep_places(self, listed: tuple[ProblemRow, ...]) -> None:
+        """Leave every line where it is while someone points at one: solved ones are marked, others come last."""
+        self._moved = True
+        known = followed([line.row for line in self.lines], listed)
+        for line, now in zip(self.lines, known, strict=True):
+            line.follow(now)
+        for row in listed:
+            if row not in known:
+                self._add_line(row)
+        inside = self.area.widget()  # at once: a layout that lacks room makes every line lower
+        inside.resize(inside.width(), max(inside.height(), self._column.minimumSize().height()))
+
+    @property
+    def under_pointer(self) -> bool:
+        """Whether the pointer is over the list: it keeps its height then, else a click would hit what is below."""
+        return self.isVisible() and self.underMouse()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        self._show()
+        if self._moved:  # later: Qt says that the pointer leaves where what is under it is replaced, too
+            QTimer.singleShot(0, self, self._order)
+        if not self.rows:
+            self.close_asked.emit()
+
+    def _order(self) -> None:
+        """List the problems in the order of their lines again."""
+        if self._moved and not self.under_pointer:
+            self._moved, self._listed = False, None
+            self._show()
+
+    def show_repairs(self, row: ProblemRow, repairs: tuple[str, ...]) -> None:
+        self._repairs[row] = repairs
+        for line in self.lines:
+            if line.row == row:
+                line.show_repairs(repairs)
+
+    @property
+    def coming(self) -> tuple[ProblemRow, ...]:
+        """Every row from the next one on: where the last one is solved, from the one that took its place."""
+        at = self.rows.index(self.at) + 1 if self.at in self.rows else self._number
+        at %= max(1, len(self.rows))
+        return (*self.rows[at:], *self.rows[:at])
+
+    def repairs_of(self, problem: ProblemRow) -> list[RepairButton]:
+        return [button for line in self.lines for button in line.repairs if line.row == problem]
+
+    def set_current(self, row: ProblemRow) -> None:
+        """Take a problem as the one that one is at; ``coming`` begins after it."""
+        if row in self.rows:
+            self.at, self._number = row, self.rows.index(row)
+
+    def open(self, row: ProblemRow) -> None:
+        self.set_current(row)
+        for line in self.lines:
+            line.here = line.row == row
+            line.update()
+            if line.here:
+                self.area.ensureWidgetVisible(line)
+        self.opened.emit(row)
+
+    def _limit(self, here_only: object) -> None:
+        self._here_only, self._listed = bool(here_only), None
+        self.lines = []
+        self._show()

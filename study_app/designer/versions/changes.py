@@ -1,42 +1,159 @@
-"""The tab Changes: compares the study with a version and restores it; cards that ask before saving or renaming."""
+"""What the open study was run with: the tab Changes, cards that ask before saving, ids with recorded answers."""
 
+import contextlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from datetime import datetime
 from difflib import unified_diff
+from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QColor, QFontDatabase, QSyntaxHighlighter, QTextCharFormat
+from PySide6.QtCore import QFileSystemWatcher, QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QColor, QFontDatabase, QGuiApplication, QSyntaxHighlighter, QTextCharFormat
 from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.designer.document.document import Document, Standing
+from study_app.designer.document.names import references_to
+from study_app.designer.document.steps import RenameElement, Request
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_text import shown
-from study_app.designer.place.arrangement import PanePage
+from study_app.designer.document.toml_text import Comment, comments_naming, shown
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.prompts import Prompt
-from study_app.designer.place.view import DesignerPlace
-from study_app.designer.problems.card import NameRefusal
-from study_app.designer.versions.known_runs import KnownRuns
-from study_app.designer.versions.version_rows import FILE, Comparison, counts, version_choices
+from study_app.designer.place.view import DesignerPlace, PanePage
+from study_app.designer.problems.problems import NameRefusal
+from study_app.designer.versions.version_rows import (
+    FILE,
+    Comparison,
+    VersionChip,
+    counts,
+    version_chip,
+    version_choices,
+)
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.background import delayed
+from study_app.gui.widgets.background import Background, delayed
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
 from study_app.number_text import counted
 from study_app.protocol.differences import differences
+from study_app.protocol.source.document import Path as Place
+from study_app.protocol.source.document import value_at
 from study_app.protocol.source.files import unbundled, with_liquid_files
 from study_app.store.folders import SessionFolder
 from study_app.store.receipt import without_conditions
-from study_app.store.study_runs import Run, run_of, source_of
+from study_app.store.study_runs import Run, keep_what_was_run, recorded_items, run_of, runs, source_of
 from study_app.store.study_versions import content_hash, kept_content, kept_versions
+
+LOOK_MS: Final = 150
+"""A program that writes a file makes several changes; they are one."""
+
+
+class FileWatch(QObject):
+    """``touched`` is emitted when the file or its folder changed, and when the program is in front again.
+
+    A folder on a network may not say that it changes; then the file is looked at when the program is in front again.
+    """
+
+    touched = Signal()
+
+    def __init__(self, editing: Editing) -> None:
+        super().__init__(editing)
+        self.editing = editing
+        self._watcher = QFileSystemWatcher(self)
+        self._resting = delayed(self, LOOK_MS, self._touch)
+        self._watcher.fileChanged.connect(lambda _path: self._resting.start())
+        self._watcher.directoryChanged.connect(lambda _path: self._resting.start())
+        editing.opened_other.connect(self.watch)
+        application = QGuiApplication.instance()
+        if isinstance(application, QGuiApplication):
+            application.applicationStateChanged.connect(self._come_back)
+
+    def watch(self) -> None:
+        """Watch the file of the open study; one that was replaced is another file to the system."""
+        watched = [*self._watcher.files(), *self._watcher.directories()]
+        opened = self.editing.opened
+        file = None if opened is None else opened.file.resolve()
+        wanted = [] if file is None else [str(path) for path in (file, file.parent) if path.exists()]
+        if gone := [path for path in watched if path not in wanted]:
+            self._watcher.removePaths(gone)
+        if missing := [path for path in wanted if path not in watched]:
+            self._watcher.addPaths(missing)
+
+    def _touch(self) -> None:
+        self.watch()
+        self.touched.emit()
+
+    def _come_back(self, state: Qt.ApplicationState) -> None:
+        if state == Qt.ApplicationState.ApplicationActive and self.editing.opened is not None:
+            self._resting.start()
+
+
+class KnownRuns(QObject):
+    """The contents of the open study that sessions were run with; ``changed`` comes when they or the chip change.
+
+    ``items`` counts the sessions of participants by questionnaire and id of the questions that they were asked.
+    """
+
+    changed = Signal()
+
+    def __init__(self, editing: Editing) -> None:
+        super().__init__(editing)
+        self.editing = editing
+        self.known: tuple[Run, ...] = ()
+        self.items: Mapping[tuple[str, str], int] = {}
+        self.chip = VersionChip()
+        self._reader = Background(self)
+        self._reader.done.connect(self._take)
+        self._resting = delayed(self, LOOK_MS, self._stand)
+        editing.opened_other.connect(self._begin)
+        editing.edited.connect(self._resting.start)
+
+    def look(self) -> None:
+        """Read again which sessions there are, without waiting for it."""
+        if (opened := self.editing.opened) is not None:
+            self._reader.run(partial(_read, self.editing.results, opened.name, opened.file))
+
+    def read(self) -> tuple[Run, ...]:
+        """Read at once which sessions there are, as before saving."""
+        if (opened := self.editing.opened) is not None:
+            self.known = runs(self.editing.results, opened.name)
+        return self.known
+
+    def standing(self) -> Standing | None:
+        """Return how the open study stands to what was run."""
+        return None if self.editing.opened is None else self.editing.opened.standing(self.known)
+
+    def _begin(self) -> None:
+        self.known, self.items, self.chip = (), {}, VersionChip()
+        self.look()
+
+    def _take(self, found: tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]) -> None:
+        if self.editing.opened is not None and self.editing.opened.name == found[0]:
+            fresh = found[1:] != (self.known, self.items)
+            _, self.known, self.items = found
+            self._stand()
+            if fresh:
+                self.changed.emit()
+
+    def _stand(self) -> None:
+        standing = self.standing()
+        chip = VersionChip() if standing is None else version_chip(standing, self.known)
+        if chip != self.chip:
+            self.chip = chip
+            self.changed.emit()
+
+
+def _read(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]:
+    found = runs(results, study)
+    with contextlib.suppress(StoreError):  # a draft that cannot be written says so
+        keep_what_was_run(file, found)
+    return study, found, recorded_items(found)
+
 
 NOTHING = "There is no version to compare with: no session was run, and nothing was saved before."
 LETTERS_PX = 12
@@ -405,3 +522,105 @@ class Changes(Card):
         if text is not None:
             self.editing.make(f"Restore {dict(self._choices)[self.chosen]}", text=text)
             self.compare_now()
+
+
+BREAKS: Final = (
+    "answers before and after are in different columns of the tables",
+    "figures and tests take them as two questions",
+    "an analysis that was decided before and names the old id does not find the new one",
+)
+
+
+class Renaming(QObject):
+    """Locks the ids of questions with recorded answers; after a rename counts references, and offers comments.
+
+    It notes a rename before `Editing` makes it: construct it before requests are connected to that.
+    """
+
+    def __init__(self, editing: Editing, place: DesignerPlace, runs: KnownRuns) -> None:
+        super().__init__(editing)
+        self.editing, self.place, self.runs = editing, place, runs
+        self._unlocked: Place = ()
+        self._renamed: tuple[str, int] | None = None
+        self._listed: tuple[Place, str, tuple[Comment, ...]] = ((), "", ())
+        editing.recorded = self._recorded
+        place.asked.connect(self._note)
+        editing.changed.connect(self._lock)
+        editing.edited.connect(self._tell)
+        editing.refused.connect(self._forget)
+        runs.changed.connect(self._lock)
+        place.form.head.unlock_asked.connect(self._explain)
+        place.form.head.comments_asked.connect(self._list_comments)
+
+    def _id(self, path: Place) -> str:
+        """Return the id of an element, "" where it has none."""
+        opened = self.editing.opened
+        value = None if opened is None else value_at(opened.study.document, path)
+        if not isinstance(value, dict):
+            return ""
+        return str(value.get("id", path[-1]))
+
+    def _why(self, path: Place) -> str:
+        """Return why an id is locked, "" where it is not."""
+        if len(path) != 4 or path[2] != "items" or path == self._unlocked:
+            return ""
+        sessions = self.runs.items.get((str(path[1]), self._id(path)), 0)
+        return f"Answers of {counted(sessions, 'session')} are recorded under this id." if sessions else ""
+
+    def _recorded(self, element: Place) -> frozenset[str]:
+        """Return the ids of a question's questionnaire under which answers are recorded."""
+        known = self.runs.items if element[2:3] == ("items",) else ()
+        return frozenset(name for form, name in known if form == element[1])
+
+    def _lock(self) -> None:
+        path = self.editing.selected
+        if path != self._unlocked:
+            self._unlocked = ()
+        if path != self._listed[0]:
+            self._listed = ((), "", ())
+            self.place.form.head.show_comments("")
+            self.place.form.head.show_followed("")
+        self.place.form.head.show_lock(path, self._why(path))
+
+    def _explain(self) -> None:
+        path = self.editing.selected
+        card = UnlockCard(self._id(path), self._why(path), BREAKS)
+        card.answered.connect(lambda _id: self._unlock(path))
+        self.place.show_prompt(card, card.first)
+
+    def _unlock(self, path: Place) -> None:
+        self._unlocked = path
+        self._lock()
+        self.place.form.head.edit_id()
+
+    def _note(self, asked: Request) -> None:
+        self._renamed, opened = None, self.editing.opened
+        if isinstance(asked, RenameElement) and opened is not None:
+            self._renamed = (self._id(asked.path), len(references_to(opened.study.document, asked.path)))
+
+    def _forget(self) -> None:
+        """Forget a rename that was refused: the next step is another one."""
+        self._renamed = None
+
+    def _tell(self) -> None:
+        """Say how many references followed a rename, and which comments mention the old id."""
+        renamed, self._renamed = self._renamed, None
+        opened, head = self.editing.opened, self.place.form.head
+        if renamed is None or opened is None:
+            head.show_followed("")
+            return
+        name, references = renamed
+        head.show_followed(f"{counted(references, 'place')} updated" if references else "")
+        found = comments_naming(opened.study.text, name)
+        if found:
+            self._listed = (self.editing.selected, name, found)
+            head.show_comments(title_of(name, found))
+
+    def _list_comments(self) -> None:
+        card = CommentsCard(*self._listed[1:])
+        card.line_asked.connect(self._go_to)
+        self.place.show_prompt(card, card.first)
+
+    def _go_to(self, line: int) -> None:
+        self.place.show_tab("file")
+        self.place.file.editor.go_to(line - 1)

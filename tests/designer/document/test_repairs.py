@@ -6,8 +6,8 @@ import pytest
 
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.study import Study, read
-from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Set
+from study_app.designer.measures.study_facts import facts
 from study_app.designer.new_study.new_study import template
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load

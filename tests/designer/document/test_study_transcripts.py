@@ -33,7 +33,7 @@ from study_app.designer.document.steps import (
 )
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.outline.add_list import addable
+from study_app.designer.outline.outline_rows import addable
 from study_app.protocol.source.document import Path, entries
 from tests.designer.document.grown import PROTOCOLS
 from tests.golden import compare

@@ -9,18 +9,15 @@ from study_app.designer.document.additions import repairs
 from study_app.designer.document.elements import used_by
 from study_app.designer.document.names import blocks_using
 from study_app.designer.document.study import Study, read
-from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.form.form import form
 from study_app.designer.measures.measures_view import measures_view
-from study_app.designer.measures.observers import Simulated
-from study_app.designer.measures.simulation import Controls
-from study_app.designer.measures.valid_part import restored_part
+from study_app.designer.measures.simulation import Controls, Simulated
+from study_app.designer.measures.study_facts import facts, restored_part
 from study_app.designer.new_study.new_study import template
 from study_app.designer.new_study.templates import FOLDER
 from study_app.designer.outline.outline_rows import outline_rows
-from study_app.designer.participant.playable import NotPlayableError, playable
-from study_app.designer.participant.shown_step import showing
+from study_app.designer.participant.playable import NotPlayableError, playable, showing
 from study_app.designer.problems.problems import problem_rows
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.files import shipped_file

@@ -10,12 +10,13 @@ from study_app.designer.document.additions import additions_for, repairs
 from study_app.designer.document.elements import brief, found_fields, outline, position_of, used_by
 from study_app.designer.document.steps import MakeSeries
 from study_app.designer.document.study import Study, read
-from study_app.designer.document.study_facts import facts
 from study_app.designer.form.form import form
 from study_app.designer.measures.measures_page import clipped_sentence
 from study_app.designer.measures.measures_view import MeasuresView, measures_view
-from study_app.designer.measures.observers import (
+from study_app.designer.measures.plots import forces_sentence, function_sentence, track_sentence
+from study_app.designer.measures.simulation import (
     Asked,
+    Controls,
     Detectable,
     Finding,
     GroupPrecision,
@@ -24,10 +25,8 @@ from study_app.designer.measures.observers import (
     Planted,
     Simulated,
 )
-from study_app.designer.measures.plots import forces_sentence, function_sentence, track_sentence
-from study_app.designer.measures.simulation import Controls
-from study_app.designer.outline.add_list import addable, fields_to_go_to
-from study_app.designer.outline.outline_rows import outline_rows
+from study_app.designer.measures.study_facts import facts
+from study_app.designer.outline.outline_rows import addable, fields_to_go_to, outline_rows
 from study_app.designer.place.file import file_text
 from study_app.designer.place.prompts import series_prompt, series_titles
 from study_app.designer.problems.problems import problem_rows

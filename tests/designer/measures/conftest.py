@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.measures.observers import (
+from study_app.designer.measures.simulation import (
     Asked,
     Detectable,
     Finding,
@@ -12,8 +12,8 @@ from study_app.designer.measures.observers import (
     Measurable,
     Observed,
     Simulated,
+    Simulation,
 )
-from study_app.designer.measures.simulation import Simulation
 from study_app.protocol.checks.expected_precision import threshold_plan
 
 QUANTILES = (0.1, 0.15, 0.2, 0.25, 0.3)

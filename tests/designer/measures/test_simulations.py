@@ -15,8 +15,8 @@ from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.measures_controller import ANEW, _pages
 from study_app.designer.measures.measures_view import FAILED
-from study_app.designer.measures.observers import ENOUGH
 from study_app.designer.measures.simulation import (
+    ENOUGH,
     THRESHOLD_STUDIES,
     Controls,
     Focus,

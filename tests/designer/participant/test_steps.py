@@ -4,12 +4,13 @@ import pytest
 
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Edit, Set, Unset
-from study_app.designer.measures.valid_part import restored_part
-from study_app.designer.participant.playable import NotPlayableError, playable
-from study_app.designer.participant.shown_step import (
+from study_app.designer.measures.study_facts import restored_part
+from study_app.designer.participant.playable import (
     STANDALONE,
+    NotPlayableError,
     StepPosition,
     first_step,
+    playable,
     same_step,
     showing,
     step_name,

@@ -17,7 +17,7 @@ from study_app.app.failures import Patience
 from study_app.app.session import playing
 from study_app.app.session.bridge import SessionBridge
 from study_app.designer.new_study.new_study import template
-from study_app.designer.participant.shown_step import StepPosition
+from study_app.designer.participant.playable import StepPosition
 from study_app.errors import DeviceLost
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow

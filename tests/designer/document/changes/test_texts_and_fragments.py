@@ -7,10 +7,9 @@ import pytest
 from study_app.designer.document.changes import filled_in, followed, moved, texts_of, with_language
 from study_app.designer.document.fragments import copied, pasted
 from study_app.designer.document.study import Study, read
-from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.measures.participant_texts import copied_texts, missing_texts
+from study_app.designer.measures.study_facts import copied_texts, facts, missing_texts
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import entries
 from tests.designer.document.grown import PROTOCOLS, texts

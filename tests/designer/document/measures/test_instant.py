@@ -3,11 +3,16 @@
 import pytest
 
 from study_app.designer.document.study import Study, read
-from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.measures.observers import balance_of
-from study_app.designer.measures.participant_texts import copied_texts, revealing, text_keys, texts_by_language
-from study_app.designer.measures.valid_part import valid_part
+from study_app.designer.measures.simulation import balance_of
+from study_app.designer.measures.study_facts import (
+    copied_texts,
+    facts,
+    revealing,
+    text_keys,
+    texts_by_language,
+    valid_part,
+)
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.protocol.load import load
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s

@@ -9,9 +9,8 @@ import pytest
 from study_app.analysis.planning.threshold_studies import Case, study_batch
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.measures import observers
-from study_app.designer.measures.observers import measurable, observe
-from study_app.designer.measures.simulation import focus_of
+from study_app.designer.measures import simulation
+from study_app.designer.measures.simulation import focus_of, measurable, observe
 from study_app.designer.new_study.new_study import template
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
 from study_app.protocol.source.files import shipped_file
@@ -54,7 +53,7 @@ def test_planted_observers_are_found_as_precisely_as_check_expects() -> None:
 
 
 def test_observers_show_the_same_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(observers, "OBSERVERS", 200)
+    monkeypatch.setattr(simulation, "OBSERVERS", 200)
     found = observe(plan_of(4), 0.2, 0.02)
     assert found is not None
     assert (found.observers, found.trials) == (200, 4)

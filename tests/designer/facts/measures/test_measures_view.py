@@ -3,14 +3,13 @@
 import pytest
 
 from study_app.designer.document.study import Study, read
-from study_app.designer.document.study_facts import facts
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.measures.cards import UNKNOWN, Figures, Line, Lines, MeasureCard
 from study_app.designer.measures.levels import AS_ASKED
 from study_app.designer.measures.measures_page import clipped_sentence
 from study_app.designer.measures.measures_view import MeasuresView, measures_view
-from study_app.designer.measures.observers import GroupPrecision, Measurable, Observed, Simulated
-from study_app.designer.measures.simulation import Controls
+from study_app.designer.measures.simulation import Controls, GroupPrecision, Measurable, Observed, Simulated
+from study_app.designer.measures.study_facts import facts
 from study_app.designer.new_study.new_study import template
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.files import shipped_file

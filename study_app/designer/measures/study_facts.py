@@ -1,0 +1,341 @@
+"""What is known of a study, even of a faulty one: its texts by language, its valid part, and facts of that."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, lru_cache
+from typing import Any, Final
+
+from study_app.designer.document.additions import is_unknown_name
+from study_app.designer.document.changes import is_copied, languages_of, texts_of
+from study_app.designer.document.elements import title_of
+from study_app.designer.document.fields import alternatives, initial, is_localised, label_of
+from study_app.designer.document.names import named_at
+from study_app.designer.document.study import Study, with_value, without_value
+from study_app.designer.document.toml_text import Refused
+from study_app.haptics.model.slope_limits import HAND_MPS, steady
+from study_app.number_text import counted
+from study_app.protocol.checks.warnings import warnings
+from study_app.protocol.load import examined
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
+from study_app.protocol.source.document import Path, entries, has, value_at
+from study_app.protocol.source.json_schema import schema
+from study_app.protocol.source.problems import Fault
+from study_app.protocol.wording.languages import language_name
+from study_app.store.verification.leaks import Telltales
+from study_app.store.workstation import device_without_force
+
+SHORTEST: Final = 3
+"""Letters of an id that does not stand in a text by chance."""
+READ: Final = ("pages", "blocks", "tasks", "designs")
+"""Sections whose texts are read before the last answer; statements may name what is compared, as all see the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class Revealing:
+    """A text that reveals a condition: its key, the element's title, and the word that reveals it."""
+
+    path: Path
+    element: str
+    key: str
+    word: str
+
+
+def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
+    """Return for each language how many texts it has, and how many it should have."""
+    languages = languages_of(study)
+    counted = {code: [0, 0] for code in languages}
+    for _, value in texts_of(study):
+        for place, code in enumerate(languages):
+            counted[code][1] += 1
+            text = value.get(code) if isinstance(value, Mapping) else value if place == 0 else ""
+            counted[code][0] += bool(text.strip() if isinstance(text, str) else text)
+    return {code: (there, wanted) for code, (there, wanted) in counted.items()}
+
+
+def missing_texts(study: Study) -> dict[str, int]:
+    """Return how many texts each language lacks; none where it lacks none."""
+    return {code: wanted - there for code, (there, wanted) in texts_by_language(study).items() if there < wanted}
+
+
+def copied_texts(study: Study) -> dict[str, int]:
+    """Return for each further language how many of its texts are those of the first one, or of a new question."""
+    first, *others = languages_of(study)
+    texts = [value for _, value in texts_of(study) if isinstance(value, Mapping)]
+    counted = {code: sum(is_copied(value, code, first) for value in texts) for code in others}
+    return {code: count for code, count in counted.items() if count}
+
+
+def own_texts(study: Study, counts: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
+    """Return for each language how many of its texts, of `texts_by_language`, are not copied, and how many it needs."""
+    copied = copied_texts(study)
+    return {code: (there - copied.get(code, 0), wanted) for code, (there, wanted) in counts.items()}
+
+
+def to_translate(study: Study) -> tuple[str, ...]:
+    """Return a warning for each language with copied texts; they prevent no session."""
+    first = language_name(languages_of(study)[0])
+    return tuple(
+        f"study.languages: {counted(count, 'text')} to translate to {language_name(code)}, as in {first} so far"
+        for code, count in copied_texts(study).items()
+    )
+
+
+def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
+    """Return the texts that name a liquid, a condition or a delay which participants must not know."""
+    words = Telltales(_words(protocol))
+    debriefs = {name for name, page in protocol.pages.items() if page.kind == "debrief"}
+    found = []
+    for path, value in _texts(study.document):
+        if path[0] not in READ or (path[0] == "pages" and path[1] in debriefs):
+            continue
+        texts = value.values() if isinstance(value, Mapping) else (value,)
+        words_there = [word for text in texts if isinstance(text, str) for word in words.in_text(text.casefold())]
+        if words_there:
+            element = title_of(study.document, path[:2])
+            found.append(Revealing(path, element, label_of(path[-1]), words_there[0]))
+    return tuple(found)
+
+
+def _words(protocol: Protocol) -> set[str]:
+    """Return the names of what main blocks compare, and their delays with the unit."""
+    found: set[str] = set()
+    for block in protocol.main_blocks:
+        names = protocol.conditions_in(block.id)
+        if len(names) < 2 and block.stimulus is None:
+            continue
+        for name in names:
+            condition = protocol.conditions[name]
+            ids = {name, *condition.liquid_ids}
+            found |= {one.replace("_", " ").casefold() for one in ids if len(one) >= SHORTEST}
+            if condition.delay_ms:
+                found.add(f"{condition.delay_ms:g} ms")
+    return found
+
+
+def _texts(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+    """Yield every text of the study that is in its languages, with its place."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            place = (*path, key)
+            texts = inner.values() if isinstance(inner, Mapping) else (inner,)
+            if key in text_keys() and len(path) > 0 and all(isinstance(one, str) for one in texts):
+                yield place, inner
+            else:
+                yield from _texts(inner, place)
+    elif isinstance(value, tuple):
+        for at, inner in enumerate(value):
+            yield from _texts(inner, (*path, at))
+
+
+@cache
+def text_keys() -> frozenset[str]:
+    """Return the keys that have a text for each language, of every model of the grammar."""
+    models = [schema(), *schema()["$defs"].values()]
+    properties = (pair for model in models for pair in model.get("properties", {}).items())
+    return frozenset(key for key, node in properties if is_localised(tuple(alternatives(node))))
+
+
+ROUNDS: Final = 8
+"""Leaving one element out may break those that name it: so often the rest is examined again."""
+_PART: Final = re.compile(r"must be (\d+) at its place in sequence")
+TEXT: Final = "…"
+_STAND_IN: Final = {
+    ("study", "version"): "1", ("study", "name"): "study", ("study", "title"): TEXT,
+    ("device", "workspace_mm"): (1000, 1000, 1000),
+}  # fmt: skip
+_LEFT_OUT: Final = (("analysis",), ("limits",))
+"""Tables that no session needs."""
+_OF_FORCES: Final = (("device",), ("scene",))
+"""Tables on which every force depends, and no sum over the session."""
+_APART: Final = (*_LEFT_OUT, *_OF_FORCES)
+_MARK: Final = "\u034f"
+"""The combining grapheme joiner: nothing is seen of it, and texts with it are not taken as alike."""
+
+
+@dataclass(frozen=True, slots=True)
+class ValidPart:
+    """The study without its broken elements, None where everything depends on what is broken.
+
+    It is ``whole`` where no element was left out, so that sums over the session are known; ``forces`` are known where
+    no value of device and scene was left out.
+    """
+
+    protocol: Protocol | None
+    whole: bool
+    forces: bool = True
+
+
+@lru_cache(maxsize=2)
+def valid_part(study: Study) -> ValidPart:
+    """Return what can be measured of a study."""
+    return restored_part(study, {})
+
+
+def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
+    """Return what can be measured or shown of a study: a faulty value is the one of the document ``before``, if any."""
+    if study.formed is not None or not (study.is_toml or before):
+        return ValidPart(study.formed, whole=study.formed is not None)
+    document: Any = study.document
+    faults: list[Fault] = list(study.faults) if study.is_toml else examined(document)[1]
+    whole = forces = True
+    for number in range(ROUNDS):
+        for fault in sorted(faults, key=_place, reverse=True):
+            place, value = _restored(document, fault, before) or _mended(document, fault, of_others=number > 0)
+            known = value is not None or fault.message == "unknown key" or place[:1] in _APART
+            if not place:
+                place, value = fault.path[:2], _initial(document, fault.path[:2])
+                if value is None:
+                    return ValidPart(None, whole=False)
+            if value_at(document, place) is None and value is None:
+                continue  # another fault of the same element left it out
+            whole = whole and known
+            forces = forces and (fault.message == "unknown key" or fault.path[:1] not in _OF_FORCES)
+            document = without_value(document, place) if value is None else with_value(document, place, value)
+        protocol, faults = examined(document)
+        if protocol is not None:
+            return ValidPart(protocol, whole, forces)
+    return ValidPart(None, whole=False)
+
+
+def _restored(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[Path, Any] | None:
+    """Return the place to change because of a fault, and the value that it had before; None where it had none."""
+    if not before or fault.missing_language:
+        return None
+    path, value = fault.path, value_at(document, fault.path)
+    sound = value_at(before, _path_before(document, path, before))
+    if fault.in_one_language and isinstance(value, str):
+        return path, dict.fromkeys((str(code) for _, code in entries(document, "study.languages.*")), value)
+    if fault.reads_alike:  # each place gets its number of marks: the text looks the same and reads as no other
+        marks = _MARK * (1 + max((step for step in path if isinstance(step, int)), default=0))
+        texts = value.items() if isinstance(value, Mapping) else ()
+        return path, {code: f"{one}{marks}" for code, one in texts} or f"{value}{marks}"
+    named = named_at(before, path) if is_unknown_name(fault) and sound == value else None
+    if named is not None and value_at(document, named[:1]) is not None:
+        return named, value_at(before, named)
+    return (path, sound) if sound is not None and sound != value else None
+
+
+def _path_before(document: Any, path: Path, before: Any) -> Path:
+    """Return where an element of a document was before: a question is found by its id, not by its number."""
+    found: list[str | int] = []
+    for step in path:
+        document = document[step] if has(document, step) else None
+        name = document.get("id") if isinstance(document, Mapping) and path[-1] != "id" else None
+        if isinstance(step, int) and name is not None:
+            entries_before = before if isinstance(before, list | tuple) else ()
+            same = (at for at, one in enumerate(entries_before) if isinstance(one, Mapping) and one.get("id") == name)
+            step = next(same, len(entries_before))  # noqa: PLW2901 - the step of the other document
+        found.append(step)
+        before = before[step] if has(before, step) else None
+    return tuple(found)
+
+
+def _place(fault: Fault) -> tuple[str, ...]:
+    """Return a key by which later entries of a list come after earlier ones."""
+    return tuple(f"{step:06}" if isinstance(step, int) else step for step in fault.path)
+
+
+def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]:
+    """Return the place to change because of a fault, and its value (None leaves it out); () where nothing helps.
+
+    A key that is wrong only because another element was left out (``of_others``) is left out before its own element.
+    """
+    path = fault.path
+    if (missing := fault.missing_language) and path and path[-1] != missing:
+        known = value_at(document, path)
+        others = known.values() if isinstance(known, Mapping) else ()
+        return (*path, missing), next(iter(others), TEXT)
+    if fault.message == "unknown key":
+        return path, None
+    if (part := _PART.search(fault.message)) is not None:
+        return path, int(part[1])
+    named = 0 if path[:1] == ("study",) else 1  # the name of an element may be that of a text
+    for length in range(len(path), 1 + named, -1):
+        if path[length - 1] in text_keys():
+            return path[:length], _text(document)
+    if path[:2] in _STAND_IN:
+        return path[:2], _STAND_IN[path[0], path[1]]  # type: ignore[index]
+    if path[:1] == ("questionnaires",) and path[2:3] == ("items",) and len(path) > 3:
+        return (path[:5], f"item_{path[3]}") if path[4:] == ("id",) else (path[:4], None)
+    if path[:1] == ("scales",) and path[2:3] == ("labels",) and len(path) == 4:
+        labels = value_at(document, path[:3])
+        by_language = labels.items() if isinstance(labels, Mapping) else ()
+        return path, next((own for code, own in by_language if code != path[3]), None)
+    if path[:1] in _LEFT_OUT:
+        return path[:1], None
+    if path[:1] in _OF_FORCES:
+        return path[:2], None if value_at(document, path[:2]) is not None else _initial(document, path[:2])
+    listed = len(path) > 1 and isinstance(path[-1], int) and isinstance(value_at(document, path), str)
+    if listed:
+        return path, None
+    if of_others and len(path) > 2 and value_at(document, path[:3]) is not None:
+        return path[:3], None
+    return (path[:2], None) if len(path) > 1 and isinstance(value_at(document, path[:2]), Mapping) else ((), None)
+
+
+def _initial(document: Any, path: Path) -> Any:
+    """Return a valid value for a key; None where there is none."""
+    try:
+        return initial(document, path) if path else None
+    except Refused:
+        return None
+
+
+def _text(document: Any) -> Any:
+    codes = [str(code) for _, code in entries(document, "study.languages.*")]
+    return dict.fromkeys(codes, TEXT) if len(codes) > 1 else TEXT
+
+
+MOST_PARTICIPANTS: Final = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a study is, in numbers: those that depend on a broken element are not known."""
+
+    expected_s: float | None = None  # how long a session will take [s]
+    range_s: tuple[float, float] | None = None  # how long the shortest and the longest session will take [s]
+    # how long each page, form and block will take [s], by its id
+    steps_s: dict[str, float] = field(default_factory=dict)
+    # how many a complete session has at most, practice included
+    trials: int | None = None
+    answers: int | None = None
+    breaks: int | None = None
+    forces_n: dict[str, float] = field(default_factory=dict)  # force of each liquid [N] against a hand at 0.1 m/s
+    # how many texts each language lacks; none where it lacks none
+    missing: dict[str, int] = field(default_factory=dict)
+    # the warnings of ``check``, but those that take simulated observers, and what is to be translated
+    warnings: tuple[str, ...] = ()
+
+
+@lru_cache(maxsize=2)
+def facts(study: Study) -> Facts:
+    """Return the facts of a study."""
+    missing, translate = missing_texts(study), to_translate(study)
+    valid = valid_part(study)
+    if (protocol := valid.protocol) is None:
+        return Facts(missing=missing, warnings=translate)
+    language = protocol.study.languages[0]
+    known = Facts(
+        steps_s={step: step_duration_s(protocol, step, language) for step in protocol.steps},
+        missing=missing,
+        warnings=translate,
+    )
+    if valid.forces:
+        forces_n = {name: steady(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids}
+        warned = warnings(protocol, simulates=False, without_force=device_without_force())
+        known = replace(known, forces_n=forces_n, warnings=(*warned, *translate))
+    if not valid.whole:
+        return known
+    orders = orders_of(protocol)
+    return replace(
+        known,
+        expected_s=expected_duration_s(protocol),
+        range_s=duration_range_s(protocol),
+        trials=sum(block.trials for block in orders.blocks),
+        answers=orders.answers,
+        breaks=sum(block.breaks for block in orders.blocks),
+    )
