@@ -185,7 +185,7 @@ def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], li
     faults: list[Fault] = []
     for name in named:
         table, alone = liquids[name], ("belongs into the liquid file", "give file alone")
-        faults += [Fault(("liquids", name, key), *alone) for key in table if key != "file"]
+        faults += [Fault(("liquids", name, key), *alone, kind="surplus") for key in table if key != "file"]
         try:
             resolved[name] = _liquid_of_file(table["file"], texts)
         except _LiquidFileFault as fault:

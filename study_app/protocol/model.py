@@ -177,7 +177,7 @@ class PageText(Table):
     @model_validator(mode="after")
     def _only_breaks_last(self) -> Self:
         if self.min_s is not None and self.kind != "break":
-            raise invalid(f"belongs to a page of kind break, not {self.kind}", "min_s")
+            raise invalid(f"belongs to a page of kind break, not {self.kind}", "min_s", kind="surplus")
         return self
 
 

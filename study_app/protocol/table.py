@@ -118,12 +118,14 @@ NOT_WITH: Final = "not with"
 """Where it keeps `Table.NOT_WITH`, for forms."""
 
 
-def invalid(message: str, key: str = "", hint: str = "", use: tuple[str, Any] | None = None) -> PydanticCustomError:
+def invalid(
+    message: str, key: str = "", hint: str = "", use: tuple[str, Any] | None = None, kind: str = ""
+) -> PydanticCustomError:
     """Return the error of a table that is not valid: a sentence, the key that it is about, and what to do.
 
-    ``use`` is a key of the table with a value that repairs it.
+    ``use`` is a key of the table with a value that repairs it, ``kind`` that of the `Fault`.
     """
-    stated = {"message": message, "place": key, "hint": hint, "use": use}
+    stated = {"message": message, "place": key, "hint": hint, "use": use, "kind": kind}
     return PydanticCustomError("invalid", "{message}", {name: one for name, one in stated.items() if one})
 
 

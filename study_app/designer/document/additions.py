@@ -1,7 +1,7 @@
 """New elements with all that ``check`` requires, copies and series of them, and repairs of faults."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -41,8 +41,8 @@ class Repair:
 
 
 def repairs(study: Study, fault: Fault) -> tuple[Repair, ...]:
-    """Return the repairs of a fault: after each of them it is gone."""
-    offered = (repair for kind in _KINDS for repair in kind(study, fault))
+    """Return the repairs of a fault, by its kind: after each of them it is gone."""
+    offered = (*_levels(study, fault), *_stated(study, fault), *_by_kind(study, fault))
     return (*(repair for repair in offered if removes(study, fault, repair)), *_every_text(study, fault))
 
 
@@ -63,54 +63,39 @@ def _stated(study: Study, fault: Fault) -> Iterator[Repair]:
         return
     path, value = fault.use
     now = value_at(study.document, path)
-    if fault.message == "unknown key":
+    if fault.kind == "unknown key":
         yield Repair(f'Use "{value}"', (Rename(path, value),))
-    elif path != fault.path:
+        return
+    if isinstance(now, int | float) and isinstance(value, int | float) and now < 0 < value and path == fault.path:
+        value = -now
+    words = f"Use {shown(value)}"
+    if path != fault.path:
         words = f"Move to {value:g} mm" if isinstance(path[-1], int) else f"Use {path[-1]} = {shown(value)}"
-        yield Repair(words, (Set(path, value),))
-    elif isinstance(now, int | float) and isinstance(value, int | float) and now < 0 < value:
-        yield Repair(f"Use {shown(-now)}", (Set(path, -now),))
-    else:
-        yield Repair(f"Use {shown(value)}", (Set(path, value),))
+    yield Repair(words, (Set(path, value),))
 
 
-def is_unknown_name(fault: Fault) -> bool:
-    """Return whether a text names something that is not in the study."""
-    return fault.message.startswith("there is no ")
-
-
-def _missing(study: Study, fault: Fault) -> Iterator[Repair]:
-    if fault.message == "is missing" and fault.path:
-        with suppress(Refused):
-            yield Repair("Add it", (Set(fault.path, initial(study.document, fault.path)),))
-
-
-def _surplus(study: Study, fault: Fault) -> Iterator[Repair]:
-    message = fault.message
-    if message == "unknown key" or message.endswith("is listed twice") or "belong" in message:
-        yield Repair("Remove", (Unset(fault.path),))
-    if message == "is not a language of the study":
-        yield Repair("Remove this text", (Unset(fault.path),))
-
-
-def _quoted_numbers(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the number that a text holds where a number must be."""
-    text = value_at(study.document, fault.path)
-    number = number_of(text) if isinstance(text, str) and "number" in fault.message else None
-    if number is not None:
-        yield Repair(f"Use {shown(number)} as a number", (Set(fault.path, number),))
-
-
-def _texts(study: Study, fault: Fault) -> Iterator[Repair]:
+def _by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
+    """Yield what follows from the kind of a fault."""
+    path, value = fault.path, value_at(study.document, fault.path)
     languages = value_at(study.document, ("study", "languages"))
-    text = value_at(study.document, fault.path)
-    if (lacking := fault.missing_language) and isinstance(text, Mapping) and text:
-        first = next(iter(text))
+    sequence = value_at(study.document, ("sequence",))
+    if fault.kind == "missing" and path:
+        with suppress(Refused):
+            yield Repair("Add it", (Set(path, initial(study.document, path)),))
+    elif fault.kind in {"surplus", "unknown key"}:
+        yield Repair("Remove", (Unset(path),))
+    elif fault.kind == "other language":
+        yield Repair("Remove this text", (Unset(path),))
+    elif fault.kind == "not a number" and isinstance(value, str) and (number := number_of(value)) is not None:
+        yield Repair(f"Use {shown(number)} as a number", (Set(path, number),))
+    elif fault.kind == "one language" and isinstance(value, str) and languages:
+        yield Repair("Use this text in every language", (Set(path, dict.fromkeys(languages, value)),))
+    elif fault.kind == "not in sequence" and isinstance(sequence, tuple):
+        yield Repair("Add to the session", (Insert(("sequence", max(len(sequence) - 1, 0)), path[-1]),))
+    elif (lacking := fault.missing_language) and isinstance(value, Mapping) and value:
+        first = next(iter(value))
         words = f"Copy {language_name(first)} to {language_name(lacking)}"
-        yield Repair(words, (Set((*fault.path, lacking), text[first]),))
-    elif fault.in_one_language and isinstance(text, str) and languages:
-        copies = dict.fromkeys(languages, text)
-        yield Repair("Use this text in every language", (Set(fault.path, copies),))
+        yield Repair(words, (Set((*path, lacking), value[first]),))
 
 
 def _every_text(study: Study, fault: Fault) -> Iterator[Repair]:
@@ -119,13 +104,6 @@ def _every_text(study: Study, fault: Fault) -> Iterator[Repair]:
     edits = filled_in(study, lacking) if lacking else ()
     if lacking and len(edits) > 1 and any(edit.path[: len(fault.path)] == fault.path for edit in edits):
         yield Repair(f"Copy all {len(edits)} to {language_name(lacking)}", edits)
-
-
-def _steps(study: Study, fault: Fault) -> Iterator[Repair]:
-    sequence = value_at(study.document, ("sequence",))
-    if fault.message == "comes nowhere in sequence" and isinstance(sequence, tuple):
-        at = max(len(sequence) - 1, 0)
-        yield Repair("Add to the session", (Insert(("sequence", at), fault.path[-1]),))
 
 
 def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
@@ -189,13 +167,7 @@ def _exponent(value: float, digits: int) -> int:
     return int(f"{value:e}".split("e")[1]) - digits + 1
 
 
-_KINDS: Final[tuple[Callable[[Study, Fault], Iterator[Repair]], ...]] = (
-    _stated, _quoted_numbers, _levels, _texts, _steps, _missing, _surplus,
-)  # fmt: skip
-
-
 _ROUNDS: Final = 12
-_KNOWN: Final = re.compile(r"known: (.+)")
 
 
 def added(
@@ -244,8 +216,8 @@ def added(
                 _put(value, inner, made[-1])
             else:
                 _put(value, inner, initial(after.document, fault.path))
-        elif inner and (known := _KNOWN.match(fault.hint)):
-            for word in known[1].split(", "):
+        elif inner and fault.permitted:
+            for word in fault.permitted:
                 _put(value, inner, word)
                 if fault.path not in {one.path for one in study.edited(first, *others)[0].faults}:
                     break
@@ -257,7 +229,7 @@ def added(
 def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
     """Return the repairs of a reference to a missing element: each adds an element of that name."""
     name = value_at(study.document, fault.path)
-    if not is_unknown_name(fault) or not isinstance(name, str):
+    if fault.kind != "unknown name" or not isinstance(name, str):
         return ()
     found: list[Repair] = []
     for section in sections_at(fault.path):

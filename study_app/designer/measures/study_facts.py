@@ -1,12 +1,10 @@
 """What is known of a study, even of a faulty one: its texts by language, its valid part, and facts of that."""
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from typing import Any, Final
 
-from study_app.designer.document.additions import is_unknown_name
 from study_app.designer.document.changes import is_copied, languages_of, texts_of
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import alternatives, initial, is_localised, label_of
@@ -140,7 +138,6 @@ def text_keys() -> frozenset[str]:
 
 ROUNDS: Final = 8
 """Leaving one element out may break those that name it: so often the rest is examined again."""
-_PART: Final = re.compile(r"must be (\d+) at its place in sequence")
 TEXT: Final = "…"
 _STAND_IN: Final = {
     ("study", "version"): "1", ("study", "name"): "study", ("study", "title"): TEXT,
@@ -184,7 +181,7 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
     for number in range(ROUNDS):
         for fault in sorted(faults, key=_place, reverse=True):
             place, value = _restored(document, fault, before) or _mended(document, fault, of_others=number > 0)
-            known = value is not None or fault.message == "unknown key" or place[:1] in _APART
+            known = value is not None or fault.kind == "unknown key" or place[:1] in _APART
             if not place:
                 place, value = fault.path[:2], _initial(document, fault.path[:2])
                 if value is None:
@@ -192,7 +189,7 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
             if value_at(document, place) is None and value is None:
                 continue  # another fault of the same element left it out
             whole = whole and known
-            forces = forces and (fault.message == "unknown key" or fault.path[:1] not in _OF_FORCES)
+            forces = forces and (fault.kind == "unknown key" or fault.path[:1] not in _OF_FORCES)
             document = without_value(document, place) if value is None else with_value(document, place, value)
         protocol, faults = examined(document)
         if protocol is not None:
@@ -206,13 +203,13 @@ def _restored(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[P
         return None
     path, value = fault.path, value_at(document, fault.path)
     sound = value_at(before, _path_before(document, path, before))
-    if fault.in_one_language and isinstance(value, str):
+    if fault.kind == "one language" and isinstance(value, str):
         return path, dict.fromkeys((str(code) for _, code in entries(document, "study.languages.*")), value)
-    if fault.reads_alike:  # each place gets its number of marks: the text looks the same and reads as no other
+    if fault.kind == "alike":  # each place gets its number of marks: the text looks the same and reads as no other
         marks = _MARK * (1 + max((step for step in path if isinstance(step, int)), default=0))
         texts = value.items() if isinstance(value, Mapping) else ()
         return path, {code: f"{one}{marks}" for code, one in texts} or f"{value}{marks}"
-    named = named_at(before, path) if is_unknown_name(fault) and sound == value else None
+    named = named_at(before, path) if fault.kind == "unknown name" and sound == value else None
     if named is not None and value_at(document, named[:1]) is not None:
         return named, value_at(before, named)
     return (path, sound) if sound is not None and sound != value else None
@@ -248,10 +245,10 @@ def _mended(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]
         known = value_at(document, path)
         others = known.values() if isinstance(known, Mapping) else ()
         return (*path, missing), next(iter(others), TEXT)
-    if fault.message == "unknown key":
+    if fault.kind == "unknown key":
         return path, None
-    if (part := _PART.search(fault.message)) is not None:
-        return path, int(part[1])
+    if fault.kind == "part" and fault.use is not None:
+        return fault.use
     named = 0 if path[:1] == ("study",) else 1  # the name of an element may be that of a text
     for length in range(len(path), 1 + named, -1):
         if path[length - 1] in text_keys():

@@ -306,7 +306,7 @@ def _filled_texts(study: Study, language: str) -> Iterator[Edit]:
         lacking = fault.missing_language
         if lacking and lacking != language and isinstance(text, Mapping) and text:
             yield Set((*fault.path, lacking), text.get(language) or next(iter(text.values())))
-        elif fault.in_one_language and isinstance(text, str):
+        elif fault.kind == "one language" and isinstance(text, str):
             languages = [str(one) for _, one in entries(study.document, "study.languages.*")]
             yield Set(fault.path, dict.fromkeys(languages, text))
 

@@ -677,14 +677,14 @@ class ParticipantPreview(Card):
             return "This page is in no session." if found.session == STANDALONE else ""
         title = title_of(study.document, self._selected)
         own = [fault for fault in faults if fault.path[: len(self._selected)] == self._selected]
-        lacks = [fault for fault in faults if fault.missing_language or fault.in_one_language]
+        lacks = [fault for fault in faults if fault.missing_language or fault.kind == "one language"]
         if own and self._protocol is not None:
             if not self._holds(self._protocol, study):
                 return f"{title} cannot be shown: {own[0].message}"
             if own[0] in lacks:
                 return f"{title} has no {language_name(self._language)} text; the text of another language is shown."
             value = "an initial value" if self._valid is None else "the last valid value"
-            value = "the text as it is written" if own[0].reads_alike else value
+            value = "the text as it is written" if own[0].kind == "alike" else value
             return f"{title} has a problem ({own[0].message}): {value} is shown."
         if len(lacks) == count:
             return f"{counted(count, 'text')} missing in {language_name(self._language)}: shown in another language."

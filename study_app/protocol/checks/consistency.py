@@ -245,7 +245,7 @@ def counted_parts(parts: Draft) -> Iterator[Fault]:
         if part not in {latest, latest + 1}:
             expected, path = f"{latest} or {latest + 1}" if latest else "1", ("blocks", name, "part")
             message = f"is {part}, must be {expected} at its place in sequence"
-            yield Fault(path, message, use=(path, latest or 1))
+            yield Fault(path, message, use=(path, latest or 1), kind="part")
         latest = max(latest, part)
 
 

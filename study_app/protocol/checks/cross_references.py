@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from study_app.protocol.groups import SEQUENCES, sequences_in
 from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries, names, value_at
-from study_app.protocol.source.problems import ALIKE, ONE_LANGUAGE, Fault, did_you_mean, unknown
+from study_app.protocol.source.problems import Fault, did_you_mean, unknown
 from study_app.protocol.wording.languages import LANGUAGES, missing_text
 
 REFERENCES = {
@@ -94,7 +94,7 @@ def _unknown(path: Path, name: Any, kind: str, known: Collection[str]) -> Iterat
 def _twice(listed: Sequence[tuple[Path, Any]]) -> Iterator[Fault]:
     for at, (path, name) in enumerate(listed):
         if name in [earlier for _, earlier in listed[:at]]:
-            yield Fault(path, f'"{name}" is listed twice', "remove one")
+            yield Fault(path, f'"{name}" is listed twice', "remove one", kind="surplus")
 
 
 def references(document: Document) -> Iterator[Fault]:
@@ -116,7 +116,8 @@ def sequence(document: Document) -> Iterator[Fault]:
         if name in blocks:
             yield Fault(("blocks", name), "a page has this name too", apart)
     if not document.keys() & {"sequence", "sequences", "groups"}:
-        yield Fault(("sequence",), "is missing", "list the pages and blocks of a session in their order")
+        hint = "list the pages and blocks of a session in their order"
+        yield Fault(("sequence",), "is missing", hint, kind="missing")
     breaks = [page for _, page in entries(document, "blocks.*.break_page")]
     used: set[str] = set()
     for place, steps in sequences_in(document):
@@ -139,7 +140,7 @@ def sequence(document: Document) -> Iterator[Fault]:
     unused += [("blocks", name) for name in blocks if "groups" not in document]
     for place in unused if used else ():
         if place[1] not in used:
-            yield Fault(place, "comes nowhere in sequence", "add it there, or take it out")
+            yield Fault(place, "comes nowhere in sequence", "add it there, or take it out", kind="not in sequence")
 
 
 def repeats(document: Document) -> Iterator[Fault]:
@@ -187,7 +188,8 @@ def _alike(found: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
         texts = entry if isinstance(entry, Mapping) else {"": entry}
         read = {(language, _as_read(text)) for language, text in texts.items() if isinstance(text, str)}
         if read & seen:
-            yield Fault(path, f"{ALIKE} {kind} does", "people could not tell the two apart: change one")
+            hint = "people could not tell the two apart: change one"
+            yield Fault(path, f"reads as an earlier {kind} does", hint, kind="alike")
         seen |= read
 
 
@@ -206,20 +208,23 @@ def languages(document: Document) -> Iterator[Fault]:
     written = [(path, name) for path, name in entries(document, "study.languages.*") if isinstance(name, str)]
     for path, name in written:
         if name not in LANGUAGES:
-            yield Fault(path, f'the program has no words in "{name}"', f"known: {', '.join(LANGUAGES)}")
+            known = f"known: {', '.join(LANGUAGES)}"
+            yield Fault(path, f'the program has no words in "{name}"', known, permitted=tuple(LANGUAGES))
     wanted = tuple(name for _, name in written)
     texts = (found for pattern in TEXTS for found in entries(document, pattern)) if wanted else ()
     for path, text in texts:
         if isinstance(text, str) and len(wanted) > 1:
             listed = ", ".join(f'{language} = "…"' for language in wanted)
-            yield Fault(path, ONE_LANGUAGE, f"write {{ {listed} }}")
+            message = "is in one language, the study in several"
+            yield Fault(path, message, f"write {{ {listed} }}", kind="one language")
         elif isinstance(text, Mapping):
             for language in wanted:
                 if language not in text:
                     yield missing_text(path, language)
             for language in text:
                 if language not in wanted:
-                    yield Fault((*path, language), "is not a language of the study", f"these are: {', '.join(wanted)}")
+                    hint = f"these are: {', '.join(wanted)}"
+                    yield Fault((*path, language), "is not a language of the study", hint, kind="other language")
 
 
 OWN = ("sequence", "sequences")
@@ -283,7 +288,7 @@ def questions(document: Document) -> Iterator[Fault]:
         if any(isinstance(item, Statement) for item in items):
             if "scale" not in table:
                 message = "statements are rated on it; other items have a kind"
-                yield Fault((*path, "scale"), "is missing", message)
+                yield Fault((*path, "scale"), "is missing", message, kind="missing")
             elif (scale := scales.get(str(table["scale"]))) is not None and scale.points != POINTS:
                 message = f"has {scale.points} points, and statements need {POINTS}"
                 hint = f'write kind = "rating" and scale = "{table["scale"]}" in the items'
@@ -314,7 +319,7 @@ def _show_ifs(table: Document, items: Sequence[tuple[Path, Question]], context: 
             place = (*path, "show_if")
             if rule.item not in ids:
                 missing = f'there is no item "{rule.item}" in this questionnaire'
-                yield Fault(place, missing, did_you_mean(rule.item, earlier))
+                yield Fault(place, missing, did_you_mean(rule.item, earlier), kind="unknown name")
             elif rule.item not in earlier:
                 yield Fault(place, f'"{rule.item}" comes later', "name an earlier item")
             elif table.get("item_order", "fixed") != "fixed":

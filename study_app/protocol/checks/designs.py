@@ -182,7 +182,8 @@ def _varied(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault
         else:
             if not can_vary(stimulus.vary):
                 message = f"{stimulus.vary} does not belong to a liquid: it holds for the whole session"
-                yield Fault((*place, "vary"), message, f"a number of the liquid, or {', '.join(OF_CONDITION)}")
+                hint = f"a number of the liquid, or {', '.join(OF_CONDITION)}"
+                yield Fault((*place, "vary"), message, hint, kind="surplus")
 
 
 def _levels(protocol: Protocol, block: Block) -> Iterator[Fault]:

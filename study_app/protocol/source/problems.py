@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -17,15 +17,21 @@ from study_app.protocol.source.document import Path, Places, has
 Schema = Mapping[str, Any]
 
 
-ONE_LANGUAGE: Final = "is in one language, the study in several"
-ALIKE: Final = "reads as an earlier"
+FaultKind: TypeAlias = Literal[
+    "", "missing", "unknown key", "unknown name", "surplus", "other language", "one language", "alike", "not a number",
+    "not in sequence", "part",
+]  # fmt: skip
+"""What is wrong, where a repair follows from it: "surplus" does not belong there, "other language" is a text in one
+that the study lacks, "one language" a plain text in a study of several, "alike" a text that repeats another one, "part"
+the number of a part of the session; "" is anything else."""
 
 
 class Fault(NamedTuple):
     """A problem before its line is known; indices in ``path`` count from 0.
 
     ``missing_language`` is the code of the language that a text lacks, "" where another thing is wrong. ``use`` is a
-    place and the value that may repair the fault there, for an unknown key the key that was meant.
+    place and the value that may repair the fault there, for an unknown key the key that was meant; ``permitted`` are
+    the words for one that is none of them, and near none.
     """
 
     path: Path
@@ -34,20 +40,12 @@ class Fault(NamedTuple):
     counts_entries: bool = False
     missing_language: str = ""
     use: tuple[Path, Any] | None = None
-
-    @property
-    def in_one_language(self) -> bool:
-        """Whether it is a plain text in a study of several languages."""
-        return self.message == ONE_LANGUAGE
-
-    @property
-    def reads_alike(self) -> bool:
-        """Whether it is a text that repeats another one."""
-        return self.message.startswith(ALIKE)
+    kind: FaultKind = ""
+    permitted: tuple[str, ...] = ()
 
     def concerns(self, language: str, first: str) -> bool:
         """Return whether it is seen where texts are shown in a language; ``first`` is that of plain texts."""
-        return self.missing_language in ("", language) and not (self.in_one_language and language == first)
+        return self.missing_language in ("", language) and not (self.kind == "one language" and language == first)
 
     def located(self, places: Places) -> Problem:
         """Return the problem with its line; in the place that people read, entries count from 1."""
@@ -118,7 +116,9 @@ def unknown(path: Path, message: str, word: str, permitted: Iterable[str], cutof
     """Return the fault of a word that names nothing: with the nearest permitted one, or the list of them."""
     words = sorted(permitted)
     nearest = difflib.get_close_matches(word, words, n=1, cutoff=cutoff)
-    return Fault(path, message, did_you_mean(word, words), use=(path, nearest[0]) if nearest else None)
+    near = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
+    use, others = (path, nearest[0]) if nearest else None, () if near else tuple(words)
+    return Fault(path, message, did_you_mean(word, words), use=use, kind="unknown name", permitted=others)
 
 
 def _quoted(path: Path, value: Any, message: str, permitted: str) -> Fault:
@@ -145,14 +145,17 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         path = (*path, context["place"])
     if kind == "missing":
         last = path[-1]
-        return Fault(path, f"entry {last + 1} is missing" if isinstance(last, int) else "is missing")
+        if isinstance(last, int):
+            return Fault(path, f"entry {last + 1} is missing")
+        return Fault(path, "is missing", kind="missing")
     if kind == "extra_forbidden":
         permitted = {key for node in _nodes_at(document, path[:-1], schema) for key in node.get("properties", {})}
         hint = did_you_mean(str(path[-1]), permitted)
         meant = difflib.get_close_matches(str(path[-1]), sorted(permitted), n=1)
-        return Fault(path, "unknown key", hint, use=(path, meant[0]) if meant else None)
+        return Fault(path, "unknown key", hint, use=(path, meant[0]) if meant else None, kind="unknown key")
     if kind == "union_tag_not_found":
-        return Fault((*path, _tag_key(context)), "is missing", f"one of {context.get('expected_tags', '')}".strip())
+        tags = f"one of {context.get('expected_tags', '')}".strip()
+        return Fault((*path, _tag_key(context)), "is missing", tags, kind="missing")
     if kind == "union_tag_invalid":
         tag, tags = context["tag"], str(context["expected_tags"]).replace("'", '"')
         return _quoted((*path, _tag_key(context)), tag, f'"{tag}" is not one of {tags}', tags)
@@ -168,7 +171,8 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         sentence = f"is {shown(value)}, must be {words} {shown(bound)}"
         return Fault(path, sentence, next(filter(None, hints), ""), use=(path, bound) if key in {"ge", "le"} else None)
     if kind in _KINDS:
-        return Fault(path, f"must be {_KINDS[kind]}, not {shown(value)}")
+        number: FaultKind = "not a number" if "number" in _KINDS[kind] else ""
+        return Fault(path, f"must be {_KINDS[kind]}, not {shown(value)}", kind=number)
     if kind == "string_pattern_mismatch":
         return Fault(path, f"{shown(value)} is not permitted: {rule_of(str(context['pattern']))}")
     if kind in _LENGTHS:
@@ -176,7 +180,8 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         return Fault(path, _LENGTHS[kind].format(**about), counts_entries=kind == "too_short")
     use = context.get("use")
     sentence = details["msg"].removeprefix("Value error, ")
-    return Fault(path, sentence, context.get("hint", ""), use=(((*path[:-1], use[0]), use[1]) if use else None))
+    repair = ((*path[:-1], use[0]), use[1]) if use else None
+    return Fault(path, sentence, context.get("hint", ""), use=repair, kind=context.get("kind", ""))
 
 
 def _tag_key(context: Mapping[str, Any]) -> str:
