@@ -132,8 +132,10 @@ def test_tab_goes_through_the_questions_to_the_button_that_makes_the_study(qtbot
         for part in expected:
             assert designer.keyboard is part
             qtbot.keyClick(part, Qt.Key.Key_Tab)
-        designer.key("Backtab")
-        assert designer.keyboard is page.make
+        page.make.setFocus()
+        for part in reversed(expected[:-1]):
+            designer.key("Backtab")
+            assert designer.keyboard is part
 
 
 def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
