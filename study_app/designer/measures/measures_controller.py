@@ -46,7 +46,6 @@ ANEW: Final = "simulating …"
 IDLE_MS: Final = 20
 REST_MS: Final = 800
 LOOK_MS: Final = 100
-KEPT: Final = 50
 FIT_REST_MS: Final = 600
 KEPT_PAGES: Final = 60
 MOST_PARTICIPANTS: Final = 500
@@ -66,9 +65,8 @@ class MeasuresController(QObject):
         self._client: MeasureClient | None = None
         self._ordered = 0
         self._wanted: Simulation | None = None
-        self._found, self._failed = Simulated(), ""
-        self._answers: OrderedDict[Simulation, Simulated] = OrderedDict()
-        self._of_block: dict[str, Simulated] = {}
+        self._failed = ""
+        self._answers: dict[Simulation, Simulated] = {}
         self.rest = delayed(self, REST_MS, self._order)
         self._look = QTimer(self)
         self._look.setInterval(LOOK_MS)
@@ -147,7 +145,7 @@ class MeasuresController(QObject):
         kept = None if opened is None else kept_participants(opened.file)
         self._participants = None if kept is None else _permitted(kept)
         self._lapses, self._sound = LAPSES, None
-        self._thresholds, self._of_block, self._repairs = {}, {}, {}
+        self._thresholds, self._answers, self._repairs = {}, {}, {}
         self._idle.start()
 
     def _controls(self, study: Study, protocol: Protocol | None, focus: Focus) -> Controls:
@@ -170,7 +168,7 @@ class MeasuresController(QObject):
         """Want this from now on; what is under way for another element or study is given up."""
         if wanted == self._wanted:
             return
-        self._wanted, self._found, self._failed = wanted, Simulated(), ""
+        self._wanted, self._failed = wanted, ""
         self.rest.stop()
         if self._look.isActive():
             self._look.stop()
@@ -203,20 +201,10 @@ class MeasuresController(QObject):
         for number, answer in self._client.answers():
             if number != self._ordered:
                 continue
-            if isinstance(answer, Simulated):
-                self._found = answer
-                known = self._of_block.get(wanted.block, Simulated())
-                parts = ("observed", "group", "measurable", "detectable")
-                newer = {part: value for part in parts if (value := getattr(answer, part)) is not None}
-                self._of_block[wanted.block] = replace(known, **newer)
-                self._idle.start()
-                continue
             self._look.stop()
-            if answer is None:
-                self._answers[wanted] = self._of_block[wanted.block] = self._found
-                if len(self._answers) > KEPT:
-                    self._answers.popitem(last=False)
-                self._warn(self._found.warnings)
+            if isinstance(answer, Simulated):
+                self._answers[wanted] = answer
+                self._warn(answer.warnings)
                 self._idle.start()
             elif isinstance(answer, Crashed) or not answer.stopped:
                 self._fail(answer.sentence)
@@ -232,15 +220,16 @@ class MeasuresController(QObject):
             self.warned.emit()
 
     def _simulated(self) -> Simulated:
-        """Return what is known of what is wanted; before that, what was known of the block."""
+        """Return what is known of what is wanted; before that, what was known of the block last."""
         wanted = self._wanted
         if wanted is None:
             return Simulated()
         if (known := self._answers.get(wanted)) is not None:
             return known
         if self._failed:
-            return replace(self._found, warnings=self.warnings, failed=self._failed)
-        return replace(self._of_block.get(wanted.block, Simulated()), warnings=self.warnings, waiting=ANEW)
+            return Simulated(warnings=self.warnings, failed=self._failed)
+        of_block = (one for key, one in reversed(self._answers.items()) if key.block == wanted.block)
+        return replace(next(of_block, Simulated()), warnings=self.warnings, waiting=ANEW)
 
     def _close(self) -> None:
         self.rest.stop()

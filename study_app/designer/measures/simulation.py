@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
@@ -154,7 +154,7 @@ class Detectable:
 
 @dataclass(frozen=True, slots=True)
 class Simulated:
-    """What was simulated of an element, each part None until it was answered for the first time.
+    """What was simulated of an element, None what nothing simulates.
 
     ``waiting`` is said of numbers that are of an earlier study while others are simulated, ``failed`` why they cannot
     be; both are "" otherwise. ``warnings`` are those of ``check`` that take simulated observers.
@@ -425,7 +425,7 @@ def _without_texts(value: Any) -> Any:
     return [_without_texts(inner) for inner in value] if isinstance(value, list) else value
 
 
-MeasureClient: TypeAlias = WorkerClient[Simulation, Simulated | None]
+MeasureClient: TypeAlias = WorkerClient[Simulation, Simulated]
 
 
 def start_measure_worker() -> MeasureClient:
@@ -433,37 +433,28 @@ def start_measure_worker() -> MeasureClient:
     return WorkerClient("study_app.designer.measures.simulation:carry_out", name="measures", background=True)
 
 
-def carry_out(order: Simulation, send: Send, stop: Stop) -> None:
-    """Answer with what is known so far, each time a part of it was simulated, the quickest first.
-
-    Raises Stopped if another order came, or the client is gone.
-    """
+def carry_out(order: Simulation, _send: Send, stop: Stop) -> Simulated:
+    """Return what is simulated; raises Stopped if another order came, or the client is gone."""
 
     def check() -> None:
         if stop():
             raise Stopped("the study was edited")
 
-    for found in _parts(order, check):
-        send(found)
-
-
-def _parts(order: Simulation, check: Check) -> Iterator[Simulated]:
     protocol, controls, found = order.protocol, order.controls, Simulated()
     focus = focus_of(protocol, ("blocks", order.block))
     if (plan := focus.plan) is not None and focus.block is not None:
-        found = replace(found, observed=observe(plan, controls.threshold, controls.lapses, check))
-        yield found
-        found = replace(found, group=_group(plan, controls, check))
-        yield found
         clips = plan.clipping or clipping(protocol, focus.block)
         most = math.inf if clips is None else clips.highest(plan.stimulus)
-        found = replace(found, measurable=measurable(plan, controls.lapses, least_of(protocol, plan), check, most))
-        yield found
+        found = Simulated(
+            observe(plan, controls.threshold, controls.lapses, check),
+            measurable(plan, controls.lapses, least_of(protocol, plan), check, most),
+            _group(plan, controls, check),
+        )
     if focus.compares:
         found = replace(found, detectable=_detectable(order, check))
-        yield found
     if advises(protocol):
-        yield replace(found, warnings=_warnings(replace(order, block="", controls=Controls())))
+        found = replace(found, warnings=_warnings(replace(order, block="", controls=Controls())))
+    return found
 
 
 @lru_cache(maxsize=1)

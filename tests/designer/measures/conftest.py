@@ -42,12 +42,9 @@ class Worker:
         given, self.given = self.given, []
         return given
 
-    def answer(self, *, ends: bool = True) -> None:
+    def answer(self) -> None:
         """Answer what was wanted last."""
-        number = len(self.orders)
-        self.given.append((number, answer_to(self.orders[-1])))
-        if ends:
-            self.given.append((number, None))
+        self.given.append((len(self.orders), answer_to(self.orders[-1])))
 
 
 def answer_to(wanted: Simulation) -> Simulated:
