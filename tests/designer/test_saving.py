@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
 from study_app.designer.document.steps import ChangeLanguage, SetText, SetValue
-from study_app.designer.place.header import BannerCard
+from study_app.designer.participant.play import NoticeCard
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.drafts import Draft, draft_of, keep
@@ -47,7 +47,7 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What the banner has a screen reader say."""
     found: list[str] = []
     monkeypatch.setattr(
-        "study_app.designer.place.header.say", lambda by, words: isinstance(by, BannerCard) and found.append(words)
+        "study_app.designer.participant.play.say", lambda by, words: isinstance(by, NoticeCard) and found.append(words)
     )
     return found
 
@@ -114,7 +114,7 @@ def test_a_deleted_file_is_written_anew_where_mine_is_kept(drafted: Any) -> None
     drafted.file.unlink()
     drafted.controller.enter()
     assert drafted.place.banner_words.text() == "Another program deleted or moved this file"
-    drafted.place.banner.buttons[0].click()
+    next(iter(drafted.place.banner.buttons.values())).click()
     assert not drafted.place.banner.isVisible()
     drafted.saving.save()
     assert drafted.file.read_text() == drafted.text
@@ -147,7 +147,7 @@ def test_saving_says_that_the_study_cannot_be_run_until_it_is_edited(drafted: An
     assert drafted.place.banner_words.text() == words
     assert drafted.place.banner.isVisible()
     assert said == [words]
-    drafted.place.banner.buttons[0].click()
+    next(iter(drafted.place.banner.buttons.values())).click()
     assert drafted.place.problems.isVisible()
     drafted.editing.select(("device",))
     assert drafted.place.banner.isVisible()
@@ -191,7 +191,7 @@ def test_a_line_that_is_answered_by_a_key_gives_the_keyboard_back(designer: Any,
     designer.open("kitchen", *TITLE[:2])
     banner, field = designer.place.banner, next(iter(designer.field(*TITLE).lines.values()))
     field.setFocus()
-    pressed = banner.close_button if button == "close" else banner.buttons[0]
+    pressed = banner.close_button if button == "close" else next(iter(banner.buttons.values()))
     pressed.setFocus(Qt.FocusReason.TabFocusReason)
     qtbot.keyClick(pressed, Qt.Key.Key_Space)
     assert not banner.isVisible()
@@ -210,12 +210,12 @@ def never_saved(designer: Any) -> Any:
 def test_a_study_that_was_never_saved_is_discarded_once_that_is_confirmed(never_saved: Any) -> None:
     place, file = never_saved.place, never_saved.file.with_name("mine.toml")
     assert place.banner_words.text().endswith(", never saved")
-    place.banner.buttons[0].click()
+    next(iter(place.banner.buttons.values())).click()
     assert "cannot be undone" in " ".join(one.text() for one in place.prompt.findChildren(QLabel))
     assert place.prompt.cancel.hasFocus()
     place.prompt.cancel.click()
     assert draft_of(file) is not None
-    place.banner.buttons[0].click()
+    next(iter(place.banner.buttons.values())).click()
     place.prompt.go_on.click()
     assert draft_of(file) is None
     assert never_saved.editing.opened is None
@@ -232,7 +232,7 @@ def test_a_study_that_was_never_saved_is_discarded_once_that_is_confirmed(never_
 
 
 def test_a_study_stays_open_where_its_draft_cannot_be_deleted(never_saved: Any, stuck: pytest.MonkeyPatch) -> None:
-    never_saved.place.banner.buttons[0].click()
+    next(iter(never_saved.place.banner.buttons.values())).click()
     never_saved.place.prompt.go_on.click()
     assert [title for title, _ in never_saved.messages] == ["The draft was not discarded"]
     assert never_saved.editing.opened.name == "mine"

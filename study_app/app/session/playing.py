@@ -22,7 +22,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.app.failures import Patience
 from study_app.app.session.live_session import BUG, LiveSession
 from study_app.designer.participant import play as shown
-from study_app.designer.participant.play import PlayDevices, PlayState
+from study_app.designer.participant.play import Notice, PlayDevices
 from study_app.designer.participant.playable import NotPlayableError, Playable, StepPosition, playable
 from study_app.designer.place.controller import DesignerController
 from study_app.designer.problems.problems import problem_rows
@@ -314,8 +314,8 @@ class Playing(QObject):
 
     # what is shown
 
-    def _show(self, state: PlayState | None) -> None:
-        self.place.header.strip.show_state(state)
+    def _show(self, state: Notice | None) -> None:
+        self.place.header.strip.show_notice(state)
         self.place.header.play.show_playing(self.under_way)
 
     def _show_devices(self) -> None:

@@ -1,15 +1,14 @@
-"""Playing a study from the designer: what is said and asked, the header's controls, and the line below the header."""
+"""A line below the header with what is said and asked, of the study or of playing it, and the controls that play."""
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QActionGroup, QKeyEvent
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QActionGroup, QColor, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QMenu, QWidget
 
 from study_app.designer.measures.cards import INKS
 from study_app.gui.kit.commands import key_cap, keys_of, tip
-from study_app.gui.theme.theme import Tone, font
+from study_app.gui.theme.theme import RADIUS_CARD, Tone, font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
@@ -17,20 +16,116 @@ from study_app.gui.widgets.cards import SHADOW, Card, Icon
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import label
 
-PlayAction: TypeAlias = Literal["play", "stop", "keep", "delete", "problems", "close"]
-
-KEEP: tuple[tuple[PlayAction, str], ...] = (("keep", "Keep as pilot"), ("delete", "Delete"))
+KEEP = (("keep", "Keep as pilot"), ("delete", "Delete"))
+ROLES = {"play": "primary", "copy": "primary", "stop": "danger", "delete": "danger"}
+ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
 
 
 @dataclass(frozen=True, slots=True)
-class PlayState:
-    """A line with its buttons: what each asks for, and its words; ``listed`` are lines below it."""
+class Notice:
+    """A line with its buttons: what each asks for, and its words; ``listed`` are lines below it.
 
-    tone: Tone
-    icon: str
+    ``closes`` says that it needs no answer and can be closed.
+    """
+
     words: str
-    actions: tuple[tuple[PlayAction, str], ...] = ()
+    actions: tuple[tuple[str, str], ...] = ()
+    tone: Tone = "accent"
+    icon: str = "info"
     listed: tuple[str, ...] = ()
+    closes: bool = False
+
+    @property
+    def only_offers_copy(self) -> bool:
+        """Whether it only says why the study is read-only."""
+        return [action for action, _ in self.actions] == ["copy"]
+
+
+class NoticeCard(Card):
+    """Draws a `Notice`: that of the study is tinted, that of playing gives its first button the keyboard.
+
+    Signals: ``asked`` (the action of a button, "close" of the one that closes it), ``changed`` (whether there is one),
+    ``left`` before it is hidden while it has the keyboard.
+    """
+
+    asked = Signal(str)
+    changed = Signal(bool)
+    left = Signal()
+
+    def __init__(self, *, of_playing: bool) -> None:
+        super().__init__(padding=10, gap=6)
+        self._of_playing, self._other = of_playing, False
+        self.notice: Notice | None = None
+        self.buttons: dict[str, ActionButton] = {}
+        self._lines: list[QWidget] = []
+        self.icon, self.words = Icon("info", "accent", 20), label("", "body" if of_playing else "label", wraps=True)
+        self.close_button = IconButton("cross", "Close this line", "Close (Esc)", size=36, role="plain")
+        self.close_button.clicked.connect(lambda: self.asked.emit("close"))
+        self._buttons = hbox(spacing=10)
+        self._listed = vbox(spacing=2, margins=(30 + SHADOW, 0, 0, 0))
+        across = hbox(self.icon, (self.words, 1), self._buttons, self.close_button, spacing=10)
+        add_parts(self.column, across, self._listed)
+        self.hide()
+
+    def show_notice(self, notice: Notice | None) -> None:
+        """Show another line, None for none."""
+        if notice == self.notice:
+            return
+        self.notice = notice
+        self.make_room(other=self._other)
+        for part in (*self.buttons.values(), *self._lines):
+            remove_widget(part)
+        self.buttons, self._lines = {}, []
+        self.changed.emit(notice is not None)
+        self.close_button.setVisible(notice is not None and notice.closes)
+        self.words.setText("" if notice is None else notice.words)
+        if notice is None:
+            return
+        self.setAccessibleDescription(notice.words)
+        say(self, notice.words)
+        self.icon.show_icon(notice.icon, INKS[notice.tone])
+        self._lines = [label(line, "label", "text2", wraps=True) for line in notice.listed]
+        add_parts(self._listed, *self._lines)
+        for action, words in notice.actions:
+            icon, cap = ICONS.get(action, "") if self._of_playing else "", key_cap("stop") if action == "stop" else ""
+            made = ActionButton(icon, words, cap=cap, role=ROLES.get(action, ""), height=36)
+            made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
+            self._buttons.addWidget(made)
+            made.show()  # at once: a part that is not shown cannot take the keyboard
+            self.buttons[action] = made
+        apply_theme_within(self, self.theme)
+        if self._of_playing and self.buttons:
+            next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
+
+    def make_room(self, *, other: bool) -> None:
+        """Hide what needs no answer while another line is shown (``other``)."""
+        self._other = other
+        shown = self.notice is not None and not (other and self.notice.only_offers_copy)
+        if not shown and self.isAncestorOf(self.window().focusWidget()):
+            self.left.emit()  # else Qt hands the keyboard to the next part
+        self.setVisible(shown)
+
+    def close_by_key(self) -> bool:
+        """Close a line that can be closed; return whether there was one."""
+        closes = self.isVisible() and self.notice is not None and (self.notice.closes or "close" in self.buttons)
+        if closes:
+            self.asked.emit("close")
+        return closes
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() != Qt.Key.Key_Escape or not (self._of_playing and self.close_by_key()):
+            super().keyPressEvent(event)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        if self._of_playing:
+            super().paintEvent(event)
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QColor(self.theme.accent))
+        painter.setBrush(QColor(self.theme.selected))
+        body = QRectF(self.rect()).adjusted(SHADOW, SHADOW - 1, -SHADOW, -SHADOW - 1).adjusted(0.5, 0.5, -0.5, -0.5)
+        painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,35 +140,35 @@ class PlayDevices:
         return dict(self.choices).get(self.chosen, "")
 
 
-def asks_for_device(title: str, step: str, *, has_force: bool) -> PlayState:
+def asks_for_device(title: str, step: str, *, has_force: bool) -> Notice:
     """Return the question before a device other than the scripted hand is used."""
     force = "The force fades in when a trial begins; hold" if has_force else "It has no force. Hold"
     words = f"Play from {step}, with the device {title}? {force} Esc to stop."
-    return PlayState("warn", "device", words, (("play", "Play"), ("close", "Cancel")))
+    return Notice(words, (("play", "Play"), ("close", "Cancel")), "warn", "device")
 
 
-def refuses(problems: tuple[str, ...], most: int = 6) -> PlayState:
+def refuses(problems: tuple[str, ...], most: int = 6) -> Notice:
     """Return why the study cannot be played from here."""
     more = (f"and {len(problems) - most} more",) if len(problems) > most else ()
     words = "The study cannot be played from here: correct these problems first"
-    return PlayState("bad", "warning", words, (("problems", "Show problems"), ("close", "Close")),
-                     (*problems[:most], *more))  # fmt: skip
+    actions = (("problems", "Show problems"), ("close", "Close"))
+    return Notice(words, actions, "bad", "warning", (*problems[:most], *more))
 
 
-def under_way(step: str, title: str) -> PlayState:
+def under_way(step: str, title: str) -> Notice:
     """Return what is said while a pilot is played."""
     words = f"Playing from {step}, with the device {title}. Hold Esc to stop."
-    return PlayState("ok", "play", words, (("stop", "Stop"),))
+    return Notice(words, (("stop", "Stop"),), "ok", "play")
 
 
-def ended(step: str, how: str) -> PlayState:
+def ended(step: str, how: str) -> Notice:
     """Return the question after a pilot was played: whether its data are kept."""
-    return PlayState("neutral", "flag", f"Played from {step}: {how}. Its data are deleted unless you keep them.", KEEP)
+    return Notice(f"Played from {step}: {how}. Its data are deleted unless you keep them.", KEEP, "neutral", "flag")
 
 
-def kept(folder: str) -> PlayState:
+def kept(folder: str) -> Notice:
     """Return where a pilot was kept."""
-    return PlayState("ok", "check", f"Kept as a pilot in {folder}.", (("close", "Close"),))
+    return Notice(f"Kept as a pilot in {folder}.", (("close", "Close"),), "ok", "check")
 
 
 PLAY, PLAY_NARROW = "Play from here", "Play"
@@ -117,67 +212,3 @@ class PlayControls(QWidget):
 
     def show_wide(self, wide: bool) -> None:
         self.play.show_action("play", PLAY if wide else PLAY_NARROW)
-
-
-ROLES = {"play": "primary", "stop": "danger", "delete": "danger"}
-ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
-
-
-class PlayStrip(Card):
-    """Signals: ``asked`` (action), ``changed`` (whether there is one), ``left`` (it closes and had the keyboard)."""
-
-    asked = Signal(str)
-    changed = Signal(bool)
-    left = Signal()
-
-    def __init__(self) -> None:
-        super().__init__(padding=10, gap=6)
-        self.setAccessibleName("Playing")
-        self.state: PlayState | None = None
-        self.icon = Icon("play")
-        self.words = label("", "body", wraps=True)
-        self.buttons: dict[str, ActionButton] = {}
-        self._lines: list[QWidget] = []
-        self._row = hbox(self.icon, (self.words, 1), spacing=10)
-        self._listed = vbox(spacing=2, margins=(30 + SHADOW, 0, 0, 0))
-        add_parts(self.column, self._row, self._listed)
-        self.hide()
-
-    def show_state(self, state: PlayState | None) -> None:
-        """Show another state, None for nothing; the first button takes the keyboard."""
-        if state == self.state:
-            return
-        self.state = state
-        focused = self.window().focusWidget()
-        had_focus = focused is not None and self.isAncestorOf(focused)
-        for part in (*self.buttons.values(), *self._lines):
-            remove_widget(part)
-        self.buttons, self._lines = {}, []
-        self.setVisible(state is not None)
-        self.changed.emit(state is not None)
-        if state is None:
-            if had_focus:
-                self.left.emit()
-            return
-        self.icon.show_icon(state.icon, INKS[state.tone])
-        self.words.setText(state.words)
-        self.setAccessibleDescription(state.words)
-        say(self, state.words)
-        self._lines = [label(line, "label", "text2", wraps=True) for line in state.listed]
-        add_parts(self._listed, *self._lines)
-        for action, words in state.actions:
-            cap = key_cap("stop") if action == "stop" else ""
-            made = ActionButton(ICONS.get(action, ""), words, cap=cap, role=ROLES.get(action, ""), height=36)
-            made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
-            self._row.addWidget(made)
-            made.show()  # at once: a part that is not shown cannot take the keyboard
-            self.buttons[action] = made
-        apply_theme_within(self, self.theme)
-        if self.buttons:
-            next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape and "close" in self.buttons:
-            self.asked.emit("close")
-        else:
-            super().keyPressEvent(event)

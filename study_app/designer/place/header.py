@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal, TypeAlias
+from typing import Final
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QFontMetrics, QKeyEvent, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QWidget
 
 from study_app.designer.form.rows import Form
-from study_app.designer.participant.play import PlayControls, PlayStrip
+from study_app.designer.participant.play import Notice, NoticeCard, PlayControls
 from study_app.designer.place.file import FileText
 from study_app.designer.problems.problems import ProblemRow
 from study_app.designer.versions.version_rows import VersionChip
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import RADIUS_CARD, Tone, font
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.theme.theme import Tone, font
+from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import say
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, chip_size, paint_chip
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
+from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import label
 from study_app.number_text import counted
@@ -32,7 +32,6 @@ BEFORE_ORIGIN: Final = "  ("
 """What is between its file and where it is from."""
 NO_FILE: Final = FileText()
 NO_VERSION: Final = VersionChip()
-BannerAction: TypeAlias = Literal["copy", "keep", "take", "compare", "discard", "problems", "close"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,23 +51,6 @@ class StudyChoice:
     def words(self) -> str:
         origin = "shipped" if self.shipped else self.original and f"copy of {self.original}"
         return f"{self.title}{BETWEEN}{self.file}" + (f"{BEFORE_ORIGIN}{origin})" if origin else "")
-
-
-@dataclass(frozen=True, slots=True)
-class Banner:
-    """One line above the form, with its buttons: what each asks for, and its words.
-
-    ``closes`` says that it needs no answer and can be closed.
-    """
-
-    words: str
-    actions: tuple[tuple[BannerAction, str], ...] = ()
-    closes: bool = False
-
-    @property
-    def only_offers_copy(self) -> bool:
-        """Whether it only says why the study is read-only."""
-        return [action for action, _ in self.actions] == ["copy"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +77,7 @@ class DesignerView:
     form: Form | None = None
     file: FileText = NO_FILE
     problems: tuple[ProblemRow, ...] = ()
-    banner: Banner | None = None
+    banner: Notice | None = None
 
 
 def problems_chip(count: int, warnings: int) -> tuple[Tone, str, str]:
@@ -197,74 +179,6 @@ class StudyList(Choice):
             event.ignore()
 
 
-class BannerCard(Card):
-    """Draws a `Banner`; ``asked`` carries the action of a button, "close" of the one that closes it.
-
-    ``keyboard_left`` is emitted before the line is hidden while it has the keyboard.
-    Where the study is read-only, it is hidden while another line is shown; any other banner needs an answer.
-    """
-
-    asked = Signal(str)
-    keyboard_left = Signal()
-
-    def __init__(self) -> None:
-        super().__init__(padding=10, gap=6)
-        self.words = label("", "label", wraps=True)
-        self.sign = Icon("info", "accent", 20)
-        self.buttons: list[ActionButton] = []
-        self.close_button = IconButton("cross", "Close this line", "Close (Esc)", size=36, role="plain")
-        self.close_button.clicked.connect(lambda: self.asked.emit("close"))
-        self._banner: Banner | None = None
-        self._other = False
-        self._row = hbox(self.sign, (self.words, 1), self.close_button, spacing=10)
-        add_layout(self.column, self._row)
-        self.hide()
-
-    def make_room(self, *, other: bool) -> None:
-        """Hide what needs no answer while another line is shown (``other``)."""
-        self._other = other
-        shown = self._banner is not None and not (other and self._banner.only_offers_copy)
-        if not shown and self.isAncestorOf(self.window().focusWidget()):
-            self.keyboard_left.emit()  # else Qt hands the keyboard to the next part
-        self.setVisible(shown)
-
-    def close_by_key(self) -> bool:
-        """Close a line that can be closed; return whether there was one."""
-        closes = self.isVisible() and self._banner is not None and self._banner.closes
-        if closes:
-            self.asked.emit("close")
-        return closes
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QColor(self.theme.accent))
-        painter.setBrush(QColor(self.theme.selected))
-        body = QRectF(self.rect()).adjusted(SHADOW, SHADOW - 1, -SHADOW, -SHADOW - 1).adjusted(0.5, 0.5, -0.5, -0.5)
-        painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
-
-    def show_banner(self, banner: Banner | None) -> None:
-        self._banner = banner
-        self.make_room(other=self._other)
-        self.close_button.setVisible(banner is not None and banner.closes)
-        if banner is None:
-            self.words.clear()
-            return
-        if banner.words == self.words.text():
-            return
-        self.words.setText(banner.words)
-        say(self, banner.words)
-        for button in self.buttons:
-            remove_widget(button)
-        self.buttons = []
-        for action, words in banner.actions:
-            made = ActionButton("", words, role="primary" if action == "copy" else "", height=36)
-            made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
-            apply_theme_within(made, self.theme)
-            self._row.insertWidget(self._row.count() - 1, made)
-            self.buttons.append(made)
-
-
 NEW, OPEN = "\0new", "\0open"
 WIDE_FROM = 1180
 NAME_MOST_PX, NAME_EDGES_PX = 300, 60
@@ -343,7 +257,8 @@ class DesignerHeader(QWidget):
         self.redo = IconButton("redo", "Redo")
         self.save = ActionButton("save", "Save", role="primary")
         self.play = PlayControls()
-        self.strip = PlayStrip()
+        self.strip = NoticeCard(of_playing=True)
+        self.strip.setAccessibleName("Playing")
         self.strip.left.connect(self.play.play.setFocus)
         self._row = hbox(spacing=10, margins=(SHADOW, 0, SHADOW, 0))
         vbox(self._row, self.strip, margins=0, parent=self)

@@ -10,8 +10,8 @@ from study_app.designer.document.document import Document, Standing, check_versi
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.document.toml_text import Refused, free_in
 from study_app.designer.new_study.known_studies import source_of
+from study_app.designer.participant.play import Notice
 from study_app.designer.place.editing import Editing
-from study_app.designer.place.header import Banner, BannerAction
 from study_app.designer.place.prompts import DiscardCard
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.versions.changes import FileWatch, KnownRuns, SaveCard, compare, newest, version_of
@@ -46,8 +46,8 @@ class Saving(QObject):
     def __init__(self, editing: Editing, place: DesignerPlace, runs: KnownRuns) -> None:
         super().__init__(editing)
         self.editing, self.place, self.runs = editing, place, runs
-        self.banner: Banner | None = None
-        self._notice: Banner | None = None
+        self.banner: Notice | None = None
+        self._notice: Notice | None = None
         self._lasts: bool | None = None  # while the study is edited (True), until it is (False), until it is closed
         self.card: SaveCard | None = None
         self._others, self._trouble = 0, ""
@@ -80,9 +80,9 @@ class Saving(QObject):
             words = f"Draft of {time_words(draft.kept_at)}, {'not' if opened.base else 'never'} saved"
             self._note(words, ("discard", "Discard the draft"), lasts=True)
 
-    def _note(self, words: str | None, *actions: tuple[BannerAction, str], lasts: bool | None = None) -> None:
+    def _note(self, words: str | None, *actions: tuple[str, str], lasts: bool | None = None) -> None:
         """Show a line that needs no answer where no other one is needed, None for none; ``lasts`` says for how long."""
-        self._notice, self._lasts = None if words is None else Banner(words, actions, closes=True), lasts
+        self._notice, self._lasts = None if words is None else Notice(words, actions, closes=True), lasts
 
     def _end_notice(self) -> None:
         """Take back what is true no longer: that the draft differs from the file, or that the file has problems."""
@@ -94,7 +94,7 @@ class Saving(QObject):
         self._note(None)
         opened.draft = None  # it is not announced again
         self.banner = _banner(opened)
-        self.place.banner.show_banner(self.banner)
+        self.place.banner.show_notice(self.banner)
 
     def look_again(self) -> None:
         """Look whether the study may be changed, and whether another program changed its file.
@@ -282,20 +282,20 @@ class Saving(QObject):
         self.editing.announce()
 
 
-def _banner(opened: Document) -> Banner | None:
+def _banner(opened: Document) -> Notice | None:
     """Return why a study is read-only, or what another program did to its file; None where there is neither."""
     if opened.read_only:
-        return Banner(opened.read_only, (("copy", "Make a copy …"),))
+        return Notice(opened.read_only, (("copy", "Make a copy …"),))
     try:
         changed = opened.changed_outside()
     except StudyError as error:
-        return Banner(f"{str(error)[:1].upper()}{str(error)[1:]}")
+        return Notice(f"{str(error)[:1].upper()}{str(error)[1:]}")
     if not changed:
         return None
     if not opened.file.exists():
-        return Banner("Another program deleted or moved this file", (("keep", "Keep mine"),))
+        return Notice("Another program deleted or moved this file", (("keep", "Keep mine"),))
     too = ", and it was edited here, too" if opened.edited else ""
-    return Banner(
+    return Notice(
         f"Another program changed this file{too}",
         (("keep", "Keep mine"), ("take", "Take the file's"), ("compare", "Compare")),
     )

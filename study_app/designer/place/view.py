@@ -30,8 +30,9 @@ from study_app.designer.new_study.known_studies import TemplateChoice
 from study_app.designer.new_study.new_study_page import NewStudyPage, NoStudyCard
 from study_app.designer.outline.card import OutlineCard
 from study_app.designer.outline.outline_rows import Addable, AddList, ElementPath
+from study_app.designer.participant.play import NoticeCard
 from study_app.designer.place.file import FileCard
-from study_app.designer.place.header import BannerCard, DesignerHeader, DesignerView
+from study_app.designer.place.header import DesignerHeader, DesignerView
 from study_app.designer.place.prompts import KeysCard, Prompt
 from study_app.designer.place.segments import Segments
 from study_app.designer.problems.problems import ProblemRow, ProblemsCard, RepairButton
@@ -537,7 +538,7 @@ class DesignerPlace(Place):
         super().__init__()
         self.view = DesignerView()
         self.prompt: Prompt | None = None
-        self.header, self.banner = DesignerHeader(), BannerCard()
+        self.header, self.banner = DesignerHeader(), NoticeCard(of_playing=False)
         self.banner_words = self.banner.words
         self.form, self.file, self.problems = FormCard(), FileCard(), ProblemsCard()
         self.outline, self.new_page = OutlineCard(), NewStudyPage()
@@ -575,7 +576,7 @@ class DesignerPlace(Place):
         self.nothing.study_asked.connect(partial(self.ask, "open"))
         self.nothing.study_asked.connect(self.areas.focus_form)
         self.banner.asked.connect(partial(self.ask, "banner"))
-        self.banner.keyboard_left.connect(self.areas.return_keyboard)
+        self.banner.left.connect(self.areas.return_keyboard)
         outline.chosen.connect(partial(self._ask, "select"))
         outline.find_changed.connect(partial(self.ask, "find"))
         outline.field_asked.connect(self.areas.focus_field)
@@ -672,7 +673,7 @@ class DesignerPlace(Place):
         self.header.show_state(view.header)
         self.nothing.setVisible(view.form is None)
         self.parts.setVisible(view.form is not None)
-        self.banner.show_banner(view.banner)
+        self.banner.show_notice(view.banner)
         if view.form is None:
             self.nothing.show_studies(view.header.studies)
             return

@@ -90,6 +90,6 @@ def test_tab_goes_through_problems_questions_and_the_banner_which_are_made_later
     seen = passed(designer, lambda part: part is place.header.study or designer.window.rail.isAncestorOf(part))
     lines = [part for line in place.problems.lines for part in (line.go, *line.repairs)]
     card = place.prompt
-    made = [*place.banner.buttons, place.outline.tree, card.cancel, card.gaps, card.other, card.all, *lines]
+    made = [*place.banner.buttons.values(), place.outline.tree, card.cancel, card.gaps, card.other, card.all, *lines]
     assert [part for part in seen if part in made] == made
     assert len(set(seen)) == len(seen)

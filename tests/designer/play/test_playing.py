@@ -99,7 +99,7 @@ def lines_of(study: Path) -> list[dict[str, Any]]:
 def play_to_the_end(qtbot: Any, designer: Any) -> Player:
     player, pilots = Player(), designer.playing
     press_f5(qtbot, designer)
-    assert pilots.under_way, (designer.messages, designer.place.header.strip.state)
+    assert pilots.under_way, (designer.messages, designer.place.header.strip.notice)
     qtbot.waitUntil(lambda: not pilots.under_way, timeout=SESSION_MS)
     assert not designer.messages
     return player
@@ -221,7 +221,7 @@ def test_a_pilot_that_is_stopped_before_its_window_is_shown_has_not_begun(
     player = play_to_the_end(qtbot, likert)
     assert stopped == [(None, True)]
     assert not player.pages
-    assert strip.state is None
+    assert strip.notice is None
     assert not list(folders.iterdir())
 
 
@@ -251,7 +251,9 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     field.setPlainText(field.toPlainText().replace("[pages.thanks]\n", "[pages.thanks]\nnonsense = 3\n", 1))
     press_f5(qtbot, likert)
     assert "cannot be played" in header.strip.words.text()
-    assert any("Page " in line and "pages.thanks" not in line for line in header.strip.state.listed), header.strip.state
+    assert any("Page " in line and "pages.thanks" not in line for line in header.strip.notice.listed), (
+        header.strip.notice
+    )
     qtbot.mouseClick(header.strip.buttons["problems"], Qt.MouseButton.LeftButton)
     assert likert.place.problems.isVisible()
     assert len(opened) == 1

@@ -137,10 +137,10 @@ def test_a_change_by_another_program_is_noticed_while_the_place_is_shown(designe
     other.write_text(before.replace("A first look", "Another look"))
     other.replace(designer.file)
     qtbot.waitUntil(designer.place.banner.isVisible)
-    click(qtbot, designer.place.banner.buttons[2])
+    click(qtbot, [*designer.place.banner.buttons.values()][2])
     assert designer.controller.changes.chosen == "file"
     assert '-title = "Another look"' in lines(designer)
-    click(qtbot, designer.place.banner.buttons[1])
+    click(qtbot, [*designer.place.banner.buttons.values()][1])
     assert "Another look" in designer.text
     designer.editing.undo()
     assert "repetitions = 3" in designer.text
@@ -252,7 +252,7 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     other("Typed elsewhere", "leave")
     designer.saving.leave()
     assert designer.place.banner_words.text().startswith("Another window of the program edits this study, too")
-    designer.place.banner.buttons[0].click()
+    next(iter(designer.place.banner.buttons.values())).click()
     QApplication.processEvents()
     assert any("Typed elsewhere" in line for line in lines(designer))
 
