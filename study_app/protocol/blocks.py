@@ -155,7 +155,7 @@ class Block(Table):
             if name in self.model_fields_set:
                 elsewhere = (what, name) == ("a stimulus", "repetitions")
                 instead = "give it in the method's table" if elsewhere else "omit it"
-                raise invalid(f"does not belong to a block with {what}: {instead}", name)
+                raise invalid(f"does not belong to a block with {what}: {instead}", name, kind="surplus")
         if what == "conditions" and (self.standard not in self.conditions or len(self.conditions) < 2):
             raise invalid("must be one of at least two conditions, which the others are compared with", "standard")
         return self
@@ -188,6 +188,7 @@ class Block(Table):
                     given[0],
                     'write order = "constrained", or omit the key',
                     ("order", "constrained"),
+                    "surplus",
                 )
             return self
         if not given:

@@ -78,15 +78,15 @@ def newer_keys(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Yield a fault for everything in a file of format 1 that belongs to format 2."""
     for pattern in NEW_KEYS:
         for path, _ in entries(document, pattern):
-            yield Fault(path, "belongs to format 2", HINT)
+            yield Fault(path, "belongs to format 2", HINT, kind="surplus")
     for pattern, values in NEW_VALUES.items():
         for path, stated in entries(document, pattern):
             if stated in values:
-                yield Fault(path, f'"{stated}" belongs to format 2', HINT)
+                yield Fault(path, f'"{stated}" belongs to format 2', HINT, kind="surplus")
     known = {*names(document, "pages"), *names(document, "blocks")}
     for path, name in entries(document, "sequence.*"):
         if name in names(document, "questionnaires") and name not in known:
-            yield Fault(path, "a questionnaire on its own belongs to format 2", HINT)
+            yield Fault(path, "a questionnaire on its own belongs to format 2", HINT, kind="surplus")
 
 
 def upgraded(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:

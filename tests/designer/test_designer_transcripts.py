@@ -29,7 +29,7 @@ TIP = re.compile(r"^(StaticText readOnly .+) \| = \|  \| =$")
 @pytest.fixture(autouse=True)
 def no_time_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the participant's page stand still, typing be one step, and drafts be due."""
-    for module in ("document.document", "place.editing", "participant.preview", "participant.live_page"):
+    for module in ("document.document", "place.editing", "participant.preview"):
         monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
     monkeypatch.setattr("study_app.designer.place.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
 

@@ -155,16 +155,11 @@ def highest_level(study: Study, fault: Fault, low: float, high: float) -> float 
         middle = (least + most) / 2
         least, most = (middle, most) if passes(middle) else (least, middle)
     for digits in (3, 4):
-        step = 10.0 ** _exponent(least, digits)
+        step = 10.0 ** (int(f"{least:e}".split("e")[1]) - digits + 1)
         rounded = round(step * int(least / step + 1e-9), 12)
         if low < rounded and passes(rounded):
             return int(rounded) if rounded.is_integer() else rounded
     return None
-
-
-def _exponent(value: float, digits: int) -> int:
-    """Return the power of ten of the last of so many digits."""
-    return int(f"{value:e}".split("e")[1]) - digits + 1
 
 
 _ROUNDS: Final = 12

@@ -106,7 +106,10 @@ def suggested_id(document: Document, thing: Path, recorded: frozenset[str] = fro
 def taken_beside(document: Document, thing: Path) -> set[str]:
     """Return the names that a table or item cannot have, since others have them."""
     if _item_id(document, thing) is None:
-        return {*_siblings(document, thing)} - {str(thing[-1])}
+        node: Any = document
+        for step in thing[:-1]:
+            node = node[step] if has(node, step) else {}
+        return {*(tuple(node) if isinstance(node, Mapping) else ())} - {str(thing[-1])}
     return {str(other["id"]) for path, other in _items(document) if (thing[:2] == path[:2]) and path != thing}
 
 
@@ -237,13 +240,6 @@ def _item_id(document: Document, thing: Path) -> str | None:
 def _in_reach(place: Path, item: Path) -> bool:
     """Return whether a text can name an item: within a questionnaire only those of the same one."""
     return place[0] != item[0] or place[1] == item[1]
-
-
-def _siblings(document: Document, thing: Path) -> Iterable[str]:
-    node: Any = document
-    for step in thing[:-1]:
-        node = node[step] if has(node, step) else {}
-    return tuple(node) if isinstance(node, Mapping) else ()
 
 
 def _matches(place: Path, pattern: str) -> bool:

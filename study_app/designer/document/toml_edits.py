@@ -221,12 +221,6 @@ def _renamed(spans: Spans, piece: Piece, depth: int, name: str) -> str:
     return found if piece.node.kind == "pair" or found.endswith("\n") else found + spans.newline
 
 
-def rename_key(spans: Spans, edit: Editor, path: Path, name: str) -> None:
-    """Write another name for a key wherever it stands."""
-    for start, end in _key_parts(spans, path):
-        edit.replace(start, end, key_text(name))
-
-
 def _key_parts(spans: Spans, path: Path) -> Iterator[tuple[int, int]]:
     """Yield where the last step of a path is written, in headers and keys."""
     depth = len(path) - 1
@@ -666,7 +660,8 @@ def _write(spans: Spans, editor: Editor, edit: Edit) -> None:
     elif isinstance(edit, Move):
         move_entry(spans, editor, path, edit.to)
     elif isinstance(edit, Rename):
-        rename_key(spans, editor, path, edit.name)
+        for start, end in _key_parts(spans, path):
+            editor.replace(start, end, key_text(edit.name))
         for reference in edit.references:
             if (node := spans.node(reference)) is not None:
                 editor.replace(node.value, node.end, written(edit.name, spans.text[node.value : node.end]))

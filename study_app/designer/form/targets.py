@@ -99,16 +99,13 @@ class TankView(Themed, QWidget):
     def show_targets(self, shown: TargetsInTank, chosen: int) -> None:
         self.shown, self.chosen = shown, min(chosen, max(0, len(shown.points) - 1))
         self._dragged = None
-        self._say()
-        self.updateGeometry()
-        self.update()
-
-    def _say(self) -> None:
         points = self.shown.points
-        self.setAccessibleName(f"Targets in the tank, {'from the front' if self.side == 'front' else 'from above'}")
+        self.setAccessibleName(f"Targets in the tank, {('from the front' if self.side == 'front' else 'from above')}")
         point = points[self.chosen] if points else None
         where = "no targets" if point is None else f"target {self.chosen + 1} of {len(points)} at {written(point)}"
         self.setAccessibleDescription(f"{where}; arrow keys move it, Page Up and Page Down choose another one")
+        self.updateGeometry()
+        self.update()
 
     def sizeHint(self) -> QSize:
         return QSize(200, 138)

@@ -102,7 +102,11 @@ class MeasuresController(QObject):
             self._want(None)
             return
         path, problems = opened.selected, problem_rows(opened.study)
-        study = self._measured(opened.study, path)
+        if opened.study.formed is not None:
+            self._sound = opened.study
+        now, before = (None if one is None else valid_part(one).protocol for one in (opened.study, self._sound))
+        lost = now is None or (focus_of(now, path).block is None and focus_of(before, path).block is not None)
+        study = opened.study if self._sound is None or not lost else self._sound
         valid = valid_part(study)
         protocol = valid.protocol
         self._focus = focus = focus_of(protocol, path)
@@ -120,14 +124,6 @@ class MeasuresController(QObject):
         view = measures_view(study, facts(study), path, controls, self._simulated(), repairs, parts, earlier=earlier)
         self._place.measures.show_measures(view)
         self._place.pane.facts.show_measures(view)
-
-    def _measured(self, study: Study, path: Path) -> Study:
-        """Return the study to measure: the last one without faults where what an element is measured by is broken."""
-        if study.formed is not None:
-            self._sound = study
-        now, before = (None if one is None else valid_part(one).protocol for one in (study, self._sound))
-        lost = now is None or (focus_of(now, path).block is None and focus_of(before, path).block is not None)
-        return study if self._sound is None or not lost else self._sound
 
     def leave(self) -> None:
         """End the process: a session that begins now must not share the processor with it."""

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -142,12 +142,6 @@ class TemplateChoice:
 def languages_offered() -> tuple[tuple[str, str], ...]:
     """Return code and name of each language that participants can be addressed in."""
     return tuple((code, language.english_name) for code, language in LANGUAGES.items())
-
-
-def copy_name(name: str, taken: Collection[str]) -> str:
-    """Return a short name for a copy of a study that is free: "kitchencopy", "kitchencopy2"."""
-    stem = re.sub(f"{COPY}[0-9]*$", "", short_name_of(name)) or "study"
-    return free_short_name(taken, f"{stem[: MAX_SHORT_NAME - len(COPY)]}{COPY}")
 
 
 def template_choice(name: str, study: Study) -> TemplateChoice:
@@ -308,7 +302,9 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
         file = shipped_file(name) if name in shipped() else find(name)
         note = SHIPPED if name in shipped() else str(file.name)
         document, _places = read_document(file.read_bytes(), name)
-        choices.append(copy_choice(name, document, note, copy_name(file.stem, taken)))
+        stem = re.sub(f"{COPY}[0-9]*$", "", short_name_of(file.stem)) or "study"
+        free = free_short_name(taken, f"{stem[: MAX_SHORT_NAME - len(COPY)]}{COPY}")
+        choices.append(copy_choice(name, document, note, free))
     return tuple(choices)
 
 
