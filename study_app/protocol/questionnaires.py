@@ -186,7 +186,7 @@ def _filled(
                 for language in lacking:
                     unwritten[language].append((key, thing))
             elif len(lacking) == len(languages):
-                faults.append(Fault((*place, *path, key), "is missing"))
+                faults.append(Fault((*place, *path, key), "is missing", kind="missing"))
             else:
                 faults.extend(missing_text((*place, *path, key), language) for language in lacking)
 
