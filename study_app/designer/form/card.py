@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtGui import QColor, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QWidget
 
 from study_app.designer.document.steps import AddKey, LeaveText, RemoveKey, RenameElement, SetValue
@@ -16,15 +16,17 @@ from study_app.designer.form.row_widget import LABEL_PX, LanguageHeads, RowWidge
 from study_app.designer.form.rows import Form, FormRow, Section, added_row
 from study_app.designer.form.special import Panel, QuestionRow, QuestionRows
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
+from study_app.designer.place.segments import cut_text, small_button
 from study_app.designer.problems.problems import NameRefusal, ProblemRow, RepairButton
 from study_app.gui.kit.commands import tip
 from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import RADIUS_CONTROL, font
+from study_app.gui.theme.theme import RADIUS_CONTROL
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Rule, scrolled
-from study_app.gui.widgets.controls import ActionButton, IconButton
+from study_app.gui.widgets.boxes import grid as grid_of
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Rule, fill_rounded, scrolled, smooth_painter
+from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.protocol.source.document import Path
 
@@ -40,8 +42,7 @@ class Tile(Themed, QWidget):
         self.setFixedSize(TILE, TILE)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         painter.setPen(QColor(self.theme.selected))
         painter.setBrush(QColor(self.theme.selected))
         painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
@@ -75,22 +76,16 @@ class FormHead(QWidget):
         self.id.setMinimumWidth(110)
         self.id.setMaximumWidth(230)
         self.id.rests = False
-        self.unlock = ActionButton("lock", "Change anyway …", height=34)
-        self.unlock.setProperty("dense", "true")
-        self.unlock.setFont(font("label"))
+        self.unlock = small_button("lock", "Change anyway …", height=34)
         self.unlock.hide()
-        self.comments = ActionButton("", "Comments", role="plain", height=34)
-        self.comments.setProperty("dense", "true")
-        self.comments.setFont(font("label"))
+        self.comments = small_button("", "Comments", role="plain", height=34)
         self.comments.hide()
         self._lock: tuple[object, str] = ((), "")
         self._read_only = False
         self.refusal = NameRefusal("Rename to")
         self.refusal.chosen.connect(self._take_free)
         self.feel = IconButton("drop", "Feel", size=34)
-        self.series = ActionButton("bars", "Series …", height=34)
-        self.series.setProperty("dense", "true")
-        self.series.setFont(font("label"))
+        self.series = small_button("bars", "Series …", height=34)
         self.up = IconButton("arrow_up", "Move up", size=34)
         self.down = IconButton("arrow_down", "Move down", size=34)
         self.copy = IconButton("copy", "Duplicate", size=34)
@@ -227,8 +222,7 @@ class FormFoot(Themed, QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.title = label("", "label")
-        self.place = Elided("small", "text2")
-        self.place.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.place = cut_text("", "small", "text2", right=True)
         self.words = label("", "small", "text2", wraps=True)
         self.words.setMinimumHeight(WORDS_PX)
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
@@ -240,11 +234,8 @@ class FormFoot(Themed, QWidget):
         self.words.setText(words)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(self.theme.sunk))
-        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+        painter = smooth_painter(self)
+        fill_rounded(painter, QRectF(self.rect()), RADIUS_CONTROL, self.theme.sunk)
 
 
 class AddKeys(QWidget):
@@ -252,9 +243,7 @@ class AddKeys(QWidget):
 
     def __init__(self, keys: Iterable[tuple[Path, str, str]], add: Callable[[Path], None]) -> None:
         super().__init__()
-        grid = QGridLayout(self)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setSpacing(0)
+        grid = grid_of(0, 0, margins=0, parent=self)
         self.buttons: dict[Path, QWidget] = {}
         for at, (inner, words, help_) in enumerate(keys):
             made = self.buttons[inner] = add_button(f"Add {words}", words)

@@ -43,6 +43,7 @@ from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import add_parts, hbox
+from study_app.gui.widgets.cards import smooth_painter
 from study_app.gui.widgets.numbers import Range
 from study_app.number_text import duration, exact_duration
 from study_app.protocol.model import Reach
@@ -212,8 +213,7 @@ class End(Themed, QSlider):
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter, middle = QPainter(self), QPointF(HANDLE_PX / 2, HANDLE_PX / 2)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter, middle = smooth_painter(self), QPointF(HANDLE_PX / 2, HANDLE_PX / 2)
         painter.setPen(QPen(QColor(self.theme.accent if self.isEnabled() else self.theme.ctl), 2))
         painter.setBrush(QColor(self.theme.surface))
         painter.drawEllipse(middle, 7, 7)
@@ -286,8 +286,7 @@ class AxisView(Themed, QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         if self.axis is None:
             return
-        painter, axis, t = QPainter(self), self.axis, self.theme
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter, axis, t = smooth_painter(self), self.axis, self.theme
         painter.setPen(Qt.PenStyle.NoPen)
         track = QRectF(MARGIN, TRACK_Y - TRACK_PX / 2, self.width() - 2 * MARGIN, TRACK_PX)
         painter.setBrush(QColor(t.sunk))
@@ -462,8 +461,7 @@ class PhaseButton(Themed, QAbstractButton):
     def paintEvent(self, _event: QPaintEvent) -> None:
         if self.phase is None:
             return
-        painter, t, phase = QPainter(self), self.theme, self.phase
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter, t, phase = smooth_painter(self), self.theme, self.phase
         picture = QRectF(0, 0, self.width(), PICTURE_PX).adjusted(1, 1, -1, -1)
         lit = self.hasFocus() or (self.underMouse() and bool(phase.field))
         painter.setPen(QPen(QColor(t.accent if lit else t.border), 2 if self.hasFocus() else 1))

@@ -13,7 +13,7 @@ from study_app.designer.document.steps import AddNamed, Do, LeaveText, RemoveKey
 from study_app.designer.document.study import Study
 from study_app.designer.form.rows import FormRow, choice_words, is_right_to_left, new_words
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.designer.place.segments import Segments
+from study_app.designer.place.segments import Segments, cut_text, small_button
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
@@ -77,9 +77,7 @@ class LineField(Field):
         if row.row.unit:
             self.box.addWidget(label(row.row.unit, "label", "text2"))
         if row.row.kind in {"number", "whole number"}:
-            permitted = Elided("small", "text2")
-            permitted.show_text(row.range)
-            permitted.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            permitted = cut_text(row.range, "small", "text2", right=True)
             self.box.addWidget(permitted, 1)
         self.line.typed.connect(self._take)
         self.line.came.connect(self.came)
@@ -273,9 +271,7 @@ class UnknownField(Field):
 
 def add_button(name: str, words: str = "") -> ActionButton:
     """Return a quiet button with a plus."""
-    made = ActionButton("plus", words or name, role="plain", height=32)
-    made.setProperty("dense", "true")
-    made.setFont(font("label"))
+    made = small_button("plus", words or name, role="plain", height=32)
     made.setAccessibleName(name)
     return made
 

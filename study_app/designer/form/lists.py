@@ -32,6 +32,7 @@ from study_app.designer.form.rows import FormRow, new_words
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.study_facts import valid_part
+from study_app.designer.place.segments import cut_text
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import apply_theme_within
@@ -347,8 +348,7 @@ class EntriesField(EntryList):
     def fill(self) -> None:
         label, count = self.row.row.label, len(self.row.entries)
         for at, entry in enumerate(self.row.entries):
-            title = Elided("label", "bad" if entry.faults else "text")
-            title.show_text(entry.title)
+            title = cut_text(entry.title, "label", "bad" if entry.faults else "text")
             shown = self.add_row(f"{label}, {entry.title}, {at + 1} of {count}", (title, 1), faulty=bool(entry.faults))
             self.add_facts(shown, at)
             if self.ordered:
@@ -365,9 +365,7 @@ class EntriesField(EntryList):
         """Show what is known of an entry after its title."""
         entry = self.row.entries[at]
         if entry.note and entry.note.replace("_", " ") != entry.title.lower():
-            note = Elided("small", "text2")
-            note.show_text(entry.note)
-            note.setAlignment(RIGHT)
+            note = cut_text(entry.note, "small", "text2", right=True)
             shown.line.addWidget(note)
 
 

@@ -21,11 +21,12 @@ from study_app.designer.form.rows import (
     question_lines,
 )
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedSentence
-from study_app.designer.place.segments import Segments
+from study_app.designer.place.segments import Segments, small_button
 from study_app.gui.kit.commands import with_key
-from study_app.gui.theme.theme import Tone, TypeRole, font
+from study_app.gui.theme.theme import Tone, TypeRole
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
@@ -147,9 +148,7 @@ class QuestionRow(Themed, QWidget):
     def _missing(self) -> QWidget:
         made = QWidget()
         made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
-        self.write = ActionButton("", "Write", height=32)
-        self.write.setProperty("dense", "true")
-        self.write.setFont(font("label"))
+        self.write = small_button("", "Write", height=32)
         self.write.setAccessibleName(f"Write the missing text of question {self.line.number}")
         self.write.clicked.connect(self.opened)
         missing = Icon("warning", "bad", 16), label("Missing", "label", "bad")
@@ -318,8 +317,7 @@ class PointsField(Field):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        grid = QGridLayout()
-        grid.setSpacing(6)
+        grid = grid_of(6, 6)
         for column, (_code, language) in enumerate(row.facts.languages, start=1):
             grid.addWidget(label(language, "small", "text2"), 0, column)
         self.lines: list[list[TypedLine]] = []

@@ -16,6 +16,8 @@ from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.gui.theme.theme import RADIUS_CONTROL, TANK, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import add_layout, hbox
+from study_app.gui.widgets.boxes import grid as grid_of
+from study_app.gui.widgets.cards import smooth_painter
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import figures, label
 from study_app.number_text import number_of
@@ -190,8 +192,7 @@ class TankView(Themed, QWidget):
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        t, painter, tank = self.theme, QPainter(self), self._tank()
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        t, painter, tank = self.theme, smooth_painter(self), self._tank()
         painter.setPen(QColor(t.text2))
         painter.setFont(font("small"))
         words = "Front: x right, y up" if self.side == "front" else "From above: x right, z down"
@@ -241,8 +242,7 @@ class TargetsField(Field):
             view.picked.connect(self._pick)
             view.came.connect(self.came)
         add_layout(self.box, hbox(self.front, self.above, spacing=8))
-        grid = QGridLayout()
-        grid.setSpacing(6)
+        grid = grid_of(6, 6)
         for column, axis in enumerate(AXES, start=1):
             grid.addWidget(label(axis, "small", "text2"), 0, column)
         self.lines: list[list[TypedLine]] = []

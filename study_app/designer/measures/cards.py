@@ -8,10 +8,12 @@ from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
+from study_app.designer.place.segments import cut_text, small_button
 from study_app.gui.theme.theme import Tone, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, insert_layout, vbox
-from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
+from study_app.gui.widgets.boxes import grid as grid_of
+from study_app.gui.widgets.cards import Bar, Card, Icon, Rule, fill_rounded, smooth_painter
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
 from study_app.protocol.source.document import Path
@@ -167,9 +169,7 @@ class NumbersRow(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.grid = QGridLayout(self)
-        self.grid.setContentsMargins(0, 0, 0, 0)
-        self.grid.setSpacing(8)
+        self.grid = grid_of(8, 8, margins=0, parent=self)
         self.parts = [NumberPart() for _ in range(NUMBERS)]
         self._columns = 0
         self._lay(NUMBERS)
@@ -229,9 +229,7 @@ class CardWidget(Card):
     """Shows a card; ``opens`` is called with the path of an element whose button or step is clicked."""
 
     def __init__(self, shown: MeasureCard, opens: Callable[[Path], None]) -> None:
-        self.aside = Elided("small", "text2")
-        self.aside.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self.aside.show_text(shown.aside)
+        self.aside = cut_text(shown.aside, "small", "text2", right=True)
         super().__init__(shown.title, self.aside, padding=16, gap=8)
         self.shown, self.opens = shown, opens
         self.buttons: list[ActionButton] = []
@@ -272,15 +270,13 @@ class CardWidget(Card):
         elif isinstance(part, Segments):
             notes = hbox(margins=0)
             for at, words in enumerate(part.notes):
-                note = Elided("small", "text2")
-                note.show_text(words)
+                note = cut_text(words, "small", "text2")
                 if at:
                     note.setAlignment(Qt.AlignmentFlag.AlignRight)
                 notes.addWidget(note)
             vbox(Strip(part.segments, self.opens), notes, spacing=8, margins=0, parent=made)
         elif isinstance(part, Link):
-            button = ActionButton("", part.action, height=32)
-            button.setProperty("dense", "true")
+            button = small_button("", part.action, height=32)
             button.setAccessibleName(f"{part.action}: {part.verdict[2]}")
             button.clicked.connect(lambda: self.opens(part.path))
             self.buttons.append(button)
@@ -305,9 +301,7 @@ def verdict_line(verdict: Verdict) -> QWidget:
 
 def _table(table: Table) -> QWidget:
     made = QWidget()
-    grid = QGridLayout(made)
-    grid.setContentsMargins(0, 0, 0, 0)
-    grid.setSpacing(3)
+    grid = grid_of(3, 3, margins=0, parent=made)
     grid.addWidget(label(table.name, "small", "text2"), 0, 0, 1, len(table.codes) + 1)
     for across, code in enumerate(table.codes, start=1):
         grid.addWidget(label(code, "small", "text2"), 1, across, Qt.AlignmentFlag.AlignHCenter)
@@ -329,11 +323,8 @@ class _Cell(Themed, QWidget):
         self.setAccessibleName(name)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(self.theme.selected if self._count else self.theme.sunk))
-        painter.drawRoundedRect(QRectF(self.rect()), 3, 3)
+        painter = smooth_painter(self)
+        fill_rounded(painter, QRectF(self.rect()), 3, self.theme.selected if self._count else self.theme.sunk)
         painter.setPen(QColor(self.theme.accent if self._count else self.theme.text2))
         painter.setFont(font("small", weight=600, tabular=True))
         painter.drawText(QRectF(self.rect()), Qt.AlignmentFlag.AlignCenter, str(self._count))

@@ -12,12 +12,12 @@ from study_app.designer.measures.cards import UNKNOWN, CardGrid, NumbersRow, Ver
 from study_app.designer.measures.levels import LevelBlock, LevelWords, rounded
 from study_app.designer.measures.measures_view import FAILED, NO_FORCES, MeasuresView
 from study_app.designer.measures.simulation import Controls
+from study_app.designer.place.segments import cut_text, small_button
 from study_app.designer.problems.problems import ProblemRow
 from study_app.gui.theme.theme import Tone
 from study_app.gui.theme.themed import Themed, apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
-from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.numbers import NumberField
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
@@ -102,8 +102,7 @@ class PlotCard(Card):
     """A plot under its heading, its units and what its marks mean."""
 
     def __init__(self, title: str, legend: str, plot: FunctionView | TrackView) -> None:
-        self.heading_unit = Elided("small", "text2")
-        self.heading_unit.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.heading_unit = cut_text("", "small", "text2", right=True)
         super().__init__(title, padding=14, gap=4)
         self.heading_unit.setAlignment(Qt.AlignmentFlag.AlignLeft)
         self.legend = label(legend, "small", "text2", wraps=True)
@@ -140,8 +139,7 @@ class ForcesCard(Card):
         head = hbox(label("Force at each level", "card"), (self.unit, 1), *self.chips)
         self.bar = WarningBar()
         self.words = label("", "small", wraps=True)
-        self.repair = ActionButton("", "Repair", height=34)
-        self.repair.setProperty("dense", "true")
+        self.repair = small_button("", "Repair", height=34)
         self.repair.clicked.connect(lambda: self.repair_asked.emit(*self.offered))
         parts = (Icon("warning", "warn", 18), (self.words, 1), self.repair)
         hbox(*parts, spacing=10, margins=(12, 6, 8, 6), parent=self.bar)

@@ -21,7 +21,6 @@ from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import (
     QAbstractButton,
     QButtonGroup,
-    QGridLayout,
     QHBoxLayout,
     QLayout,
     QLineEdit,
@@ -41,6 +40,7 @@ from study_app.designer.new_study.known_studies import (
 from study_app.designer.new_study.new_study import Answers
 from study_app.designer.new_study.templates import FOLDER
 from study_app.designer.place.header import StudyChoice
+from study_app.designer.place.segments import cut_text
 from study_app.designer.problems.problems import NameRefusal
 from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.kit.dialogs import choose_protocol
@@ -48,9 +48,10 @@ from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, TANK, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule, scrolled
+from study_app.gui.widgets.boxes import grid as grid_of
+from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Check, IconButton
-from study_app.gui.widgets.labels import Elided, clamped, figures, label
+from study_app.gui.widgets.labels import clamped, figures, label
 from study_app.gui.widgets.main_view import last_focused
 from study_app.ids import short_name_of
 from study_app.number_text import number_of, typed_numbers
@@ -136,17 +137,14 @@ class TemplateButton(Themed, QAbstractButton):
             super().keyPressEvent(event)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        t, painter = self.theme, QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        t, painter = self.theme, smooth_painter(self)
         if self.hasFocus():
             painter.setPen(QPen(QColor(t.accent), 2))
             painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), RADIUS_CARD + RING, RADIUS_CARD + RING)
         painter.translate(RING, RING)
         body = QRectF(0, 0, self._wide, self.height() - 2 * RING).adjusted(1, 1, -1, -1)
         marked, empty = self.isChecked(), not self.picture and not self.choice.copy
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(t.hover if self.underMouse() or (empty and not marked) else t.surface))
-        painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
+        fill_rounded(painter, body, RADIUS_CARD, t.hover if self.underMouse() or (empty and not marked) else t.surface)
         if self.choice.copy:
             self._paint_copy(painter)
         elif empty:
@@ -187,9 +185,7 @@ class TemplateButton(Themed, QAbstractButton):
 
     def _paint_copy(self, painter: QPainter) -> None:
         t = self.theme
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(t.sunk))
-        painter.drawRoundedRect(QRectF(16, 18, 40, 40), 8, 8)
+        fill_rounded(painter, QRectF(16, 18, 40, 40), 8, t.sunk)
         draw_icon(painter, "lock" if self.choice.note == SHIPPED else "layers", QRectF(27, 29, 18, 18), t.text2)
         painter.setPen(QColor(t.text))
         wide = self._wide - 80
@@ -231,8 +227,7 @@ class RecoveryBar(Themed, QWidget):
         self.setAccessibleDescription(shown.sentence)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        t, painter, shown = self.theme, QPainter(self), self.shown
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        t, painter, shown = self.theme, smooth_painter(self), self.shown
         left, wide = 12.0, self.width() - 44.0
 
         def place(value: float) -> float:
@@ -272,16 +267,12 @@ class Questions(Themed, QWidget):
         self.title.textChanged.connect(self._propose)
         self.languages: dict[str, Check] = {}
         self.own: dict[OwnQuestion, QLineEdit] = {}
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(0, 0, 0, 0)
-        self._grid.setSpacing(8)
+        self._grid = grid_of(8, 8, margins=0, parent=self)
         self._grid.setColumnStretch(1, 1)
         for row, (words, field) in enumerate((("Title", self.title), ("Short name", self.name))):
             self._add(row, words, field)
         box = QWidget()
-        checks = QGridLayout(box)
-        checks.setContentsMargins(0, 0, 0, 0)
-        checks.setSpacing(2)
+        checks = grid_of(2, 2, margins=0, parent=box)
         for at, (code, name) in enumerate(languages_offered()):
             made = Check(name)
             made.setFont(font("label", weight=400))
@@ -488,8 +479,7 @@ def _column(of: QWidget, *parts: QWidget | QLayout) -> QVBoxLayout:
 
 
 def _step(icon: str, title: str, time: str) -> QHBoxLayout:
-    shown = Elided("label")
-    shown.show_text(title)
+    shown = cut_text(title, "label")
     return hbox(Icon(icon, "text2", 16), (shown, 1), figures(time, "label", "text2"), spacing=10)
 
 
@@ -507,8 +497,7 @@ class NewStudyPage(Themed, QWidget):
         self._group = QButtonGroup(self)
         self.back = IconButton("chevron_left", "Back", role="plain")
         self.back.clicked.connect(self.given_up)
-        aside = Elided("label", "text2")
-        aside.show_text("Choose what you want to find out. Everything can be changed afterwards.")
+        aside = cut_text("Choose what you want to find out. Everything can be changed afterwards.", "label", "text2")
         self.file = ActionButton("file", "From a file …")
         self.file.clicked.connect(self._open_file)
         parts = (self.back, label("New study", "title"), (aside, 1), self.file)
@@ -547,8 +536,7 @@ class NewStudyPage(Themed, QWidget):
         ):
             words = label(heading, "card"), label(aside, "small", "text2")
             add_layout(column, hbox(*words, STRETCH, spacing=10, margins=(RING, 0, 0, 0)))
-            grid = QGridLayout()
-            grid.setSpacing(14 - 2 * RING)
+            grid = grid_of(14 - 2 * RING, 14 - 2 * RING)
             columns = across if self.width() >= NARROW_BELOW else 2
             for at, choice in enumerate(one for one in choices if one.copy == copies):
                 made = TemplateButton(choice)

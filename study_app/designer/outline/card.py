@@ -42,7 +42,7 @@ from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox
-from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.cards import Card, fill_rounded
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided
 
@@ -95,9 +95,7 @@ class RowPainter(QStyledItemDelegate):
         current = index == self.tree.currentIndex()
         pointed = bool(state & QStyle.StateFlag.State_MouseOver)
         if chosen or pointed:
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(QColor(t.selected if chosen else t.hover))
-            painter.drawRoundedRect(place.adjusted(0, 1, 0, -1), RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
+            fill_rounded(painter, place.adjusted(0, 1, 0, -1), RADIUS_CONTROL - 2, t.selected if chosen else t.hover)
         if current and chosen:
             painter.setBrush(QColor(t.accent))
             painter.drawRoundedRect(QRectF(0, place.top() + 5, 3, place.height() - 10), 1.5, 1.5)
@@ -116,9 +114,7 @@ class RowPainter(QStyledItemDelegate):
         painter.setFont(font("label", weight=600, tabular=True))
         if row.faults:
             badge = QRectF(right - 22, place.center().y() - 10, 22, 20)
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(QColor(t.bad_bg))
-            painter.drawRoundedRect(badge, 10, 10)
+            fill_rounded(painter, badge, 10, t.bad_bg)
             painter.setPen(QColor(t.bad))
             painter.drawText(badge, Qt.AlignmentFlag.AlignCenter, str(row.faults))
             right = badge.left() - 6

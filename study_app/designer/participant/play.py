@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QActionGroup, QColor, QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QActionGroup, QColor, QKeyEvent, QPaintEvent
 from PySide6.QtWidgets import QMenu, QWidget
 
 from study_app.designer.measures.cards import INKS
@@ -12,7 +12,7 @@ from study_app.gui.theme.theme import RADIUS_CARD, Tone, font
 from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Card, Icon
+from study_app.gui.widgets.cards import SHADOW, Card, Icon, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import label
 
@@ -120,8 +120,7 @@ class NoticeCard(Card):
         if self._of_playing:
             super().paintEvent(event)
             return
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         painter.setPen(QColor(self.theme.accent))
         painter.setBrush(QColor(self.theme.selected))
         body = QRectF(self.rect()).adjusted(SHADOW, SHADOW - 1, -SHADOW, -SHADOW - 1).adjusted(0.5, 0.5, -0.5, -0.5)

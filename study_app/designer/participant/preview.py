@@ -65,7 +65,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.background import delayed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, fill_rounded
 from study_app.gui.widgets.controls import Cap, Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.numbers import NumberField
@@ -313,9 +313,7 @@ class LivePage(Themed, QGraphicsView):
             painter.setFont(font("small", weight=600))
             words = QRectF(painter.fontMetrics().boundingRect(LEAVES)).adjusted(-10, -4, 10, 4)
             words.moveBottomLeft(inset.bottomLeft() + QPointF(6, -6))
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(QColor(self.theme.accent))
-            painter.drawRoundedRect(words, RADIUS_CONTROL, RADIUS_CONTROL)
+            fill_rounded(painter, words, RADIUS_CONTROL, self.theme.accent)
             painter.setPen(QColor(self.theme.on_accent))
             painter.drawText(words, Qt.AlignmentFlag.AlignCenter, LEAVES)
         painter.end()

@@ -26,12 +26,13 @@ from PySide6.QtWidgets import QFrame, QPlainTextEdit, QWidget
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import common_ends, shown, spans_of
 from study_app.designer.form.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
+from study_app.designer.place.segments import cut_text
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import Card, Icon
-from study_app.gui.widgets.labels import Elided, label
+from study_app.gui.widgets.labels import label
 from study_app.protocol.source.document import Path
 
 
@@ -288,8 +289,7 @@ class FileCard(Card):
     def __init__(self) -> None:
         super().__init__(padding=14, gap=8)
         self.setAccessibleName("File")
-        self.name = Elided("label", "text2")
-        self.name.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.name = cut_text("", "label", "text2", right=True)
         self.editor = FileEditor()
         self.editor.typed.connect(self.typed)
         self.setFocusProxy(self.editor)

@@ -21,7 +21,7 @@ from study_app.gui.theme.theme import Tone, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip
+from study_app.gui.widgets.cards import SHADOW, Chip, chip_size, paint_chip, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import label
 from study_app.number_text import counted
@@ -215,8 +215,7 @@ class ChipButton(Themed, PressedByEnter):
         return self._state[2]
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = smooth_painter(self)
         body = QRectF(0, self.height() / 2 - 14, self.sizeHint().width(), 28)
         paint_chip(painter, body, self.theme, *self._state, small=False)
         if self.hasFocus():

@@ -1,14 +1,17 @@
-"""A choice between few words, side by side: the chosen one is raised, the one with the keyboard has a ring."""
+"""Small parts of the designer: a choice between few words side by side, small buttons, texts that are cut."""
 
 from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
-from study_app.gui.theme.theme import RADIUS_CONTROL, font
+from study_app.gui.theme.theme import RADIUS_CONTROL, TypeRole, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.boxes import hbox
+from study_app.gui.widgets.cards import fill_rounded, smooth_painter
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, Ink
 
 INSIDE, BETWEEN = 3, 4
 
@@ -43,8 +46,7 @@ class _Segment(Themed, QAbstractButton):
         return self.sizeHint()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        t, painter = self.theme, QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        t, painter = self.theme, smooth_painter(self)
         body = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         if self.isChecked():
             painter.setPen(QPen(QColor(t.accent if self.isEnabled() else t.ctl), 1.2))
@@ -106,14 +108,28 @@ class Segments(Themed, QWidget):
             super().keyPressEvent(event)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(self.theme.sunk))
-        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
+        painter = smooth_painter(self)
+        fill_rounded(painter, QRectF(self.rect()), RADIUS_CONTROL, self.theme.sunk)
         for button in self.buttons:
             if button.hasFocus():
                 painter.setPen(QPen(QColor(self.theme.accent), 2))
                 painter.setBrush(Qt.BrushStyle.NoBrush)
                 ring = QRectF(button.geometry()).adjusted(-2, -2, 2, 2)
                 painter.drawRoundedRect(ring, RADIUS_CONTROL, RADIUS_CONTROL)
+
+
+def small_button(icon: str, words: str, *, cap: str = "", role: str = "", height: int = 34) -> ActionButton:
+    """Return a button with little room around its words."""
+    made = ActionButton(icon, words, cap=cap, role=role, height=height)
+    made.setProperty("dense", "true")
+    made.setFont(font("label"))
+    return made
+
+
+def cut_text(text: str, role: TypeRole = "small", ink: Ink = "text2", *, right: bool = False) -> Elided:
+    """Return a line of text that ends in "…" where there is too little room, at the left or at the right."""
+    made = Elided(role, ink)
+    made.show_text(text)
+    if right:
+        made.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+    return made

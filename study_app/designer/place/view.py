@@ -34,7 +34,7 @@ from study_app.designer.participant.play import NoticeCard
 from study_app.designer.place.file import FileCard
 from study_app.designer.place.header import DesignerHeader, DesignerView
 from study_app.designer.place.prompts import KeysCard, Prompt
-from study_app.designer.place.segments import Segments
+from study_app.designer.place.segments import Segments, small_button
 from study_app.designer.problems.problems import ProblemRow, ProblemsCard, RepairButton
 from study_app.gui.kit.commands import add_commands, key_cap, press, tip
 from study_app.gui.theme.theme import font
@@ -42,7 +42,7 @@ from study_app.gui.theme.themed import apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Icon
-from study_app.gui.widgets.controls import ActionButton, PressedByEnter
+from study_app.gui.widgets.controls import PressedByEnter
 from study_app.gui.widgets.main_view import Place, last_focused
 
 FACTS_FROM, FACTS_FROM_OWN, FACTS_LEAST = 740, 560, 110
@@ -178,8 +178,7 @@ class PathBar(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.setAccessibleName("Path of the element")
-        self.outline = ActionButton("layers", "Outline", cap=key_cap("outline"), height=40)
-        self.outline.setProperty("dense", "true")
+        self.outline = small_button("layers", "Outline", cap=key_cap("outline"), height=40)
         self.outline.setAccessibleName(tip("outline"))
         self.outline.setToolTip(tip("outline"))
         self.outline.clicked.connect(self.outline_asked)

@@ -15,7 +15,7 @@ from study_app.designer.document.elements import FIRST, element_of, kind_and_tit
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.study import Study
 from study_app.designer.outline.outline_rows import icon_of
-from study_app.designer.place.segments import Segments
+from study_app.designer.place.segments import Segments, small_button
 from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
@@ -202,9 +202,7 @@ class NameRefusal(QWidget):
         super().__init__()
         self._does, self._free = does, ""
         self.words = label("", "label", "bad", wraps=True)
-        self.use = ActionButton("", "", height=32)
-        self.use.setProperty("dense", "true")
-        self.use.setFont(font("label"))
+        self.use = small_button("", "", height=32)
         self.use.clicked.connect(lambda: self.chosen.emit(self._free))
         hbox((self.words, 1), self.use, spacing=8, margins=0, parent=self)
         self.show_refusal("")
@@ -328,9 +326,8 @@ class ProblemsCard(Card):
         self.heading = label("", "card")
         self.limit = Segments("Problems of")
         self.limit.chosen.connect(self._limit)
-        self.next = ActionButton("", "Next", cap=key_cap("next problem"), height=36)
+        self.next = small_button("", "Next", cap=key_cap("next problem"), height=36)
         self.next.setToolTip(tip("next problem"))
-        self.next.setProperty("dense", "true")
         self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
         words = self.heading, label("the same as liquid-study check prints", "small", "text2")
         top = hbox(*words, STRETCH, self.limit, self.next, self.close_button, spacing=10)

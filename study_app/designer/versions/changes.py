@@ -21,6 +21,7 @@ from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import Comment, comments_naming, shown
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.prompts import Prompt
+from study_app.designer.place.segments import small_button
 from study_app.designer.place.view import DesignerPlace, PanePage
 from study_app.designer.problems.problems import NameRefusal
 from study_app.designer.versions.version_rows import (
@@ -320,8 +321,7 @@ class CommentsCard(Prompt):
         self.lines: list[ActionButton] = []
         for line, text in comments:
             cut = text if len(text) <= 90 else f"{text[:89].rstrip()}…"
-            made = ActionButton("", f"Line {line}:  {cut}", role="plain", height=34)
-            made.setProperty("dense", "true")
+            made = small_button("", f"Line {line}:  {cut}", role="plain", height=34)
             made.setAccessibleName(f"Go to line {line}: {text}")
             made.setToolTip(text)
             made.clicked.connect(lambda _checked=False, line=line: self.line_asked.emit(line))
@@ -424,8 +424,7 @@ class Changes(Card):
         self.version.setFont(font("label"))
         self.version.setAccessibleName("Version to compare with")
         self.version.setMinimumWidth(120)
-        self.restore = ActionButton("undo", "Restore", height=34)
-        self.restore.setProperty("dense", "true")
+        self.restore = small_button("undo", "Restore", height=34)
         self.restore.setToolTip("Give the study the text of this version, as one step")
         self.note = label("", "label", "text2", wraps=True)
         self.difference = DifferenceText()
