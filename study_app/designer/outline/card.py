@@ -12,23 +12,12 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import (
-    QColor,
-    QKeyEvent,
-    QKeySequence,
-    QMouseEvent,
-    QPainter,
-    QPaintEvent,
-    QPen,
-    QStandardItem,
-    QStandardItemModel,
-)
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
     QFrame,
     QLineEdit,
-    QMenu,
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
@@ -36,7 +25,7 @@ from PySide6.QtWidgets import (
 )
 
 from study_app.designer.outline.outline_rows import ElementPath, OutlineRow
-from study_app.gui.kit.commands import key_cap, key_words, keys_of, tip, with_key
+from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
 from study_app.gui.theme.icons import draw_icon, icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed
@@ -153,14 +142,11 @@ EDGE_PX = 24
 class Tree(Themed, QTreeView):
     """The rows.
 
-    Signals: ``delete_asked``, ``entered_row`` (by Enter), ``copy_asked``, ``paste_asked``, ``dropped``
-    (entries of a list, and the index of the one that they come before).
+    Signals: ``entered_row`` (by Enter), ``dropped`` (entries of a list, and the index that they come before). Its menu
+    shows its actions.
     """
 
-    delete_asked = Signal()
     entered_row = Signal()
-    copy_asked = Signal()
-    paste_asked = Signal()
     dropped = Signal(object, int)
 
     def __init__(self) -> None:
@@ -176,6 +162,7 @@ class Tree(Themed, QTreeView):
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setMouseTracking(True)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.rows = RowPainter(self)
         self.setItemDelegate(self.rows)
         self.setStyleSheet("QTreeView { background: transparent; border: none; outline: none; }")
@@ -193,28 +180,11 @@ class Tree(Themed, QTreeView):
         found = [index.data(ROW_ROLE) for index in self.selectedIndexes()]
         return [row for row in found if row.path]
 
-    # keys
-
-    def event(self, event: QEvent) -> bool:
-        """Keep copying and pasting for the rows."""
-        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
-            keys = (QKeySequence.StandardKey.Copy, QKeySequence.StandardKey.Paste)
-            if any(event.matches(key) for key in keys):
-                event.accept()
-                return True
-        return super().event(event)
-
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.dragged and event.key() == Qt.Key.Key_Escape:
             self._let_go()
-        elif event.key() == Qt.Key.Key_Delete and not event.modifiers():
-            self.delete_asked.emit()
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.entered_row.emit()
-        elif event.matches(QKeySequence.StandardKey.Copy):
-            self.copy_asked.emit()
-        elif event.matches(QKeySequence.StandardKey.Paste):
-            self.paste_asked.emit()
         else:
             super().keyPressEvent(event)
 
@@ -309,24 +279,14 @@ class Tree(Themed, QTreeView):
 class OutlineCard(Card):
     """Draws outline rows.
 
-    Signals: ``chosen`` (path), ``element_clicked``, ``form_asked`` (Enter), ``find_changed`` (words), ``add_asked``,
-    ``duplicate_asked``, ``delete_asked``, ``copy_asked``, ``paste_asked``, ``rename_asked``, ``move_asked`` (by how
-    many places), ``field_asked`` (path of a field that was found, instead of the first two), ``dropped`` (entries of a
-    list, and the index of the one that they come before), ``several_changed`` (what else is selected).
+    Signals: ``chosen`` (path), ``element_clicked``, ``form_asked`` (Enter), ``find_changed`` (words), ``field_asked``
+    (path of a field that was found, instead of these two), ``several_changed`` (what else is selected).
     """
 
     chosen = Signal(object)
     find_changed = Signal(str)
-    add_asked = Signal()
-    duplicate_asked = Signal()
-    delete_asked = Signal()
     element_clicked = Signal()
     form_asked = Signal()
-    copy_asked = Signal()
-    paste_asked = Signal()
-    rename_asked = Signal()
-    move_asked = Signal(int)
-    dropped = Signal(object, int)
     several_changed = Signal()
     field_asked = Signal(object)
 
@@ -353,10 +313,8 @@ class OutlineCard(Card):
         self.tree.setModel(self.items)
         self.add = ActionButton("plus", "Add", cap=key_cap("add"), height=40)
         self.add.setAccessibleName(f"Add an element ({keys_of('add')[0]})")
-        self.add.setToolTip(tip("add"))
         self.duplicate = ActionButton("", "Duplicate", cap=key_cap("duplicate"), height=40)  # no room for an icon, too
         self.duplicate.setAccessibleName(with_key("Duplicate the selected element", "duplicate"))
-        self.duplicate.setToolTip(tip("duplicate"))
         for button in (self.add, self.duplicate):
             button.setFont(font("label", weight=600))
         self.add.setMaximumWidth(self.add.minimumSizeHint().width())
@@ -370,16 +328,7 @@ class OutlineCard(Card):
         self.tree.clicked.connect(self._click)
         self.tree.expanded.connect(lambda index: None if self._finding else self._opened.add(self._key(index)))
         self.tree.collapsed.connect(lambda index: self._opened.discard(self._key(index)))
-        self.tree.delete_asked.connect(self.delete_asked)
         self.tree.entered_row.connect(self._enter_row)
-        self.tree.copy_asked.connect(self.copy_asked)
-        self.tree.paste_asked.connect(self.paste_asked)
-        self.tree.dropped.connect(self.dropped)
-        self.tree.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        self.tree.customContextMenuRequested.connect(self._open_menu)
-        self.menu: QMenu | None = None
-        self.add.clicked.connect(self.add_asked)
-        self.duplicate.clicked.connect(self.duplicate_asked)
 
     def apply_theme(self, theme: Theme) -> None:
         super().apply_theme(theme)
@@ -477,29 +426,6 @@ class OutlineCard(Card):
             else:  # Qt scrolls to it, too
                 self.tree.verticalScrollBar().setValue(down)
         self._filling = False
-
-    def _open_menu(self, at: QPoint) -> None:
-        """Show what can be done with the selected elements, each with its key."""
-        menu = self.menu = QMenu(self)
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.setFont(font("label"))
-        writable = self.add.isEnabled()
-        row = self.tree.currentIndex().data(ROW_ROLE) if self.tree.currentIndex().isValid() else None
-        ordered = writable and row is not None and bool(row.step)
-        for words, name, act, possible in (
-            ("Add …", "add", self.add_asked.emit, writable),
-            ("Duplicate", "duplicate", self.duplicate_asked.emit, self.duplicate.isEnabled()),
-            ("Copy", "copy", self.copy_asked.emit, row is not None and len(row.path) > 1),
-            ("Paste", "paste", self.paste_asked.emit, writable),
-            ("Move up", "up", lambda: self.move_asked.emit(-1), ordered),
-            ("Move down", "down", lambda: self.move_asked.emit(1), ordered),
-            ("Rename", "rename", self.rename_asked.emit, writable and row is not None and len(row.path) > 1),
-            ("Delete", "delete", self.delete_asked.emit, self.duplicate.isEnabled()),
-        ):
-            action = menu.addAction(f"{words}\t{key_words(keys_of(name)[0])}")
-            action.setEnabled(possible)
-            action.triggered.connect(lambda _checked=False, act=act: act())
-        menu.popup(self.tree.viewport().mapToGlobal(at))
 
     def indexes(self) -> list[QModelIndex]:
         """Return the rows in their order, those of branches that are closed included."""

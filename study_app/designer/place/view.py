@@ -581,14 +581,7 @@ class DesignerPlace(Place):
         outline.field_asked.connect(self.areas.focus_field)
         outline.form_asked.connect(self.areas.focus_form)
         outline.element_clicked.connect(self.areas.leave_drawer)
-        outline.add_asked.connect(self.ask_to_add)
-        outline.duplicate_asked.connect(self.duplicate)
-        outline.delete_asked.connect(self.delete)
-        outline.copy_asked.connect(lambda: self.ask("copy", outline.selected))
-        outline.paste_asked.connect(partial(self.ask, "paste"))
-        outline.rename_asked.connect(self._rename)
-        outline.move_asked.connect(self.move_by)
-        outline.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
+        outline.tree.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
         outline.several_changed.connect(lambda: form.show_selected(outline.selected))
         self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
         self.parts.path.open_asked.connect(partial(self._ask, "select"))
@@ -620,10 +613,19 @@ class DesignerPlace(Place):
         for name, button in (
             ("keys", self.header.keys), ("undo", self.header.undo), ("redo", self.header.redo),
             ("save", self.header.save), ("up", head.up), ("down", head.down), ("duplicate", head.copy),
-            ("series", head.series),
+            ("series", head.series), ("add", self.outline.add), ("duplicate", self.outline.duplicate),
         ):  # fmt: skip
             press(button, self.commands[name])
         head.delete.clicked.connect(self.delete)
+        tree = self.outline.tree
+        tree.addActions([self.commands["add"], self.commands["duplicate"]])
+        copy, paste = lambda: self.ask("copy", self.outline.selected), partial(self.ask, "paste")
+        own = add_commands(tree, {"copy": copy, "paste": paste})
+        tree.addActions([self.commands[name] for name in ("up", "down", "rename")])
+        own |= add_commands(tree, {"delete": self.delete})
+        for action in own.values():  # elsewhere these keys are those of a list or a text
+            action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        self.commands |= own
 
     # the elements of the form and of the outline that are selected
 
@@ -679,12 +681,15 @@ class DesignerPlace(Place):
         elsewhere = before.form is None or before.form.path != view.form.path
         if elsewhere:
             self.close_prompt(elsewhere=True)
+        writable = not view.header.read_only and not view.form.unreadable
+        of_element, ordered = writable and view.form.id is not None, writable and view.form.position is not None
+        possible = {"add": writable, "paste": writable, "up": ordered, "down": ordered, "copy": len(view.form.path) > 1}
+        for name, on in (possible | dict.fromkeys(("duplicate", "rename", "delete"), of_element)).items():
+            self.commands[name].setEnabled(on)
         self.parts.path.show_form(view.form)
         self.form.show_form(view.form, read_only=view.header.read_only)
         self.file.show_file(view.file, scroll=elsewhere, read_only=view.header.read_only)
         self.problem_steps.show_problems(view.problems, view.form.path)
-        self.outline.duplicate.setEnabled(self.form.head.copy.isEnabled())
-        self.outline.add.setEnabled(not view.header.read_only and not view.form.unreadable)
         self.outline.tree.rows.movable = not view.header.read_only
         if self.outline.rows:
             self.outline.mark(view.form.path)
