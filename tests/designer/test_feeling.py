@@ -63,8 +63,8 @@ def test_a_liquid_is_felt_with_unsaved_values_and_put_back_as_one_step(qtbot: An
     lab = feel(qtbot, visit, "liquids", "thick")
     assert both.designer.place.form.head.feel.accessibleName() == "Feel Thick"
     assert (lab.bench.a.name, lab.bench.a.value("liquid.density_kg_m3")) == ("Thick", 1500)
-    lab.place.changed.emit("liquid.density_kg_m3", 1234.5, False)
-    lab.place.changed.emit("effects.added_mass", "on", False)
+    lab.place.ask("change", "liquid.density_kg_m3", 1234.5, False)
+    lab.place.ask("change", "effects.added_mass", "on", False)
     qtbot.waitUntil(lambda: lab.place.view.workbench == lab.bench)
     assert lab.place.form.back.isVisible()
     steps = len(editing.opened.done)
@@ -88,8 +88,8 @@ def test_a_block_is_felt_as_two_liquids_and_each_goes_back_to_its_own(qtbot: Any
     lab = feel(qtbot, visit, "blocks", "liquids")
     assert both.designer is not None
     assert (lab.bench.a.name, lab.bench.b.name) == ("Thin", "Thick")
-    lab.place.switched.emit()
-    lab.place.changed.emit("liquid.density_kg_m3", 1700.0, False)
+    lab.place.ask("switch")
+    lab.place.ask("change", "liquid.density_kg_m3", 1700.0, False)
     qtbot.waitUntil(lambda: lab.place.view.workbench.presented == "B" and lab.place.view.workbench.b.is_edited)
     qtbot.mouseClick(lab.place.form.back, Qt.MouseButton.LeftButton)
     assert both.designer.editing.opened is not None

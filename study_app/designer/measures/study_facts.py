@@ -323,11 +323,11 @@ def facts(study: Study) -> Facts:
     )
     if valid.forces:
         forces_n = {name: steady(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids}
-        warned = warnings(protocol, simulates=False, without_force=device_without_force())
-        known = replace(known, forces_n=forces_n, warnings=(*warned, *translate))
+        known = replace(known, forces_n=forces_n)
     if not valid.whole:
         return known
     orders = orders_of(protocol)
+    warned = warnings(protocol, simulates=False, without_force=device_without_force()) if valid.forces else ()
     return replace(
         known,
         expected_s=expected_duration_s(protocol),
@@ -335,4 +335,5 @@ def facts(study: Study) -> Facts:
         trials=sum(block.trials for block in orders.blocks),
         answers=orders.answers,
         breaks=sum(block.breaks for block in orders.blocks),
+        warnings=(*warned, *translate),
     )
