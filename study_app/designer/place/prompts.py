@@ -1,4 +1,4 @@
-"""Cards over the place: questions before a step (deletion, discarding, series), and the list of keys."""
+"""Cards over the place: questions before a step, and the list of keys."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -134,16 +134,14 @@ class DeleteCard(Prompt):
         self.first: QWidget = self.all
 
 
-class DiscardCard(Prompt):
-    """Whether a study that was never saved is discarded; ``answered`` comes where it is."""
+class ConfirmCard(Prompt):
+    """Whether something is done that breaks or loses something; ``answered`` comes where it is."""
 
-    def __init__(self, title: str, file: str) -> None:
-        super().__init__(
-            f"Discard “{title}”?",
-            f"{file} was never saved: without its draft nothing of this study is left. This cannot be undone.",
-        )
-        self.go_on = ActionButton("trash", "Discard the draft", role="danger", height=40)
-        self.go_on.clicked.connect(lambda: self.answered.emit(file))
+    def __init__(self, title: str, explanation: str, action: str, icon: str = "", breaks: Sequence[str] = ()) -> None:
+        super().__init__(title, explanation)
+        add_parts(self.column, *(label(f"•  {words}", "label", wraps=True) for words in breaks))
+        self.go_on = ActionButton(icon, action, role="danger", height=40)
+        self.go_on.clicked.connect(lambda: self.answered.emit(action))
         self.buttons.addWidget(self.go_on)
         add_layout(self.column, self.buttons)
         self.first: QWidget = self.cancel

@@ -12,7 +12,7 @@ from study_app.designer.document.toml_text import Refused, free_in
 from study_app.designer.new_study.known_studies import source_of
 from study_app.designer.participant.play import Notice
 from study_app.designer.place.editing import Editing
-from study_app.designer.place.prompts import DiscardCard
+from study_app.designer.place.prompts import ConfirmCard
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.versions.changes import FileWatch, KnownRuns, SaveCard, compare, newest, version_of
 from study_app.designer.versions.version_rows import FILE, Comparison
@@ -136,7 +136,9 @@ class Saving(QObject):
             self._close_notice(opened)
             return
         if action == "discard" and not opened.base:
-            card = DiscardCard(opened.title or opened.file.stem, opened.file.name)
+            lost = "was never saved: without its draft nothing of this study is left. This cannot be undone."
+            title = f"Discard “{opened.title or opened.file.stem}”?"
+            card = ConfirmCard(title, f"{opened.file.name} {lost}", "Discard the draft", "trash")
             card.answered.connect(self.give_up)
             self.place.show_prompt(card, card.first)
             return

@@ -20,7 +20,7 @@ from study_app.designer.document.steps import RenameElement, Request
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import Comment, comments_naming, shown
 from study_app.designer.place.editing import Editing
-from study_app.designer.place.prompts import Prompt
+from study_app.designer.place.prompts import ConfirmCard, Prompt
 from study_app.designer.place.segments import small_button
 from study_app.designer.place.view import DesignerPlace, PanePage
 from study_app.designer.problems.problems import NameRefusal
@@ -291,20 +291,6 @@ def _field(name: str, text: str, width: int) -> QLineEdit:
     made.setAccessibleName(name)
     made.setFixedWidth(width)
     return made
-
-
-class UnlockCard(Prompt):
-    """What another id of a question breaks; ``answered`` comes where it is to be changed all the same."""
-
-    def __init__(self, name: str, why: str, breaks: Sequence[str]) -> None:
-        super().__init__(f"Change the id “{name}”?", f"{why} With another id:")
-        for words in breaks:
-            self.column.addWidget(label(f"•  {words}", "label", wraps=True))
-        self.go_on = ActionButton("", "Change the id", role="danger", height=40)
-        self.go_on.clicked.connect(lambda: self.answered.emit(name))
-        self.buttons.addWidget(self.go_on)
-        add_layout(self.column, self.buttons)
-        self.first: QWidget = self.cancel
 
 
 class CommentsCard(Prompt):
@@ -583,8 +569,9 @@ class Renaming(QObject):
 
     def _explain(self) -> None:
         path = self.editing.selected
-        card = UnlockCard(self._id(path), self._why(path), BREAKS)
-        card.answered.connect(lambda _id: self._unlock(path))
+        title, why = f"Change the id “{self._id(path)}”?", f"{self._why(path)} With another id:"
+        card = ConfirmCard(title, why, "Change the id", breaks=BREAKS)
+        card.answered.connect(lambda _action: self._unlock(path))
         self.place.show_prompt(card, card.first)
 
     def _unlock(self, path: Place) -> None:
