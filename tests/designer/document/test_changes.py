@@ -1,0 +1,356 @@
+"""Changes of a study: names that follow, elements added and copied, series, texts and fragments."""
+
+import re
+from typing import Any
+
+import pytest
+
+from study_app.designer.document.additions import added, check_values, number_row, titles_with
+from study_app.designer.document.changes import filled_in, followed, moved, switched, texts_of, with_language
+from study_app.designer.document.fields import initial
+from study_app.designer.document.fragments import copied, pasted
+from study_app.designer.document.names import (
+    check_id,
+    choices_at,
+    deletions,
+    left_without,
+    named_at,
+    references_to,
+    renamed,
+    with_references,
+)
+from study_app.designer.document.steps import MakeSeries, Situation
+from study_app.designer.document.study import Study, read
+from study_app.designer.document.toml_edits import Set, Unset
+from study_app.designer.document.toml_text import Refused
+from study_app.designer.measures.study_facts import copied_texts, facts, missing_texts
+from study_app.designer.new_study.new_study import template
+from study_app.designer.new_study.templates import FOLDER
+from study_app.ids import MAX_ID
+from study_app.protocol.groups import sequences_in
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.source.document import Path, entries, value_at
+from tests.designer.document.grown import PROTOCOLS, texts
+from tests.designer.document.random_edits import at, owners
+
+NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))
+
+
+def study_of(name: str) -> Study:
+    return read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
+
+
+def things(document: Any) -> list[Path]:
+    sections = [path for path, _ in entries(document, "*.*") if path[0] not in {"study", "device", "scene", "limits"}]
+    tables = [path for path in sections if isinstance(path[1], str) and path[0] != "analysis"]
+    return [*tables, *(path for path, _ in entries(document, "questionnaires.*.items.*"))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_renamed_leaves_no_reference_and_no_session_changed(name: str) -> None:
+    study = study_of(name)
+    for thing in things(study.document)[::4]:
+        if thing[0] in {"designs", "methods"} or (len(thing) == 4 and "instrument" in str(study.document[thing[0]])):
+            continue
+        changed, _ = study.edited(*renamed(study.document, thing, "quite_other"))
+        assert changed.protocol is not None, (thing, changed.problems)
+        assert study.protocol is not None
+        before, after = (build_schedule(one.protocol, "P001", 1).steps for one in (study, changed))
+        assert [type(step) for step in before] == [type(step) for step in after]
+        if thing[0] in {"liquids", "conditions", "tasks", "scales", "pages"}:  # other names are those of random streams
+            named = repr(before).replace(f"'{thing[1]}'", "'quite_other'")
+            assert repr(after) in {repr(before), named}, thing
+        back, _ = changed.edited(*renamed(changed.document, _renamed(thing), str(_name(study.document, thing))))
+        assert back.text == study.text
+
+
+def _renamed(thing: Path) -> Path:
+    return thing if isinstance(thing[-1], int) else (*thing[:-1], "quite_other")
+
+
+def _name(document: Any, thing: Path) -> Any:
+    for step in thing:
+        document = document[step]
+    return document["id"] if isinstance(thing[-1], int) else thing[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "thing", [("liquids", "water"), ("scales", "agreement"), ("tasks", "explore"), ("pages", "rest")]
+)
+def test_with_references_leaves_none_that_dangles(thing: Path) -> None:
+    study = study_of("rek2024")
+    paths = with_references(study.document, thing, study.needs)
+    assert paths[-1] == thing
+    changed, _ = study.edited(*deletions(paths))
+    assert not [fault for fault in changed.faults if "there is no" in fault.message and '"' in fault.message], thing
+
+
+@pytest.mark.parametrize(
+    ("thing", "place"), [(("tasks", "reach"), ("blocks", "delay", "task")),
+                         (("liquids", "water"), ("stimuli", "delay", "condition"))],
+)  # fmt: skip
+def test_what_leaves_the_name_of_the_only_one_out_goes_with_it(thing: Path, place: Path) -> None:
+    study = study_of("delayjnd")
+    assert left_without(study.document, [thing]) == (place,)
+    assert place[:2] in with_references(study.document, thing, study.needs)
+
+
+def test_the_only_condition_leaves_its_liquid_to_what_leaves_its_name_out() -> None:
+    study = study_of("delaydetect")
+    condition, liquid = ("conditions", "water"), ("liquids", "water")
+    assert left_without(study.document, [condition]) == ()
+    assert with_references(study.document, condition, study.needs) == (condition,)
+    changed, _ = study.edited(*deletions([condition]))
+    assert not changed.faults
+    assert left_without(study.document, [condition, liquid]) == (("stimuli", "delay", "condition"),)
+    assert {condition, ("stimuli", "delay")} <= {*with_references(study.document, liquid, study.needs)}
+
+
+def test_with_references_leaves_no_list_empty() -> None:
+    study = read((FOLDER / "compare-liquids.toml").read_bytes(), FOLDER)
+    gone = with_references(study.document, ("liquids", "syrup"), study.needs)
+    assert gone == (("sequence", 1), ("blocks", "practice"), ("conditions", "practice"), ("liquids", "syrup"))
+    changed, _ = study.edited(*deletions(gone))
+    assert not changed.faults
+
+
+def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
+    text = re.sub(r"\[conditions\.\w+\]\n(?:\w+ = .*\n)+", "", (FOLDER / "compare-liquids.toml").read_text())
+    study = read(text.replace('conditions = ["practice"]', 'conditions = ["syrup"]').encode(), FOLDER)
+    assert not study.problems
+    place = ("blocks", "liquids", "conditions", 1)
+    assert named_at(study.document, place) == ("liquids", "oil")
+    assert references_to(study.document, ("liquids", "oil")) == (place,)
+    assert choices_at(study.document, place) == ("water", "oil", "honey", "syrup")
+    for edits in (
+        renamed(study.document, ("liquids", "oil"), "butter"),
+        deletions(with_references(study.document, ("liquids", "oil"), study.needs)),
+    ):
+        changed, _ = study.edited(*edits)
+        assert not changed.problems
+
+
+@pytest.mark.parametrize("name", ["", "Water", "2nd", "with blank", "é", "a" * (MAX_ID + 1)])
+def test_check_id_refuses_what_is_no_id(name: str) -> None:
+    with pytest.raises(Refused, match="is not an id: write at most"):
+        check_id(name)
+
+
+def test_a_new_liquid_exerts_a_force_and_a_new_ball_fits_the_tank() -> None:
+    study = template("empty")
+    edits, path = added(study, ("liquids",))
+    study, _ = study.edited(*edits)
+    assert study.faults == ()
+    assert study.document["liquids"][path[1]] == {"density_kg_m3": 1200}
+    assert initial(study.document, (*path, "body", "diameter_m")) == 0.068
+
+
+TASK = ("tasks", "explore")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["reach", "follow"])
+def test_switched_keeps_what_both_kinds_have_and_gives_back_the_rest(kind: str) -> None:
+    study = study_of("slime")
+    edits, left = switched(study, TASK, kind, {})
+    assert set(left) == {"min_s", "max_s"}
+    other, _ = study.edited(*edits)
+    table = other.document["tasks"]["explore"]
+    assert table["kind"] == kind
+    assert table["instruction"] == study.document["tasks"]["explore"]["instruction"]
+    assert not {"min_s", "max_s"} & set(table)
+    assert not [fault for fault in other.faults if "missing" in fault.message or "unknown" in fault.message]
+    back, _ = other.edited(*switched(other, TASK, "explore", left)[0])
+    assert back.document == study.document
+
+
+REK = (PROTOCOLS / "rek2024.toml").read_text(encoding="utf-8")
+TITLE_LINE = 'title = { en = "Baseline settings", nl = "Basisinstellingen" }'
+NO_DELAY = ("conditions", "delay_0")
+REPETITIONS = ("blocks", "liquids", "repetitions")
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return read(REK.encode(), PROTOCOLS)
+
+
+@pytest.mark.parametrize(
+    ("values", "why"),
+    [
+        ((2000,), "2000 is not permitted: Delay is at most 1000"),
+        ((-5, 30), "-5 is not permitted: Delay is at least 0"),
+        ((30, 30.0), "30 is there twice, or is the value of the original"),
+        ((30, 0), "0 is there twice, or is the value of the original"),
+        ((), "a series has 1 to 24 copies"),
+        (tuple(range(1, 26)), "a series has 1 to 24 copies"),
+    ],
+)
+def test_values_are_refused_in_one_sentence(study: Study, values: tuple[float, ...], why: str) -> None:
+    row = number_row(study.document, NO_DELAY, (*NO_DELAY, "delay_ms"))
+    with pytest.raises(Refused, match=f"^{why}$"):
+        check_values(study.document, row, values)
+
+
+@pytest.mark.parametrize(
+    ("title", "titles"),
+    [
+        (TITLE_LINE.removeprefix("title = "), {"en": "Baseline settings, 3", "nl": "Basisinstellingen, 3"}),
+        ('"Liquids 2"', "Liquids 2, 3"),
+        ('"Level A-1"', "Level A-3"),
+        ('"Level -1"', "Level -1, 3"),
+        ('"Times 1.0"', "Times 3"),
+    ],
+)
+def test_the_number_of_the_element_is_replaced_in_each_title_and_else_added(title: str, titles: Any) -> None:
+    study = read(REK.replace(TITLE_LINE, f"title = {title}").encode(), PROTOCOLS)
+    row = number_row(study.document, REPETITIONS[:2], REPETITIONS)
+    found = dict(titles_with(study.document, REPETITIONS[:2], row, 3))
+    assert found == (
+        {("title", code): text for code, text in titles.items()} if isinstance(titles, dict) else {("title",): titles}
+    )
+
+
+def test_copies_are_listed_after_the_original_where_the_block_can_take_them(study: Study) -> None:
+    step = MakeSeries(NO_DELAY, (*NO_DELAY, "delay_ms"), (30, 60)).step(Situation(study))
+    after, _ = study.edited(*step.edits)
+    assert after.faults == ()
+    assert step.several == (("conditions", "delay_30"), ("conditions", "delay_60"))
+    assert value_at(after.document, ("conditions", "delay_60", "delay_ms")) == 60
+    assert list(value_at(after.document, ("blocks", "baseline", "conditions"))) == ["delay_0"]
+    assert list(value_at(after.document, ("blocks", "delays", "conditions")))[:4] == [
+        "delay_0", "delay_30", "delay_60", "delay_50",
+    ]  # fmt: skip
+
+
+TEXTS = texts()
+PASTED = 8
+"""So many elements of each text are copied, evenly spread."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TEXTS)
+def test_entries_come_together_to_their_place_in_their_order(name: str) -> None:
+    study = Study(TEXTS[name])
+    lists = [*sequences_in(study.document), *entries(study.document, "questionnaires.*.items")]
+    for place, listed in lists:
+        count = len(listed)
+        for chosen, to in (([0], count), ([count - 1], 0), (list(range(0, count, 2)), count // 2)):
+            edits, paths = moved(study, [(*place, index) for index in chosen], to)
+            after, _ = study.edited(*edits)
+            rest = [entry for index, entry in enumerate(listed) if index not in chosen]
+            first = to - sum(index < to for index in chosen)
+            wanted = [*rest[:first], *(listed[index] for index in chosen), *rest[first:]]
+            assert list(at(after.document, place)) == wanted
+            assert [at(after.document, path) for path in paths] == [listed[index] for index in chosen]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_pasted_copy_has_the_values_and_comments_of_its_original(name: str) -> None:
+    study = Study(TEXTS[name])
+    before = owners(study.text)
+    found = [path for path, value in entries(study.document, "*.*") if isinstance(value, dict)]
+    found += [path for path, _ in entries(study.document, "questionnaires.*.items.*")]
+    for path in found[:: max(1, len(found) // PASTED)]:
+        try:
+            made, (copy,) = pasted(study, path, copied(study, [path]))
+        except Refused:
+            assert path[0] in {"study", "scene", "device", "analysis", "limits"}
+            continue
+        after = Study(made, before=study.document)
+        old, new = at(study.document, path), at(after.document, copy)
+        assert {**old, "id": 0} == {**new, "id": 0}
+        if f"[{path[0]}.{path[1]}]" in study.text or len(path) > 2:
+            comments = owners(made)
+            for (place, comment), count in before.items():
+                if place[: len(path)] == path:
+                    assert comments[(*copy, *place[len(path) :]), comment] >= count, (path, comment)
+        lines = set(study.text.splitlines())
+        assert lines <= set(made.splitlines())
+
+
+def test_keys_before_a_header_do_not_end_up_in_another_table() -> None:
+    study = Study(TEXTS["demo"])
+    made, _ = pasted(study, ("liquids", "thick"), "liquids.honey.density_kg_m3 = 1_420\n")
+    assert Study(made).document["liquids"]["honey"] == {"density_kg_m3": 1420}
+
+
+@pytest.mark.parametrize("text", ["study.name = 'x'", "liquids.x = 5", "# a comment", "liquids = 4", "other.x.y = 1"])
+def test_what_is_no_element_of_a_study_is_refused(text: str) -> None:
+    with pytest.raises(Refused):
+        pasted(Study(TEXTS["demo"]), ("liquids", "thick"), text)
+
+
+TITLE = ("pages", "welcome", "title")
+DEMO = read((PROTOCOLS / "demo.toml").read_bytes(), PROTOCOLS)
+
+
+@pytest.fixture(scope="module")
+def translated() -> Study:
+    """The demo with two languages that are copies of the first one, as one step."""
+    study = DEMO
+    for code in ("nl", "de"):
+        study, _ = study.edited(*with_language(study, code))
+    for code in ("nl", "de"):
+        study, _ = study.edited(*filled_in(study, code))
+    return study
+
+
+def words(study: Study) -> list[str]:
+    return [one for one in facts(study).warnings if "to translate" in one]
+
+
+def test_copies_in_two_languages_are_counted_until_each_is_edited(translated: Study) -> None:
+    count = sum(any(map(str.isalpha, str(text["en"]))) for _, text in texts_of(translated))
+    assert copied_texts(translated) == {"nl": count, "de": count}
+    assert translated.faults == ()
+    assert words(translated) == [
+        f"study.languages: {count} texts to translate to {name}, as in English so far" for name in ("Dutch", "German")
+    ]
+    edited, _ = translated.edited(Set((*TITLE, "nl"), "Een eerste blik"))
+    assert copied_texts(edited) == {"nl": count - 1, "de": count}
+    assert (copied_texts(DEMO), words(DEMO)) == ({}, [])
+
+
+def test_a_missing_text_is_not_one_to_translate(translated: Study) -> None:
+    lacking, _ = translated.edited(Unset((*TITLE, "nl")))
+    counts = copied_texts(translated)
+    assert missing_texts(lacking) == {"nl": 1}
+    assert copied_texts(lacking) == counts | {"nl": counts["nl"] - 1}
+    assert [fault.missing_language for fault in lacking.faults] == ["nl"]
+
+
+def test_a_text_without_letters_is_the_same_in_every_language(translated: Study) -> None:
+    counts = copied_texts(translated)
+    plain, _ = translated.edited(*(Set((*TITLE, code), "7") for code in ("en", "nl")))
+    assert copied_texts(plain) == counts | {"nl": counts["nl"] - 1, "de": counts["de"] - 1}
+
+
+ITEM = ("questionnaires", "liquid", "items", 0)
+
+
+def with_question(text: str, short: str) -> Study:
+    source = (PROTOCOLS / "rek2024.toml").read_text(encoding="utf-8")
+    start = source.index("[[questionnaires.liquid.items]]")
+    end = source.index("[[questionnaires.liquid.items]]", start + 1)
+    table = f'[[questionnaires.liquid.items]]\nid = "feels_liquid"\ntext = {text}\nshort = {short}\n\n'
+    return read((source[:start] + table + source[end:]).encode(), PROTOCOLS)
+
+
+@pytest.mark.parametrize(
+    ("text", "short", "found"),
+    [
+        ('"New question"', '"New question"', {("short",): "Was it cold"}),
+        ('{ en = "Was", nl = "Was" }', '{ en = "Was", nl = "Kou" }', {("short", "en"): "Was it cold"}),
+        ('{ en = "Was", nl = "Was" }', '{ en = "Cold", nl = "Was" }', {}),
+        ('{ nl = "Was" }', '{ nl = "Was" }', {}),
+        ('"Was it cold?"', '"Cold"', {}),
+        ('{ en = "Was" }', '"Was"', {}),
+    ],
+)
+def test_a_short_text_that_says_what_the_text_says_follows_it(text: str, short: str, found: dict[Any, str]) -> None:
+    edits = followed(with_question(text, short), (*ITEM, "text"), "en", "Was it cold?")
+    assert {edit.path[len(ITEM) :]: edit.value for edit in edits} == found  # type: ignore[union-attr]

@@ -1,0 +1,438 @@
+"""A study that is open: undo and redo, its draft, and the versions that were run."""
+
+import itertools
+import json
+import os
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from study_app.designer.document.document import Document, check_version, next_version, standing
+from study_app.designer.document.fields import rows
+from study_app.designer.document.study import read
+from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset
+from study_app.designer.document.toml_text import Refused
+from study_app.errors import ProtocolError, StoreError
+from study_app.protocol.load import load, parse
+from study_app.protocol.source.files import protocol_hash, shipped
+from study_app.store.drafts import REST_S, Draft, Keeper, discard, draft_of, drafted_files, keep
+from study_app.store.receipt import without_conditions
+from study_app.store.study_runs import Run, keep_what_was_run, runs
+from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, kept_versions, save
+from study_app.user_folder import data_folder
+from tests.designer.document.grown import PROTOCOLS
+
+DEMO = read((PROTOCOLS / "demo.toml").read_bytes())
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_study_is_what_check_reads(name: str) -> None:
+    study = read((PROTOCOLS / f"{name}.toml").read_bytes(), PROTOCOLS)
+    assert study.protocol == load(name)
+    assert study.problems == ()
+
+
+@pytest.mark.parametrize(("old", "new"), [('liquid = "thin"', 'liquid = "thn"'), ("format = 1", "format = ")])
+def test_problems_are_those_of_check(old: str, new: str) -> None:
+    source = DEMO.text.replace(old, new).encode()
+    with pytest.raises(ProtocolError) as raised:
+        parse(source, "demo")
+    assert read(source).problems == raised.value.problems
+
+
+def test_undo_and_redo_restore_text_and_selection() -> None:
+    opened = Document(DEMO, ("liquids", "thin"))
+    opened.undo()
+    opened.redo()
+    found = [(DEMO.text, ("liquids", "thin"))]
+    for words, edit, select in (
+        ("Change the title", Set(("study", "title"), "New"), ("study",)), ("Remove the limits", Unset(("limits",)), ()),
+    ):  # fmt: skip
+        opened.edit(words, edit, select=select)
+        found.append((opened.study.text, opened.selected))
+    for at in (1, 0):
+        opened.undo()
+        assert (opened.study.text, opened.selected) == found[at]
+    for at in (1, 2):
+        opened.redo()
+        assert (opened.study.text, opened.selected) == found[at]
+    opened.undo()
+    opened.edit("Other", Set(("study", "title"), "Other"))
+    assert ([step.words for step in opened.done], opened.undone) == (["Change the title", "Other"], [])
+
+
+def test_steps_of_one_key_join_until_the_keyboard_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 0.0
+    monkeypatch.setattr("study_app.designer.document.document.time", SimpleNamespace(monotonic=lambda: now_s))
+    opened = Document(DEMO)
+    for now_s, key in ((1.0, "title"), (1.5, "title"), (3.0, "title"), (3.1, "other"), (3.2, None), (3.3, None)):
+        opened.edit("Type", Set(("study", "title"), f"New at {now_s}"), key=key)
+    assert len(opened.done) == 5
+    for _ in range(5):
+        opened.undo()
+    assert opened.study.text == DEMO.text
+
+
+def test_a_step_that_changes_nothing_is_none() -> None:
+    same = Document(DEMO, ())
+    same.edit("Same", Set(("format",), 1), select=("study",))
+    assert (same.done, same.selected) == ([], ("study",))
+
+
+def test_a_text_that_is_not_toml_keeps_its_last_document_and_is_typed_on() -> None:
+    broken = Document(DEMO)
+    broken.edit("Type", text=DEMO.text.replace("format = 1", "format = "))
+    assert not broken.study.is_toml
+    assert broken.study.document == DEMO.document
+    assert "not TOML" in broken.study.problems[0].message
+    with pytest.raises(Refused, match="correct its text first"):
+        broken.edit("Change", Set(("format",), 2))
+    assert len(broken.done) == 1
+    broken.edit("Type", text=DEMO.text)
+    assert broken.study.protocol == DEMO.protocol
+    broken.undo()
+    broken.undo()
+    assert broken.study.text == DEMO.text
+
+
+def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> None:
+    (tmp_path / "thick.toml").write_text("[liquids.any]\ndensity_kg_m3 = 1400\n")
+    own = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]'
+    text = DEMO.text.replace(own, '[liquids.thick]\nfile = "thick.toml"')
+    study = read(text.encode(), tmp_path)
+    assert study.protocol is not None
+    assert set(study.document) == set(DEMO.document)
+    assert study.document["liquids"]["thick"] == {"file": "thick.toml"}
+    assert not [row for row in rows(study.document, ("liquids", "thick")) if row.kind == "unknown"]
+
+
+def test_typed_refuses_half_a_character() -> None:
+    with pytest.raises(Refused, match="half a character"):
+        DEMO.typed(DEMO.text + "# \ud800")
+
+
+def test_read_refuses_what_is_not_utf_8() -> None:
+    with pytest.raises(Refused, match="line 2 is not UTF-8 text"):
+        read(b"a = 1\nb = '\xff'\n")
+
+
+BLOCK = ("blocks", "delays", "conditions")
+EDITS: tuple[Edit, ...] = (
+    Set(("conditions", "water", "delay_ms"), 5000),
+    Duplicate(("conditions", "water"), "sea"),
+    Insert((*BLOCK, 1), "sea"),
+    Move((*BLOCK, 1), 3),
+    Rename(("conditions", "delay_50"), "late", ((*BLOCK, 1),)),
+    Unset((*BLOCK, 4)),
+    Set(("liquids", "brine"), {"density_kg_m3": 1200, "effects": ["drag"], "wake": {"length": 40}}),
+    Unset(("study", "title")),
+)
+
+
+@pytest.mark.slow
+def test_a_trial_has_the_document_and_the_faults_of_the_text() -> None:
+    study = read((PROTOCOLS / "rek2024.toml").read_bytes(), PROTOCOLS)
+    tried = study.trial
+    for edit in EDITS:
+        written, (tried, _) = study.edited(edit)[0], tried.edited(edit)
+        assert tried.document == written.document
+        assert tried.faults == written.faults
+        study = written
+    assert study.faults
+
+
+def test_an_edit_that_makes_no_sense_is_refused_and_so_is_a_text_that_is_not_toml() -> None:
+    study = read((PROTOCOLS / "rek2024.toml").read_bytes(), PROTOCOLS)
+    with pytest.raises(Refused):
+        study.trial.edited(Unset(("liquids", "tar")))
+    with pytest.raises(Refused):
+        _ = study.typed("[")[0].trial
+
+
+KILLS = int(os.environ.get("LIQUID_STUDY_DRAFT_KILLS", "10"))
+AT_ONCE = 10
+
+
+def test_a_draft_is_found_again_until_it_is_discarded(tmp_path: Path) -> None:
+    file = tmp_path / "new.toml"
+    assert draft_of(file) is None
+    keep(file, Draft("a = 'é'\r\n", "abc", ("blocks", "a", 1)))
+    found = draft_of(file)
+    assert found is not None
+    assert (found.text, found.base, found.selected) == ("a = 'é'\r\n", "abc", ("blocks", "a", 1))
+    assert found.kept_at
+    assert draft_of(tmp_path / "other.toml") is None
+    discard(file)
+    discard(file)
+    assert draft_of(file) is None
+
+
+def test_files_with_a_draft_are_listed(tmp_path: Path) -> None:
+    assert drafted_files() == ()
+    for name in ("b.toml", "a.toml"):
+        keep(tmp_path / name, Draft("a = 1\n", ""))
+    (data_folder() / "drafts" / "broken.json").write_text("{")
+    assert drafted_files() == (tmp_path.resolve() / "a.toml", tmp_path.resolve() / "b.toml")
+    discard(tmp_path / "a.toml")
+    assert drafted_files() == (tmp_path.resolve() / "b.toml",)
+
+
+def test_keeper_writes_within_its_rest_however_fast_edits_follow(tmp_path: Path) -> None:
+    keeper = Keeper(tmp_path / "a.toml", "")
+    written = []
+    for tick in range(300):
+        now = tick / 100
+        keeper.edited("x" * tick, (), now)
+        if keeper.write_if_due(now):
+            written.append(now)
+    assert written[0] == REST_S
+    assert max(later - earlier for earlier, later in itertools.pairwise(written)) <= REST_S + 0.02
+    assert keeper.write()
+    assert not keeper.write()
+    assert not keeper.write_if_due(99)
+    found = draft_of(tmp_path / "a.toml")
+    assert found is not None
+    assert found.text == "x" * 299
+    keeper.saved("hash")
+    assert draft_of(tmp_path / "a.toml") is None
+
+
+def test_the_draft_of_another_program_is_kept_as_a_version_and_not_discarded(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    one, other = Keeper(file, ""), Keeper(file, "")
+    for keeper, text in ((one, "mine"), (other, "yours"), (one, "mine again")):
+        keeper.edited(text, (), 0.0)
+        keeper.write()
+    assert [kept_content(kept.hash) for kept in kept_versions(file)] == [b"mine", b"yours"]
+    assert {kept.origin for kept in kept_versions(file)} == {"draft"}
+    assert (one.others, other.others) == (1, 1)
+    other.saved("hash")
+    assert draft_of(file) is not None
+    one.saved("hash")
+    assert draft_of(file) is None
+
+
+def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keeper = Keeper(tmp_path / "a.toml", "")
+    keeper.edited("x", (), 0.0)
+    monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "file"))
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(StoreError, match="cannot be made"):
+        keeper.write()
+    (tmp_path / "file").unlink()
+    assert keeper.write()
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"text": 1, "base": "", "selected": [], "kept_at": ""}'])
+def test_a_broken_draft_is_none(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "a.toml"
+    keep(file, Draft("x", ""))
+    (path,) = Path(os.environ["LIQUID_STUDY_DATA"], "drafts").glob("*.json")
+    path.write_bytes(content)
+    assert draft_of(file) is None
+
+
+TYPING = """
+import sys, time
+from pathlib import Path
+from study_app.store.drafts import Keeper
+keeper, letters = Keeper(Path(sys.argv[1]), "base"), 0
+while True:
+    letters += 1
+    keeper.edited("x" * letters, ("study", "title"), time.monotonic())
+    print(letters, time.time(), flush=True)
+    keeper.write_if_due(time.monotonic())
+    time.sleep(0.005)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="needs SIGKILL")
+def test_a_kill_while_typing_loses_at_most_the_last_second(tmp_path: Path) -> None:
+    draw = random.Random(1)  # noqa: S311
+    drafts = 0
+    for start in range(0, KILLS, AT_ONCE):
+        files = [tmp_path / f"study_{number}.toml" for number in range(start, start + AT_ONCE)]
+        for file in files:
+            file.write_text("a = 1\n")
+        outs = [file.with_suffix(".out") for file in files]
+        typing = []
+        for file, out in zip(files, outs, strict=True):
+            with out.open("wb") as stdout:
+                typing.append(subprocess.Popen([sys.executable, "-c", TYPING, str(file)], stdout=stdout))
+        while not all(out.stat().st_size for out in outs):
+            time.sleep(0.01)
+        for process in typing:
+            time.sleep(draw.uniform(0.0, 0.3))
+            process.kill()
+            process.wait()
+        drafts += sum(_kept(file, out) for file, out in zip(files, outs, strict=True))
+    assert drafts >= KILLS // 2
+
+
+def _kept(file: Path, out: Path) -> bool:
+    """Check what is left of a study whose typing was killed; return whether there is a draft."""
+    assert file.read_text() == "a = 1\n"
+    times = [float(line.split()[1]) for line in out.read_text().splitlines() if len(line.split()) == 2]
+    draft = draft_of(file)
+    letters = 0 if draft is None else len(draft.text)
+    assert draft is None or draft.text == "x" * letters
+    lost = times[letters:]
+    assert not lost or lost[-1] - lost[0] <= 1.0, (letters, len(times))
+    return draft is not None
+
+
+TEXT = (PROTOCOLS / "demo.toml").read_text(encoding="utf-8")
+
+
+def session(folder: Path, participant: str, source: bytes, **facts: Any) -> None:
+    path = folder / "data" / f"sub-{participant}" / "ses-01" / "receipt.json"
+    path.parent.mkdir(parents=True)
+    protocol = without_conditions(parse(source, "demo"))
+    held = {
+        "key_hash": "0" * 64, "protocol_hash": protocol_hash(source), "protocol": protocol, "simulated": False,
+        "pilot": False, "started_at": "2026-11-21T12:00:00+00:00", **facts,
+    }  # fmt: skip
+    path.write_text(json.dumps(held))
+
+
+def test_runs_counts_sessions_pilots_and_rehearsals_by_content(tmp_path: Path) -> None:
+    one, other = TEXT.encode(), TEXT.replace('version = "1.0"', 'version = "1.1"').encode()
+    session(tmp_path / "demo", "P001", one)
+    session(tmp_path / "demo", "P002", one)
+    session(tmp_path / "demo", "P003", other, started_at="2026-11-22T12:00:00+00:00")
+    session(tmp_path / "demo-pilot", "P001", one, pilot=True)
+    session(tmp_path / "demo-pilot-2", "P001", other, pilot=True, simulated=True)  # played and kept
+    session(tmp_path / "demo-rehearsal-1", "P001", other, simulated=True)
+    (tmp_path / "demo" / "data" / "sub-P004" / "ses-01").mkdir(parents=True)
+    found = runs(tmp_path, "demo")
+    assert [(run.version, run.sessions, run.pilots, run.rehearsals) for run in found] == [
+        ("1.0", 2, 1, 0),
+        ("1.1", 1, 1, 1),
+    ]
+    assert [run.hash for run in found] == [protocol_hash(one), protocol_hash(other)]
+    assert found[0].protocol == json.loads(json.dumps(without_conditions(parse(one, "demo"))))
+    assert runs(tmp_path, "other") == ()
+
+
+def test_a_content_that_was_run_is_kept_before_the_file_changes(tmp_path: Path) -> None:
+    file = tmp_path / "demo.toml"
+    file.write_text(TEXT, encoding="utf-8")
+    keep_what_was_run(file, [Run("another", "1.0", sessions=1)])
+    assert kept_content(content_hash(TEXT.encode())) is None
+    keep_what_was_run(file, [Run(content_hash(TEXT.encode()), "1.0", sessions=1)])
+    assert kept_content(content_hash(TEXT.encode())) == TEXT.encode()
+
+
+def test_standing_says_when_saving_asks_and_which_version_is_free() -> None:
+    ran = (Run("abc", "1.0", sessions=2), Run("def", "1.1", sessions=1), Run("pil", "1.2", pilots=3))
+    assert not standing("new", "old", "0.1", [Run("pil", "0.1", pilots=1, rehearsals=2)]).asks
+    same = standing("abc", "abc", "1.0", ran)
+    assert (same.asks, same.version, same.sessions) == (False, "1.0", 2)
+    changed = standing("new", "abc", "1.0", ran)
+    assert (changed.asks, changed.version, changed.was, changed.others) == (True, "1.2", "1.1", 2)
+    raised = standing("new", "def", "2.0", ran)
+    assert (raised.asks, raised.version, raised.others) == (True, "2.0", 0)
+    assert not standing("newer", "new", "2.0", ran).asks
+
+
+@pytest.mark.parametrize("version", ["", "1 2", "1,2", "é"])
+def test_what_cannot_be_a_version_is_refused(version: str) -> None:
+    check_version("1.2-rc+3", [Run("abc", "1.2-rc+3", pilots=1)])
+    with pytest.raises(Refused, match="cannot be a version"):
+        check_version(version, [])
+    with pytest.raises(Refused, match="was run with another content"):
+        check_version("1.0", [Run("abc", "1.0", sessions=1)])
+
+
+def test_a_version_that_was_run_is_never_overwritten_with_other_content(tmp_path: Path) -> None:
+    opened = Document(read(TEXT.encode(), tmp_path), file=tmp_path / "study.toml")
+    own = content_hash(opened.source())
+    for harmless in (Run(own, "1.0", sessions=2), Run("other", "1.0", pilots=3), Run("other", "2.0", sessions=1)):
+        opened.save((harmless,))
+    with pytest.raises(Refused, match=r"version 1\.0 was run by 2 sessions with another content: .* version 1\.1$"):
+        opened.save((Run("other", "1.0", sessions=2),))
+
+
+@pytest.mark.parametrize(
+    ("version", "following"),
+    [("1", "2"), ("1.9", "1.10"), ("2026-a", "2027-a"), ("beta", "beta.1"), ("1.0-rc2", "1.0-rc3")],
+)
+def test_next_version_raises_the_last_number(version: str, following: str) -> None:
+    assert next_version(version) == following
+
+
+def test_save_replaces_the_file_keeps_its_permissions_and_its_previous_content(tmp_path: Path) -> None:
+    file, link = tmp_path / "study.toml", tmp_path / "link.toml"
+    file.write_bytes(b"a = 1\r\n")
+    file.chmod(0o640)
+    link.symlink_to(file)
+    base = content_hash(b"a = 1\r\n")
+    after = save(link, "a = 2\r\n", base)
+    assert file.read_bytes() == b"a = 2\r\n"
+    assert link.is_symlink()
+    assert file.stat().st_mode & 0o777 == 0o640
+    assert kept_content(base) == b"a = 1\r\n"
+    assert kept_content(after) == b"a = 2\r\n"
+    assert kept_content("0" * 64) is None
+    assert [(kept.hash, kept.origin) for kept in kept_versions(file)] == [(base, "found"), (after, "saved")]
+    save(file, "a = 1\r\n", after)
+    assert [kept.hash for kept in kept_versions(link)] == [base, after]
+
+
+def test_save_refuses_a_file_that_another_program_changed(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    base = save(file, "a = 1\n", "")
+    with pytest.raises(ChangedOutsideError, match="changed by another program"):
+        save(file, "a = 2\n", "")
+    file.write_text("b = 1\n")
+    with pytest.raises(ChangedOutsideError, match="changed by another program"):
+        save(file, "a = 2\n", base)
+    assert file.read_text() == "b = 1\n"
+    file.unlink()
+    with pytest.raises(ChangedOutsideError, match="deleted or moved"):
+        save(file, "a = 2\n", base)
+
+
+def test_lines_of_the_list_that_cannot_be_read_are_left_out(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    base = save(file, "a = 1\n", "")
+    (path,) = (data_folder() / "versions").glob("*.jsonl")
+    path.write_bytes(b'{"hash": "torn\n[]\n{"hash": "x", "origin": "else"}\n' + path.read_bytes())
+    assert [kept.hash for kept in kept_versions(file)] == [base]
+
+
+SAVING = """
+import sys
+from pathlib import Path
+from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, save
+from study_app.errors import StoreError
+file, name, saved = Path(sys.argv[1]), sys.argv[2], 0
+while saved < 20:
+    before = file.read_bytes()
+    text = before.decode() + f"{name}{saved} = 1\\n"
+    try:
+        save(file, text, content_hash(before))
+    except ChangedOutsideError:
+        continue
+    except StoreError:
+        continue
+    saved += 1
+"""
+
+
+@pytest.mark.slow
+def test_two_programs_that_save_one_file_lose_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    file.write_text("")
+    programs = [subprocess.Popen([sys.executable, "-c", SAVING, str(file), name]) for name in "ab"]
+    assert [program.wait(120) for program in programs] == [0, 0]
+    expected = {f"{name}{number} = 1" for name in "ab" for number in range(20)}
+    assert set(file.read_text().splitlines()) == expected
+    assert len(list(Path(os.environ["LIQUID_STUDY_DATA"], "contents").glob("*.toml"))) == 41

@@ -1,0 +1,461 @@
+"""Repairs of faults, numbers that follow every edit, and what simulated observers show."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from study_app.analysis.planning import threshold_studies
+from study_app.designer.document.additions import repairs
+from study_app.designer.document.study import Study, read
+from study_app.designer.document.toml_edits import Set, Unset
+from study_app.designer.measures import simulation
+from study_app.designer.measures.simulation import balance_of, focus_of, measurable, observe
+from study_app.designer.measures.study_facts import (
+    copied_texts,
+    facts,
+    revealing,
+    text_keys,
+    texts_by_language,
+    valid_part,
+)
+from study_app.designer.new_study.new_study import template
+from study_app.haptics.model.slope_limits import slope_limit
+from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
+from study_app.protocol.describe import describe
+from study_app.protocol.load import load
+from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
+from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
+from study_app.protocol.source.files import shipped, shipped_file
+from study_app.protocol.trials.presented_levels import LevelLimits, clipping, level_limits, levels, standard_of
+from tests.designer.document.grown import PROTOCOLS
+from tests.protocol.faulty_protocols import CASES, Case
+
+
+def study_of(name: str, *changes: tuple[str, str]) -> Study:
+    text = (PROTOCOLS / f"{name}.toml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return read(text.encode(), PROTOCOLS)
+
+
+@pytest.mark.slow
+def test_each_repair_of_the_known_faults_removes_its_fault() -> None:
+    repaired = {case.name for case in CASES if _repaired(case)}
+    assert len(repaired) >= 30, sorted(repaired)
+
+
+def _repaired(case: Case) -> int:
+    study = read(case.text.encode())
+    count = 0
+    for fault in study.faults:
+        for repair in repairs(study, fault):
+            after, _ = study.edited(*repair.edits)
+            assert (fault.path, fault.message) not in {(one.path, one.message) for one in after.faults}
+            count += 1
+    return count
+
+
+@pytest.mark.slow
+def test_a_level_beyond_the_slope_limit_is_repaired_by_the_highest_that_passes() -> None:
+    study = study_of("viscosityjnd", ("levels = [0.02, 0.6]", "levels = [0.02, 3]"))
+    (fault,) = study.faults
+    (repair,) = repairs(study, fault)
+    assert repair.words.startswith("Highest level ")
+    after, _ = study.edited(*repair.edits)
+    assert after.protocol is not None
+    highest = after.document["stimuli"]["damping"]["levels"][1]
+    above = study.text.replace("levels = [0.02, 3]", f"levels = [0.02, {highest * 1.01}]")
+    assert read(above.encode()).protocol is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("standard", "frequency_hz", "limit", "most"),
+    [(40, 1.0, "the slope limit", 0.324), (30, 1.3, "device.force_limit_n", 0.36)],
+)
+def test_the_highest_level_is_that_of_fixed_levels_too(
+    standard: float, frequency_hz: float, limit: str, most: float
+) -> None:
+    edits = Set(("stimuli", "damping", "standards"), [standard]), Set(("tasks", "stir", "frequency_hz"), frequency_hz)
+    study, _ = template("viscosity-jnd").edited(*edits)
+    (fault,) = study.faults  # one for both blocks
+    assert limit in fault.message
+    (repair,) = repairs(study, fault)
+    assert repair.words == f"Highest level {most:g}"
+    after, _ = study.edited(*repair.edits)
+    assert after.document["stimuli"]["damping"]["levels"] == (0.02, most)
+    assert after.document["methods"]["easy"]["levels"] == (most,)
+
+
+def test_a_fault_of_a_table_that_two_blocks_name_counts_once() -> None:
+    changes = Set(("stimuli", "damping", "level"), "value"), Set(("stimuli", "damping", "levels"), [9, 40])
+    study, _ = template("viscosity-jnd").edited(*changes, Set(("methods", "easy", "levels"), [12]))
+    assert [fault.path for fault in study.faults].count(("designs", "pair", "feedback")) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped())
+def test_facts_are_those_of_the_session_and_of_check(name: str) -> None:
+    study = study_of(name)
+    assert study.protocol is not None
+    found = facts(study)
+    steps = build_schedule(study.protocol, "P001", 1).steps
+    assert found.trials == sum(isinstance(step, Trial) for step in steps)
+    assert found.answers == sum(len(step.items) for step in steps if isinstance(step, Trial | FormStep))
+    assert found.expected_s == pytest.approx(sum(found.steps_s.values()))
+    words = describe(study.protocol)
+    assert f"about {found.expected_s / 60:.0f} min" in words
+    assert all(warning in words for warning in found.warnings)
+    assert set(found.forces_n) == set(study.protocol.liquids)
+    assert found.missing == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "block"), [("viscosityjnd", "viscosity"), ("delayjnd", "delay"), ("thickness", "thickness")]
+)
+def test_no_level_of_a_shipped_study_is_clipped(name: str, block: str) -> None:
+    found = levels(load(name), block)
+    assert found
+    assert not [level for level in found if level.clipped_by]
+    assert all(later.level > level.level for level, later in itertools.pairwise(found)
+               if level.standard == later.standard)  # fmt: skip
+
+
+def test_levels_say_which_limit_clips_them() -> None:
+    protocol = load("viscosityjnd")
+    slow = protocol.device.model_copy(update={"rate_hz": 500.0})
+    weak = protocol.device.model_copy(update={"force_limit_n": 2.0})
+    by = {
+        device: {level.clipped_by for level in levels(protocol.model_copy(update={"device": one}), "viscosity")}
+        for device, one in (("slow", slow), ("weak", weak))
+    }
+    assert "slope" in by["slow"]
+    assert "norm" in by["weak"]
+    clipped = [level for level in levels(protocol.model_copy(update={"device": weak}), "viscosity") if level.clipped_by]
+    assert all(level.asked_n > level.sent_n == 2.0 for level in clipped)  # type: ignore[operator]
+    assert levels(load("demo"), "liquids") == ()
+
+
+@pytest.mark.parametrize(("name", "block"), [("viscosityjnd", "viscosity"), ("thickness", "thickness")])
+def test_a_limit_begins_where_levels_begin_to_be_clipped(name: str, block: str) -> None:
+    protocol = load(name)
+    limits = level_limits(protocol, protocol.blocks[block])
+    assert limits is not None
+    assert limits.force is not None
+    assert limits.loop is not None
+    first = min(limits.force, limits.loop)
+    assert standard_of(protocol, block, 0.999 * first).clipped_by is None
+    assert standard_of(protocol, block, 1.001 * first).clipped_by is not None
+    force = standard_of(protocol, block, limits.force).asked_n
+    assert force == pytest.approx(protocol.device.force_limit_n, rel=1e-3)
+    if name == "viscosityjnd":
+        loop = slope_limit(1 / protocol.device.rate_hz, 1, protocol.scene.velocity)
+        assert limits.loop == pytest.approx(loop, rel=1e-4)
+
+
+def test_a_study_with_clipped_levels_still_has_its_numbers() -> None:
+    clipped, _ = study_of("viscosityjnd").edited(Set(("stimuli", "damping", "levels"), [0.02, 3]))
+    assert clipped.protocol is None
+    assert clipped.formed is not None
+    assert facts(clipped).trials
+    assert any(one.clipped_by for one in levels(clipped.formed, "viscosity"))
+    broken, _ = clipped.edited(Set(("study", "version"), 3))
+    assert broken.formed is None
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_the_expected_duration_lies_between_the_shortest_and_the_longest(name: str) -> None:
+    protocol = load(name)
+    least_s, most_s = duration_range_s(protocol)
+    assert least_s <= expected_duration_s(protocol) <= most_s
+
+
+def test_texts_are_counted_by_language() -> None:
+    study = study_of("rek2024")
+    (there, wanted), dutch = texts_by_language(study)["en"], texts_by_language(study)["nl"]
+    assert there == wanted > 50
+    assert dutch == (there, wanted)
+    lacking, _ = study.edited(Unset(("blocks", "liquids", "title", "nl")))
+    assert texts_by_language(lacking)["nl"] == (wanted - 1, wanted)
+    (labels, _), plain = texts_by_language(study)["nl"], Set(("blocks", "liquids", "title"), "Hi")
+    without, _ = study.edited(Unset(("scales", "agreement", "labels", "nl")), plain)
+    assert texts_by_language(without) == {"en": (wanted, wanted), "nl": (labels - 2, wanted)}
+    assert facts(without).missing == {"nl": 2}
+    assert {"title", "body", "setting_label", "instruction"} <= text_keys()
+
+
+def test_texts_that_were_copied_or_are_those_of_a_new_question_are_not_translated() -> None:
+    study = study_of("rek2024")
+    before = copied_texts(study).get("nl", 0)
+    title = study.document["blocks"]["liquids"]["title"]["en"]
+    copied, _ = study.edited(Set(("blocks", "liquids", "title", "nl"), title))
+    assert copied_texts(copied)["nl"] == before + 1
+    new, _ = copied.edited(Set(("questionnaires", "liquid", "items", 0, "text", "nl"), "New question"))
+    assert copied_texts(new)["nl"] == before + 2
+    assert texts_by_language(new) == texts_by_language(study)
+
+
+@pytest.mark.parametrize(("text", "word"), [("Now comes Light Oil", "light oil"), ("Seen 50 ms late", "50 ms")])
+def test_a_text_that_names_what_is_compared_is_found(text: str, word: str) -> None:
+    study = study_of("rek2024")
+    assert study.protocol is not None
+    assert revealing(study, study.protocol) == ()
+    changed, _ = study.edited(Set(("blocks", "liquids", "setting_label", "en"), text))
+    assert changed.protocol is not None
+    (found,) = revealing(changed, changed.protocol)
+    assert (found.path, found.word) == (("blocks", "liquids", "setting_label"), word)
+
+
+def test_an_order_is_even_at_full_rounds_of_its_square() -> None:
+    protocol = load("physical2")
+    block = protocol.blocks["liquids"]
+    even, uneven = balance_of(protocol, block, 12), balance_of(protocol, block, 13)
+    assert even is not None
+    assert uneven is not None
+    assert (even[2], even[1].balanced) == (6, True)
+    assert (uneven[2], uneven[1].balanced) == (6, False)
+    assert balance_of(protocol, protocol.blocks["practice"], 12) is None
+
+
+def test_numbers_continue_while_a_text_is_missing() -> None:
+    study = study_of("rek2024")
+    lacking, _ = study.edited(Unset(("blocks", "liquids", "title", "nl")), Set(("study", "version"), 3))
+    assert lacking.formed is None
+    before, after = facts(study), facts(lacking)
+    assert (after.trials, after.answers, after.expected_s) == (before.trials, before.answers, before.expected_s)
+    assert after.missing == {"nl": 1}
+
+
+@pytest.mark.slow
+def test_numbers_that_depend_on_a_broken_element_are_not_known() -> None:
+    study = study_of("rek2024")
+    before = facts(study)
+    broken, _ = study.edited(Set(("blocks", "liquids", "repetitions"), -1))
+    after = facts(broken)
+    assert (after.trials, after.expected_s) == (None, None)
+    assert "liquids" not in after.steps_s
+    assert after.steps_s["delays"] == before.steps_s["delays"]
+    assert after.forces_n == before.forces_n
+    drowned, _ = study.edited(Set(("liquids", "honey", "density_kg_m3"), -5))
+    left = facts(drowned)
+    assert set(left.forces_n) == set(before.forces_n) - {"honey"}
+    assert left.forces_n["water"] == before.forces_n["water"]
+    assert "delays" in left.steps_s
+    unlimited, _ = study.edited(Set(("device", "force_limit_n"), 60))
+    assert facts(unlimited).forces_n == {}
+    assert facts(unlimited).warnings == ()  # those of forces are not known
+    assert facts(unlimited).expected_s == before.expected_s
+
+
+def test_a_question_without_a_sound_id_counts_and_another_fault_leaves_the_question_out() -> None:
+    study = study_of("rek2024")
+    items = ("questionnaires", "liquid", "items")
+    unnamed, _ = study.edited(Unset((*items, 2, "id")))
+    assert facts(unnamed).answers == facts(study).answers
+    unknown, _ = study.edited(Set((*items, 2, "kind"), "nothing"))
+    assert facts(unknown).answers is None
+    protocol = valid_part(unknown).protocol
+    assert protocol is not None
+    whole = valid_part(study).protocol
+    assert whole is not None
+    assert len(protocol.questionnaires["liquid"].items) == len(whole.questionnaires["liquid"].items) - 1
+
+
+@pytest.mark.slow
+def test_something_can_be_measured_of_every_known_fault() -> None:
+    whole = sum(valid_part(read(case.text.encode())).protocol is not None for case in CASES)
+    assert whole > 0.95 * len(CASES)
+
+
+CLIPPED = Set(("stimuli", "damping", "standards"), [32]), Set(("stimuli", "damping", "levels"), [0.02, 2.0])
+FULL = 53 / 32 - 1
+"""The highest level of these that is presented in full: the slope limit of the loop is 53 N·s/m."""
+
+
+def plan_of(trials: int = 40, *changes: Set) -> ThresholdPlan:
+    protocol = template("viscosity-jnd").edited(*changes)[0].formed
+    assert protocol is not None
+    plan = threshold_plan(protocol, protocol.blocks["viscosity"])
+    assert plan is not None
+    return plan.with_trials(trials)
+
+
+@pytest.mark.slow
+def test_planted_observers_are_found_as_precisely_as_check_expects() -> None:
+    plan = plan_of()
+    found = observe(plan, 0.2, 0.02)
+    assert found is not None
+    low, middle, high = (found.course[-1][1][at] for at in (0, 2, 4))
+    assert low < 0.2 < high
+    assert middle == pytest.approx(0.2, rel=0.1)
+    assert found.course[-1][0] == plan.trials == found.trials
+    known = expected(plan)
+    assert known is not None
+    assert 0.6 < found.error / (2.303 * known.spread) < 1.0  # whose observers differ in width, too
+    spreads = [quantiles[4] / quantiles[0] for _, quantiles in found.course]
+    assert spreads[-1] < 0.6 * max(spreads)
+    assert sum(share for _, share in found.asked) == pytest.approx(1.0)
+    assert [one.trial for one in found.one] == list(range(1, plan.trials + 1))
+    assert {one.track for one in found.one} == {1, 2}
+    grid = {round(level, 9) for level in plan.stimulus.grid}
+    assert {round(one.level, 9) for one in found.one} <= grid
+    assert found.at_threshold == pytest.approx(0.5 + 0.48 / 2, abs=1e-6)  # half the way from guessing to lapsing
+    assert found.found[0][30] > found.planted[30] > found.found[4][30]  # a lower threshold is a higher function
+
+
+def test_observers_show_the_same_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulation, "OBSERVERS", 200)
+    found = observe(plan_of(4), 0.2, 0.02)
+    assert found is not None
+    assert (found.observers, found.trials) == (200, 4)
+    assert (found.error, found.at_threshold) == pytest.approx((0.791341, 0.74), abs=1e-6)
+    assert np.array(found.asked) == pytest.approx(
+        np.array([[0.137425, 0.3425], [0.153923, 0.5], [0.303897, 0.1575]]), abs=1e-6
+    )
+    assert [trials for trials, _ in found.course] == [2, 4]
+    assert found.course[1][1] == pytest.approx((0.039823, 0.039823, 0.170916, 0.330816, 0.442758), abs=1e-6)
+    assert [(one.trial, one.track, one.success) for one in found.one] == [
+        (1, 1, True), (2, 2, True), (3, 1, False), (4, 2, True),
+    ]  # fmt: skip
+    assert [one.level for one in found.one] == pytest.approx([0.153923, 0.153923, 0.137425, 0.137425], abs=1e-6)
+    assert (found.levels[30], found.planted[30]) == pytest.approx((0.109545, 0.632946), abs=1e-6)
+    high_to_low = [function[30] for function in found.found]
+    assert high_to_low == pytest.approx([0.939999, 0.656772, 0.641236, 0.575650, 0.553845], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "asked", "presented"),
+    [
+        (CLIPPED, [0.02, 0.6, 0.7, 2.0], [0.02, 0.6, FULL, FULL]),
+        ((*CLIPPED[:1], Set(("stimuli", "damping", "levels"), [0.02, 0.6])), [0.6], [0.6]),
+        ((Set(("stimuli", "damping", "standards"), [60]),), [0.1, 0.6], [0.0, 0.0]),
+        (
+            (Set(("stimuli", "damping", "standards"), [60]), Set(("stimuli", "damping", "direction"), "down")),
+            [0.05, 0.5],
+            [0.0, (53 - 30) / 53],
+        ),
+    ],
+)
+def test_levels_are_presented_as_the_limits_leave_them(
+    changes: tuple[Set, ...], asked: list[float], presented: list[float]
+) -> None:
+    plan = plan_of(40, *changes)
+    found = 10.0 ** plan.presented(np.log10(asked))
+    assert found.tolist() == pytest.approx(presented, rel=1e-6)
+
+
+def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
+    free = {"kind": "explore", "min_s": 2, "max_s": 4, "instruction": "Feel."}
+    unpaced = CLIPPED[1], Set(("tasks", "stir"), free), Set(("stimuli", "damping", "standards"), [12])
+    for changes, most in ((CLIPPED, FULL), (unpaced, 8 / 0.3 / 12 - 1)):
+        protocol = template("viscosity-jnd").edited(*changes)[0].formed
+        assert protocol is not None
+        focus = focus_of(protocol, ("blocks", "viscosity"))
+        assert focus.plan is not None
+        clips = clipping(protocol, protocol.blocks["viscosity"])
+        assert clips is not None
+        assert clips.highest(focus.plan.stimulus) == pytest.approx(most, rel=1e-4)
+        assert (focus.plan.clipping is None) == (changes is unpaced)  # fast motions are repeated, not answered
+    limits = LevelLimits(None, 40.0, 0.1)
+    known = clipping(protocol, protocol.blocks["viscosity"], limits)
+    assert known is not None
+    assert known.limit == 40.0  # limits that are known are not looked for again
+    down = Set(("stimuli", "damping", "standards"), [60]), Set(("stimuli", "damping", "direction"), "down")
+    assert not plan_of(4, *down).measures(np.array(-1.0))  # the standard itself is clipped
+    found = measurable(plan_of(4, *CLIPPED), 0.02, 0.02, most=0.03)
+    assert found is not None
+    assert [one.threshold for one in found.planted] == pytest.approx([0.02], rel=0.01)
+
+
+def test_no_level_of_a_late_force_is_clipped_though_a_limit_clips_the_force() -> None:
+    protocol = read(shipped_file("forcedelay").read_bytes()).edited(Set(("device", "force_limit_n"), 0.1))[0].formed
+    assert protocol is not None
+    assert clipping(protocol, protocol.blocks["delay"]) is None
+
+
+@pytest.mark.slow
+def test_clipped_levels_make_the_error_larger() -> None:
+    clipped, full = plan_of(24, *CLIPPED), plan_of(24, *CLIPPED)
+    found = [observe(one, 0.6, 0.02) for one in (clipped, replace(full, clipping=None))]
+    assert found[0] is not None
+    assert found[1] is not None
+    assert found[0].error > 1.2 * found[1].error
+    assert max(found[0].planted) < found[0].at_threshold + 0.05 < max(found[1].planted)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("standard", [52, 60])
+def test_a_threshold_whose_levels_are_clipped_has_no_error_and_no_precision(standard: float) -> None:
+    plan = plan_of(24, Set(("stimuli", "damping", "standards"), [standard]))
+    observed, known = observe(plan, 0.19, 0.02), expected(plan)
+    assert observed is not None
+    assert known is not None
+    assert math.isinf(observed.error)
+    assert not known.measured
+    assert (known.participants_for(0.15), known.trials_for(0.15, 12)) == (None, None)
+    found = threshold_studies.study_batch(threshold_studies.Case("viscosity", plan, (1,)), (12,))
+    assert found.within(0, 100.0) == 0.0
+    assert math.isinf(found.spread)
+    full = threshold_studies.study_batch(threshold_studies.Case("viscosity", replace(plan, clipping=None), (1,)), (12,))
+    assert full.within(0, 100.0) == 1.0
+
+
+@pytest.mark.slow
+def test_each_standard_is_simulated_as_limits_clip_it() -> None:
+    plan = plan_of(24, Set(("stimuli", "damping", "standards"), [8, 32]), CLIPPED[1])
+    asked = np.log10([0.02, 0.6, 2.0])
+    high, low = (10.0 ** one.presented(asked) for one in plan.each_standard())
+    assert high.tolist() == pytest.approx([0.02, 0.6, FULL], rel=1e-6)
+    assert low.tolist() == pytest.approx([0.02, 0.6, 2.0])
+    assert plan.clipping is not None
+    all_as_the_highest = replace(plan, clipping=replace(plan.clipping, others=()))
+    own, same = expected(plan), expected(all_as_the_highest)
+    assert own is not None
+    assert same is not None
+    assert own.spread < 0.95 * same.spread
+    studies = (
+        threshold_studies.study_batch(threshold_studies.Case("viscosity", one, (1,)), (20,))
+        for one in (plan, all_as_the_highest)
+    )
+    own_errors, same_errors = (np.concatenate(one.errors) for one in studies)
+    assert own_errors[:, 1].std() < 0.9 * same_errors[:, 1].std()
+
+
+@pytest.mark.slow
+def test_more_lapses_lower_the_function_and_raise_the_error() -> None:
+    plan = plan_of(24)
+    few, many = observe(plan, 0.2, 0.0), observe(plan, 0.2, 0.15)
+    assert few is not None
+    assert many is not None
+    assert few.planted[-1] > many.planted[-1] + 0.1
+    assert many.error > few.error
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_thresholds_beyond_the_levels_are_not_measurable_and_none_below_the_error_of_a_trial() -> None:
+    found = measurable(plan_of(60), 0.02, least=0.1)
+    assert found is not None
+    assert found.ends is not None
+    assert min(one.threshold for one in found.planted) >= 0.1 == pytest.approx(found.ends[0], rel=0.5)
+    assert all(one.coverage > 0.9 for one in found.planted)
+
+
+def test_a_simulation_is_given_up_when_asked() -> None:
+    asked = 0
+
+    def check() -> None:
+        nonlocal asked
+        asked += 1
+        if asked > 3:
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        observe(plan_of(4), 0.2, 0.02, check)
+    with pytest.raises(InterruptedError):
+        measurable(plan_of(4), 0.02, 0.0, check)
+    assert asked == 5
