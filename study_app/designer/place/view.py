@@ -682,10 +682,11 @@ class DesignerPlace(Place):
         if elsewhere:
             self.close_prompt(elsewhere=True)
         writable = not view.header.read_only and not view.form.unreadable
-        of_element, ordered = writable and view.form.id is not None, writable and view.form.position is not None
-        possible = {"add": writable, "paste": writable, "up": ordered, "down": ordered, "copy": len(view.form.path) > 1}
-        for name, on in (possible | dict.fromkeys(("duplicate", "rename", "delete"), of_element)).items():
-            self.commands[name].setEnabled(on)
+        of_element = writable and view.form.id is not None
+        on = dict.fromkeys(("add", "paste", "up", "down"), writable)  # what has no place in an order is told so
+        on |= dict.fromkeys(("duplicate", "rename", "delete"), of_element) | {"copy": len(view.form.path) > 1}
+        for name, possible in on.items():
+            self.commands[name].setEnabled(possible)
         self.parts.path.show_form(view.form)
         self.form.show_form(view.form, read_only=view.header.read_only)
         self.file.show_file(view.file, scroll=elsewhere, read_only=view.header.read_only)
