@@ -253,6 +253,21 @@ def is_there(path: Path) -> bool:
     return True
 
 
+def refuse_special(path: Path) -> None:
+    """Refuse a folder that is a link, or that holds a pipe or device, before anything is copied or deleted.
+
+    Raises
+    ------
+    StoreError
+        Names what it is.
+    """
+    if path.is_symlink():
+        raise StoreError(f"{path} is a link to {path.readlink()}: replace the link by the folder itself")
+    for inside in (path, *paths_in(path)):
+        if is_there(inside) and not inside.is_symlink() and not inside.is_file() and not inside.is_dir():
+            raise StoreError(f"{inside} is neither a file nor a folder: remove it")
+
+
 def cannot_read(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
     return StoreError(f"{path} cannot be read ({cause(error)}): correct its permissions, or restore it from a copy")

@@ -158,7 +158,7 @@ class Progress:
         """Take the answers of a trial or a form as confirmed."""
         of = (line.form, line.after) if isinstance(line, events.FormAnswered) else line.trial
         self.answered[of] = len(line.items)
-        if isinstance(line, events.Responses) and line.trial == self.of_intervals:
+        if isinstance(line, events.Responses) and line.items and line.trial == self.of_intervals:
             answer = line.items[0]
             seconds = None if answer.onset_s is None or answer.first_s is None else answer.first_s - answer.onset_s
             self.trial_answers[line.trial] = TrialAnswer(answer.value, seconds)
@@ -266,8 +266,8 @@ def trial_results(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[Tr
             block = protocol.blocks[start.block]
             if block.design is None:
                 continue
-            if start.arrangement is None:
-                raise KeyError("arrangement")
+            if start.arrangement is None or not line.items:
+                raise KeyError("arrangement and answer")
             arrangement = arrangement_of(design_of(protocol, block), start.arrangement)
             answer: Any = line.items[0].value
             of_trial = line.trial, start.code, start.level, arrangement

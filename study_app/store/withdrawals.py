@@ -26,6 +26,7 @@ from study_app.store.atomic import (
     paths_in,
     read_if_there,
     read_regular,
+    refuse_special,
     sync_folder,
     write_file,
 )
@@ -123,6 +124,8 @@ def withdraw(
     by, reason = readable(by, reason, "a withdrawal needs initials and a reason")
     study = StudyFolder(folder)
     copies, shared = _found(study, also)
+    for one in (study, *copies):
+        refuse_special(one.data / f"sub-{participant}")
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
     with open_alone(folder):
         tombstone = _tombstone(study, participant, at, by, reason)
@@ -262,6 +265,7 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
     """Write the tombstone, then erase folder and rows of a participant; return whether anything was there."""
     participant = tombstone.participant
     sessions = _sessions(study, participant)
+    person = study.data / f"sub-{participant}"
     for session in sessions:
         refuse_if_open(session.path)
     if sessions and participant not in tombstones(study):
@@ -269,7 +273,6 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
     ignored = study.withdrawals.name.encode()  # by a Psych-DS validator, also in folders of earlier versions
     if is_there(study.ignore) and ignored not in read_regular(study.ignore).splitlines():
         append_line(study.ignore, ignored + b"\n")
-    person = study.data / f"sub-{participant}"
     try:
         if is_there(person):
             shutil.rmtree(person)

@@ -162,6 +162,8 @@ def _break(line: Mapping[str, Any], before: str, *, chained: bool) -> str | None
     first, hash_before = line["n"] == 1, line.get("previous")
     if first and line.get("format", 1) > FORMAT:
         return f"has format {line['format']}, this version reads {FORMAT}: use a newer version of liquid-study"
+    if first and "format" not in line and "measures_sealed" in line:  # a later version than those of format 1
+        return "lacks format: it was changed; restore it from a copy"
     if hash_before is None:
         needed = chained or (first and line.get("format", 1) > 1)
         return "lacks previous: it was changed; restore it from a copy" if needed else None

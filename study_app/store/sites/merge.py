@@ -21,6 +21,7 @@ from study_app.store.atomic import (
     is_there,
     open_regular,
     paths_in,
+    refuse_special,
     sweep,
     sync_folder,
     temporaries,
@@ -140,6 +141,7 @@ def _source(name: str, path: Path) -> _Source:
             f"site {name}: {path} is not the results folder of a study (no {study.description.name}): name one such as "
             "results/rek2024"
         )
+    refuse_special(path.resolve())
     try:
         state = _state(path)
     except OSError as error:

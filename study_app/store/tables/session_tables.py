@@ -194,6 +194,8 @@ def _interval_row(trial: Row, started: events.TrialStarted, line: events.Interva
     number = line.interval
     ended_s = None if before is None else before["ended_s"]
     arrangement = started.arrangement
+    if arrangement is not None and not (0 < number <= len(arrangement) and set(arrangement) <= set(_PRESENTED)):
+        raise StoreError(f"the journal's line {line.n} is of an interval that its trial lacks: restore it from a copy")
     return row | {
         "interval": number,
         "interval_started_s": line.t_s,

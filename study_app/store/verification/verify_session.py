@@ -10,16 +10,18 @@ keep their checksums.
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+import study_app
 from study_app.errors import StoreError
 from study_app.store import receipt
-from study_app.store.atomic import is_there, read_own, read_regular, study_root, temporaries
-from study_app.store.blinded.blinding import Key, opened, opened_key
+from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporaries
+from study_app.store.blinded.blinding import Key, opened, opened_key, whole_protocol
 from study_app.store.checksums import files, fingerprint, hashed, read_checksums
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
@@ -146,7 +148,7 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
     contents = _journal(folder, found, running=running)
     lines = contents.lines
     if not running:
-        _receipt(folder, lines, key.hash if key else None, found)
+        _receipt(folder, lines, key, found)
     if not lines:
         return CheckedSession(place, readable=running or never_begun(folder.path), running=running)
     start = events.start_of(lines)
@@ -157,7 +159,7 @@ def _check(place: Place, key: Key | None, found: Findings, *, running: bool, rec
     told = lines
     with found.reading(folder.journal):
         told = opened(lines, key)
-    for wrong in wrong_responses(lines):
+    for wrong in (*wrong_responses(lines), *_removed(lines)):
         found.error(folder.journal, wrong)
     ended = isinstance(lines[-1], events.SessionEnded)
     hashes = {}
@@ -228,7 +230,7 @@ def _journal(folder: SessionFolder, found: Findings, *, running: bool) -> Conten
     return contents
 
 
-def _receipt(folder: SessionFolder, lines: list[events.Event], key_hash: str | None, found: Findings) -> None:
+def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, found: Findings) -> None:
     path = folder.receipt
     if not lines and not is_there(path):
         return  # claimed and never begun
@@ -239,14 +241,18 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key_hash: str | N
         return
     if missing := [name for name in receipt.FIELDS if name not in held]:
         found.error(path, f"lacks {', '.join(missing)}")
-    if key_hash is not None and held["key_hash"] != key_hash:
+    if key is not None and held["key_hash"] != key.hash:
         found.error(path, "contains the hash of another key")
     if not lines:
         return
     start = events.start_of(lines)
     compared = [name for name in (*receipt.COPIED_FIELDS, "row_of") if name in held or name == "row_of"]
-    if differing := [name for name in compared if held.get(name) != getattr(start, name)]:
+    differing = [name for name in compared if held.get(name) != getattr(start, name)]
+    differing += _differing(held, lines)
+    if differing:
         found.error(path, f"{', '.join(differing)}: differ from the journal")
+    if key is not None and not _is_protocol(held, start, key):
+        found.error(path, "its protocol was changed: restore it from a copy")
     if receipt.other_format(held, start):
         found.error(
             folder.journal, f"has another format than {path.name} states: it was changed; restore it from a copy"
@@ -254,6 +260,48 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key_hash: str | N
     last = lines[-1]
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:
         found.error(path, f"its status is {held.get('status')!r}, the journal's {last.status!r}; rebuild renews it")
+    sequence = protocol.get("sequence") if isinstance(protocol := held.get("protocol"), dict) else None
+    was_last = any(isinstance(line, events.PageLeft) and sequence and line.page == sequence[-1] for line in lines)
+    if isinstance(last, events.SessionEnded) and last.status != "completed" and was_last:
+        found.error(folder.journal, f"its status is {last.status!r}, though the last page was left: it was changed")
+
+
+def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[str]:
+    """Return the fields of a receipt that the journal contradicts, beside those that are copied from its first line."""
+    start, resumed = events.start_of(lines), {line.at for line in lines if isinstance(line, events.SessionResumed)}
+    expected: dict[str, Any] = {"started_at": start.at}
+    if not isinstance(lines[-1], events.SessionEnded):
+        expected |= {"status": receipt.UNFINISHED, "reason": "", "ended_at": None}
+    found = [name for name, value in expected.items() if held.get(name) != value]
+    parts = {"device": ("name", start.device), "clock": ("origin_at", start.at)}
+    found += [name for name, (part, value) in parts.items() if held.get(name, {}).get(part) != value]
+    if not all(isinstance(entry, dict) and entry.get("at") in resumed for entry in held.get("resumed", ())):
+        found.append("resumed")
+    return found
+
+
+def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key) -> bool:
+    """Return whether the protocol of a receipt is one, completed from the key, and as this version writes it."""
+    try:
+        whole = receipt.without_conditions(whole_protocol(held["protocol"], key))
+    except (KeyError, TypeError, AttributeError, ValueError):
+        return False
+    return start.version != study_app.__version__ or parse_json(json.dumps(whole)) == held["protocol"]
+
+
+def _removed(lines: Sequence[events.Event]) -> Iterator[str]:
+    """Yield a sentence on each trial whose answers were chosen and never confirmed, though the session went on."""
+    chosen: dict[int, int] = {}
+    for line in lines:
+        if isinstance(line, events.Choice) and line.trial is not None:
+            chosen[line.trial] = line.n
+        elif isinstance(line, events.Responses | events.TrialStarted | events.PassedOver) and line.trial is not None:
+            chosen.pop(line.trial, None)
+        goes_on = isinstance(line, events.SessionEnded) and line.status == "completed"
+        for trial, number in list(chosen.items()):
+            if goes_on or (isinstance(line, events.TrialStarted) and line.trial > trial):
+                del chosen[trial]
+                yield f"line {number} is an answer in trial {trial}, which was never confirmed: a line was removed"
 
 
 def wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:

@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
+from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import opened, sealed
@@ -24,6 +25,7 @@ from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals import Tombstone, add_tombstone, describe_session
 from tests.store.conftest import SOURCE, Attend, Start
 from tests.store.forging import Lines, cover_up, forge
+from tests.studies import made_up
 
 pytestmark = pytest.mark.slow
 
@@ -95,6 +97,10 @@ def without_a_choice(lines: Lines) -> None:
     del lines[next(n for n, line in enumerate(lines) if line["event"] == "choice")]
 
 
+def without_responses(lines: Lines) -> None:
+    del lines[next(n for n, line in enumerate(lines) if line["event"] == "responses")]
+
+
 def edit_a_response(study: Path) -> None:
     path = study / JOURNAL
     path.write_bytes(path.read_bytes().replace(b'"value":7', b'"value":1'))
@@ -144,7 +150,8 @@ def change_and_rebuild(study: Path) -> None:
         (cut_the_journal_and_delete_the_checksums, f"{P007}: is not the session that fingerprints.txt lists as"),
         (delete_a_participant, f"{P007}: is missing, but fingerprints.txt lists it"),
         (forging(of_start(simulated=False)), "simulated: differ from the journal"),
-        (forging(without_format, chained=False, covered=True), "has another format than receipt.json states"),
+        (forging(without_format, chained=False, format=1), "lacks format: it was changed"),
+        (forging(without_responses, covered=True), "which was never confirmed: a line was removed"),
         (begin_the_chain_late, "has previous, and the lines before it lack it"),
         (change_and_rebuild, f"{P007}: is not the session that fingerprints.txt lists as"),
     ],
@@ -185,7 +192,6 @@ def add_a_session(study: Path) -> None:
         (cut_the_journal, "it no longer has an end"),
         (forget_a_participant, f"{P007}: is missing, but"),
         (forging(of_start(simulated=False), simulated=False), f"{P007}: is not the session that"),
-        (forging(without_format, chained=False, format=1), f"{P007}: is not the session that"),
         (
             forging(lambda lines: lines[-1].update(status="withdrawn"), status="withdrawn"),
             f"{P007}: is not the session that",
@@ -275,8 +281,40 @@ def test_an_unfinished_session_with_a_changed_line_does_not_go_on(
         check_can_go_on(store.folder.path, protocol, SOURCE)
     store.folder.journal.write_bytes(before)
     forge(store.folder.journal, lambda lines: lines[0].pop("format"), chained=False)
-    with pytest.raises(StoreError, match="has another format than its receipt states"):
+    with pytest.raises(StoreError, match="lacks format: it was changed"):
         check_can_go_on(store.folder.path, protocol, SOURCE)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("started_at", "2020-01-01T00:00:00+00:00"),
+        ("ended_at", "2020-01-01T00:00:00+00:00"),
+        ("reason", "tired"),
+        ("device", {"name": "falcon"}),
+        ("clock", {"origin_ns": 1, "origin_at": "2020-01-01T00:00:00+00:00"}),
+        ("resumed", [{"at": "2020-01-01T00:00:00+00:00"}]),
+        ("resumed", [1]),
+        ("protocol", {}),
+    ],
+)
+def test_a_changed_receipt_of_an_unfinished_session_is_found(
+    tmp_path: Path, start: Start, attend: Attend, field: str, value: Any
+) -> None:
+    with start("P007") as store:
+        attend(store)
+    assert verify(tmp_path / "study").errors == ()
+    of_receipt(tmp_path / "study", **{field: value})
+    assert field in told(tmp_path / "study")
+
+
+def test_a_session_that_left_its_last_page_was_not_aborted(tmp_path: Path) -> None:
+    study = rehearse_answers("demo", participants=1, seed=1, results=tmp_path / "demo", features=made_up("demo"))
+    session = study / "data" / "sub-P001" / "ses-01"
+    forge(session / "journal.jsonl", lambda lines: lines[-1].update(status="aborted"))
+    receipt.write(session / "receipt.json", receipt.read(session / "receipt.json") | {"status": "aborted"})
+    cover_up(study)
+    assert "its status is 'aborted', though the last page was left: it was changed" in told(study)
 
 
 def test_a_fingerprint_is_what_the_documentation_says(study: Path) -> None:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import re
 import shutil
 import signal
@@ -22,6 +23,7 @@ from study_app.store.exclusions import exclude, include
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.begin import used_ids
 from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.sites.merge import merge
 from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals import Withdrawn, tombstones, withdraw
 from tests.faults.support.killer import die, forked
@@ -220,6 +222,25 @@ def test_bad_input_erases_nothing(
     (line,) = capsys.readouterr().err.splitlines()
     assert sentence in line
     assert contents(study) == before
+
+
+@needs_fork  # where folders can be linked, and pipes made
+def test_a_link_and_a_pipe_are_named_before_anything_is_written(study: Path, tmp_path: Path) -> None:
+    person = study / "data" / f"sub-{PERSON}"
+    pipe = person / "ses-01" / "notes"
+    os.mkfifo(pipe)
+    before = {path: path.read_bytes() for path in study.rglob("*") if path.is_file()}
+    for act in (lambda: erase(study), lambda: merge({"A": study}, tmp_path / "pooled")):
+        with pytest.raises(StoreError, match=f"^{pipe} is neither a file nor a folder: remove it$"):
+            act()
+    pipe.unlink()
+    person.rename(tmp_path / "elsewhere")
+    person.symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(StoreError, match=f"^{person} is a link to {tmp_path / 'elsewhere'}: replace the link"):
+        erase(study)
+    assert {path: path.read_bytes() for path in before} == before
+    assert not (study / "withdrawals.jsonl").exists()
+    assert not (tmp_path / "pooled").exists()
 
 
 def test_a_forged_tombstone_leads_out_of_no_folder(study: Path) -> None:
