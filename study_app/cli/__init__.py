@@ -17,7 +17,7 @@ from study_app import __version__
 from study_app.cli import data, model, power, study
 from study_app.cli.devices import devices, outlets
 from study_app.cli.evidence import accuracy, stability, timing, validation
-from study_app.cli.options import EXAMPLES, EXIT_USER_ERROR, GroupedCommands
+from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands, example_of
 from study_app.errors import StudyError, naming_the_extra
 
 SHOWN = 200  # letters of a bad value that a message repeats
@@ -66,8 +66,7 @@ def main() -> None:
             code = commands.main(standalone_mode=False)
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "liquid-study"
-        words = EXAMPLES.get(command.rpartition(" ")[2])
-        example = "" if words is None else f"; example: {command} {words}"
+        example = f"; example: {words}" if error.ctx and (words := example_of(error.ctx)) else ""
         click.echo(f"{command}: {_shortened(error.format_message())} (see {command} --help{example})", err=True)
         sys.exit(EXIT_USER_ERROR)
     except (click.Abort, KeyboardInterrupt):

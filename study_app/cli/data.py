@@ -213,7 +213,7 @@ def _site(_context: click.Context, _parameter: click.Parameter, words: tuple[str
     for text in words:
         name, equals, folder = text.partition("=")
         if not (name and equals and folder):
-            raise click.BadParameter(f"{text!r} is not NAME=DIR, such as A=results/rek2024")
+            raise click.BadParameter(f"{text!r} is not NAME=RESULTS, such as A=results/rek2024")
         if name in sites:
             raise click.BadParameter(f"site {name!r} is given twice")
         sites[name] = Path(folder)
@@ -221,21 +221,13 @@ def _site(_context: click.Context, _parameter: click.Parameter, words: tuple[str
 
 
 @click.command()
-@click.option(
-    "--site",
-    "sites",
-    multiple=True,
-    required=True,
-    callback=_site,
-    metavar="NAME=DIR",
-    help="A site's name and its study folder; repeatable. The name precedes the site's IDs: A-P001.",
-)
+@click.argument("sites", nargs=-1, required=True, callback=_site, metavar="NAME=RESULTS...")
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="New folder, or a merged study to add to.")
 def merge(sites: dict[str, Path], to: Path) -> None:
     """Merge the study folders of several sites that ran the same protocol; they are copied unchanged.
 
-    Each site keeps its sealed key. The merged folder is RESULTS for report, export, plot, verify, unblind, exclude and
-    withdraw; participants are SITE-ID there.
+    Each site has a name, which precedes its IDs (A-P001), and keeps its sealed key. The merged folder is RESULTS for
+    report, export, plot, verify, unblind, exclude and withdraw.
     """
     from study_app.store.sites.merge import merge as merge_sites
 
@@ -294,7 +286,9 @@ def verify(results: Path, fingerprints: Path | None) -> None:
     with progress() as show:
         show("checking every file")
         found = verify_folder(results, fingerprints)
-    for kind, findings in (("error", found.errors), ("warning", found.warnings)):
+    described = [one for one in found.warnings if one.place.endswith("dataset_description.json")]
+    warnings = [one for one in found.warnings if one not in described]
+    for kind, findings in (("error", found.errors), ("warning", warnings), ("to share it", described)):
         for finding in findings:
             click.echo(f"{kind}: {finding}")
     running = f", {found.running} running" if found.running else ""

@@ -25,17 +25,25 @@ GROUPS: Final = {
     "Devices": "devices outlets",
 }
 REMOVED: Final = {"emulate-falcon": "--device falcon-emulated runs the Falcon's driver on an emulated Falcon"}
-RENAMED_BY: Final = ("run", "resume")
-"""Commands whose option ``--operator`` was ``--by``."""
-EXAMPLES: Final = {
-    "run": "rek2024 --participant P007 --operator AK",
-    "exclude": 'rek2024 --participant P003 --by AK --reason "fell asleep"',
-    "include": 'rek2024 --participant P003 --by AK --reason "awake after all"',
-    "withdraw": 'rek2024 --participant P007 --by AK --reason "asked by letter"',
-    "unblind": 'rek2024 --by AK --reason "collection closed"',
-    "merge": "--site Delft=results/rek2024 --site Utrecht=utrecht/rek2024 --to pooled",
+RENAMED: Final = {"run": {"--by": "--operator"}, "resume": {"--by": "--operator"}, "merge": {"--site": ""}}
+"""Options of earlier versions by command, and what they are now; "": what followed them stands alone."""
+SAMPLES: Final = {
+    "FILE": "rek2024",
+    "RESULTS": "rek2024",
+    "SESSION": "rek2024/P007/1",
+    "NAME": "mystudy",
+    "name": "falcon",
+    "NAME=RESULTS...": "Delft=results/rek2024 Utrecht=utrecht/rek2024",
+    "DIR": "lab",
+    "--participant": "P007",
+    "--participants": "12",
+    "--by": "AK",
+    "--reason": '"why"',
+    "--to": "folder",
+    "--liquid": "water",
+    "--hours": "1",
 }
-"""An example of each command with required options, which errors of its arguments show."""
+"""Values of arguments and of required options in examples."""
 LONGEST: Final = 150
 """Characters of a command's first sentence in ``--help``, which wraps it."""
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -55,11 +63,11 @@ class GroupedCommands(click.Group):
         """Return a command by its name."""
         if args and args[0] in REMOVED:
             ctx.fail(f"'{args[0]}' is no longer a command: {REMOVED[args[0]]}")
-        if args and args[0] in RENAMED_BY:
-            for place, word in enumerate(args):
-                if word.partition("=")[0] == "--by":
-                    args[place] = word.replace("--by", "--operator", 1)
-                    click.echo("--by is --operator now", err=True)
+        for old, new in RENAMED.get(args[0] if args else "", {}).items():
+            if any(word.partition("=")[0] == old for word in args):
+                click.echo(f"{old} is {new} now" if new else f"{old} is no longer needed", err=True)
+            words = (word.replace(f"{old}=", f"{new}=" if new else "", 1) for word in args)
+            args[:] = [new if word == old else word for word in words if word != old or new]
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -71,6 +79,18 @@ class GroupedCommands(click.Group):
                 formatter.write_dl(
                     [(name.ljust(width), command.get_short_help_str(LONGEST)) for name, command in listed]
                 )
+
+
+def example_of(ctx: click.Context) -> str:
+    """Return a command with its arguments and required options; empty without any."""
+    words: list[str] = []
+    for one in ctx.command.params:
+        name = one.opts[0] if isinstance(one, click.Option) else (one.metavar or one.name or "").strip("[]")
+        if isinstance(one, click.Argument):
+            words.append(SAMPLES.get(name, name))
+        elif one.required:
+            words += [name, SAMPLES.get(name, str(one.metavar))]
+    return " ".join((ctx.command_path, *words)) if words else ""
 
 
 class Target(click.Path):

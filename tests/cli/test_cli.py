@@ -188,3 +188,11 @@ def test_the_workspace_is_shown_and_changed(study: Path, monkeypatch: pytest.Mon
     assert (tmp_path / "new" / "protocols").is_dir()
     assert load_settings().workspace == str(tmp_path / "new")
     assert said("workspace").strip() == str(tmp_path / "new")
+
+
+def test_verify_says_last_what_concerns_sharing(liquid_study: Run) -> None:
+    released = Path(__file__).parents[1] / "store" / "releases" / "0.2" / "demo"
+    *first, shared, verdict = liquid_study("verify", str(released)).stdout.splitlines()
+    assert [line.partition(":")[0] for line in first] == ["warning", "warning"]
+    assert shared.startswith("to share it: dataset_description.json: ")
+    assert verdict == "2 sessions: sound"

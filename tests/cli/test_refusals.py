@@ -114,7 +114,7 @@ LONG = tuple(
         (("validate-report", "--to", ""), "--to': is empty"),
         (("check", "x" * 5000), f"{'x' * 200}…: the file name is too long"),
         (("verify", "x" * 5000), "…: the file name is too long"),
-        (("merge", "--site", f"A={'x' * 5000}", "--to", "m"), "… cannot be read (File name too long)"),
+        (("merge", f"A={'x' * 5000}", "--to", "m"), "… cannot be read (File name too long)"),
         (("rehearse", "demo", "--results", "r", "--seed", "9" * 5000), "… is not a valid integer"),
         *((words, "far.csv (it is a file, not a folder)") for words in LONG),
         pytest.param((*SIMULATE, "--path", "far.csv", "--to", "o.csv"), "must be finite", marks=needs_servo),

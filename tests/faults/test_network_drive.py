@@ -74,7 +74,7 @@ def test_sessions_and_commands_do_without_locks_links_and_flushes_of_folders(dri
         ("exclude", study, "--participant", "P001", *asked),
         ("include", study, "--participant", "P001", *asked),
         ("export", study, "--to", drive / "exported"),
-        ("merge", "--site", f"A={study}", "--to", drive / "merged"),
+        ("merge", f"A={study}", "--to", drive / "merged"),
         ("withdraw", study, "--participant", "P002", *asked),
         ("verify", study),
     ):

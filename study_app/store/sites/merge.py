@@ -103,7 +103,7 @@ def merge(given: Mapping[str, Path], to: Path, *, now: datetime | None = None) -
 
 def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
     if not given:
-        raise StoreError("no site is given: name each as --site A=DIR")
+        raise StoreError("no site is given: name each as A=DIR")
     used = {} if merged is None else {name.lower(): name for name in merged.names}
     for name in given:
         if not ID_PATTERN.fullmatch(name) or len(name) > MAX_SITE_LENGTH:

@@ -99,7 +99,7 @@ def test_another_protocol_is_refused_with_both_hashes(labs: dict[str, Path], res
 def test_what_cannot_be_merged_is_refused(
     words: tuple[str, ...], says: str, labs: dict[str, Path], pooled: Path, results: Path
 ) -> None:
-    sites = [part for word in words for part in ("--site", word.format(**labs, pooled=pooled))]
+    sites = [word.format(**labs, pooled=pooled) for word in words]
     done = run("merge", *sites, "--to", results / "new")
     assert isinstance(done.exception, StoreError)
     assert says in str(done.exception)
