@@ -8,10 +8,7 @@ their folder (``haptics.model.effects.EFFECTS``).
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
-
-if TYPE_CHECKING:
-    from study_app.haptics.model import gate, scene
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 Value: TypeAlias = "float | str | None"
 Choices: TypeAlias = tuple[tuple[str, str], ...]
@@ -64,10 +61,10 @@ class Flow(NamedTuple):
     shear_per_s: float
 
 
-Liquid: TypeAlias = "scene.Liquid"
-Scene: TypeAlias = "scene.Scene"
-Extremes: TypeAlias = "gate.Extremes"
-"""Of modules that import the descriptors."""
+Liquid: TypeAlias = Any
+Scene: TypeAlias = Any
+Extremes: TypeAlias = Any
+"""Values of ``model.scene`` and ``model.gate``, which are made from the descriptors."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,7 +45,7 @@ def _accelerated_n(extremes: Extremes, acceleration_mps2: float, change_mps: flo
 
 def _bound_n(extremes: Extremes) -> float:
     """Return C_a ρ V (a + s v), s the shear of the current."""
-    return extremes.inertial_n(_accelerated_n)
+    return float(extremes.inertial_n(_accelerated_n))
 
 
 def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:

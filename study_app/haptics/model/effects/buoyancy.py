@@ -10,7 +10,8 @@ BIT = 1 << 4
 
 def _bound_n(extremes: Extremes) -> float:
     """Return g |ρ V_sub − ρ_body V|, at the worse end of the depth range."""
-    return max(abs(extremes.lift_n * extremes.submerged(depth) - extremes.weight_n) for depth in extremes.depth_m)
+    net_n = (extremes.lift_n * extremes.submerged(depth) - extremes.weight_n for depth in extremes.depth_m)
+    return float(max(map(abs, net_n)))
 
 
 def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -> None:

@@ -73,7 +73,7 @@ def _bound_n(extremes: Extremes) -> float | None:
     """
     if extremes.liquid.current is None:
         return None
-    return extremes.drag_by_flow_n(extremes.flow.speed_mps) + extremes.sheared_n()
+    return float(extremes.drag_by_flow_n(extremes.flow.speed_mps) + extremes.sheared_n())
 
 
 def _start(kind: str, centre_m: tuple[float, float, float], reach_m: float) -> Mapping[str, Any]:

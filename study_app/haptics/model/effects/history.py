@@ -55,7 +55,9 @@ def _accelerated_n(extremes: Extremes, acceleration_mps2: float, change_mps: flo
     The Basset integral for a body that moved at −v and reversed to v at a, the greatest of any motion in the box.
     """
     liquid = extremes.liquid
-    per_root = 12 * extremes.radius_m**2 * math.sqrt(2 * math.pi * liquid.density_kg_m3 * (liquid.viscosity_pa_s or 0))
+    per_root: float = (
+        12 * extremes.radius_m**2 * math.sqrt(2 * math.pi * liquid.density_kg_m3 * (liquid.viscosity_pa_s or 0))
+    )
     return per_root * math.sqrt(acceleration_mps2 * change_mps)
 
 

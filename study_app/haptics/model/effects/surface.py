@@ -10,7 +10,7 @@ def _bound_n(extremes: Extremes) -> float | None:
     if not extremes.has_top:
         return None
     area, volume = extremes.doubtful_shares()
-    return area * extremes.total_n("area") + volume * (extremes.total_n("volume") + extremes.lift_n)
+    return float(area * extremes.total_n("area") + volume * (extremes.total_n("volume") + extremes.lift_n))
 
 
 def _problem(liquid: Liquid) -> str | None:

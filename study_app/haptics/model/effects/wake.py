@@ -102,7 +102,7 @@ def tail_bound_n(extremes: Extremes, wake: "Tail | None") -> float | None:
     """
     if wake is None:
         return None
-    return extremes.drag_by_flow_n(extremes.speed_mps * float((wake.length / wake.scaling) ** wake.exponent))
+    return float(extremes.drag_by_flow_n(extremes.speed_mps * (wake.length / wake.scaling) ** wake.exponent))
 
 
 def start_tail(kind: str, centre_m: tuple[float, float, float], reach_m: float) -> Mapping[str, Any]:
