@@ -146,15 +146,11 @@ def _names(scene: Scene, place: str) -> tuple[str, ...]:
         name = f"{place}.{field}"
         if isinstance(getattr(table, field), tuple):
             names += [f"{name}.{axis}" for axis in AXES]
-        elif name in _ROWS and _has_value(table, place, field):
-            names.append(name)
+        elif name in _ROWS:
+            follows = place in NAMED and field in NAMED[place].open_values
+            if getattr(table, field) is not None or follows or _ROWS[name].default is not None:
+                names.append(name)
     return tuple(names)
-
-
-def _has_value(table: BaseModel, place: str, field: str) -> bool:
-    """Return whether a field has a value, one computed from the scene, or a default in its row."""
-    follows = place in NAMED and field in NAMED[place].open_values
-    return getattr(table, field) is not None or follows or _ROWS[f"{place}.{field}"].default is not None
 
 
 def _accuracy(liquid: Liquid) -> tuple[str, ...]:
@@ -252,14 +248,9 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
         return override_all(scene, by_hand | {f"liquid.{place}": _begun(scene, place, str(value))})
     if read(scene, name) is None and value == value_of(scene, name):  # an unset value, unchanged
         return scene
-    return override_all(scene, by_hand | _without_replaced(scene, place, field) | {name: value})
-
-
-def _without_replaced(scene: Scene, place: str, field: str) -> dict[str, None]:
-    """Return the tables of disabled effects that a field of the liquid replaces, which are to be cleared."""
     taken = resolve(scene).liquids[0].effects
     replaced = (it.name for it in EFFECTS if place == "liquid" and field in it.replaces and it.name not in taken)
-    return {f"liquid.{name}": None for name in replaced}
+    return override_all(scene, by_hand | {f"liquid.{effect}": None for effect in replaced} | {name: value})
 
 
 def _checked(it: Parameter, value: Value) -> Value:

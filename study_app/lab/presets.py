@@ -127,7 +127,8 @@ def use_in_study(study: Path, setting: Setting, file: Path | None) -> str:
         raise StoreError(f"{study} is not a study file: choose a valid TOML file with a table [study]")
     wanted = id_of(file.stem if file is not None else setting.scene.liquids[0].id)
     name = free_id(document.get("liquids", {}), wanted or "liquid")
-    made = file if file is not None else _free_file(study.parent / f"{name}.toml")
+    names = (f"{name}.toml", *(f"{name}-{number}.toml" for number in range(2, 999)))
+    made = file if file is not None else next(path for path in map(study.parent.joinpath, names) if not path.exists())
     named = _relative(made, study.parent)
     newline = "\r\n" if b"\r\n" in before else "\n"
     lines = [
@@ -154,11 +155,6 @@ def _tables(source: bytes) -> dict[str, Any] | None:
         return tomllib.loads(source.decode())
     except (ValueError, RecursionError):
         return None
-
-
-def _free_file(wanted: Path) -> Path:
-    numbered = (wanted.with_stem(f"{wanted.stem}-{number}") for number in range(2, 999))
-    return next(path for path in (wanted, *numbered) if not path.exists())
 
 
 def _relative(file: Path, folder: Path) -> str:
