@@ -178,7 +178,7 @@ def test_at_100_percent_the_page_is_that_of_a_session_pixel_by_pixel(
     live.setFixedSize(size)
     QApplication.processEvents()
     QCursor.setPos(0, 0)  # where an earlier test left it, it may be over an answer of the session's page
-    session = ParticipantWindow(words("en"), clock=lambda: 0.0, windowed=True)
+    session = ParticipantWindow(words("en"), clock=lambda: 0.0, windowed=True, photodiode=False)
     session.resize(size)
     session.show()
     session.show_page(tab.view.page)

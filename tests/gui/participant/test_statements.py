@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
 from tests.gui.participant.driver import KEY, Participant, name_of, tap, told_of
-from tests.gui.small import DUTCH_LABELS, LABELS, questionnaire
+from tests.gui.small import DUTCH_LABELS, LABELS, STATEMENTS, questionnaire
 
 pytestmark = pytest.mark.slow
 
@@ -123,6 +123,13 @@ def test_a_small_window_shows_five_a_page_and_asks_page_by_page(opening: Opening
     seen.window.resize(*FULL)
     assert visible(seen) == [*range(1, 10)]
     assert seen.page.tabs == []
+
+
+@pytest.mark.parametrize(("many", "begins"), [(2, 256), (9, 120)])
+def test_few_statements_begin_a_third_down_the_page(opening: Opening, many: int, begins: int) -> None:
+    seen = opening(questionnaire(STATEMENTS[:many]), FULL)
+    labels = seen.page.questions.itemAt(0).widget()
+    assert labels.mapTo(seen.page, QPoint()).y() == pytest.approx(begins, abs=20)
 
 
 def test_what_is_pointed_at_chosen_and_missing_is_announced(seen: Participant, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -325,13 +325,17 @@ class QuestionsPage(PageWidget):
         side = round(self.margin - MARGIN * scale)
         self._head.setContentsMargins(margin, round((12 if self.tight else 20) * scale), margin, round(4 * scale))
         self._head.setSpacing(round((0 if self.tight else 6) * scale))
-        self.questions.setContentsMargins(side, 0, side, 0)
         self._progress.set_scale(text)
         self._title.setFont(font("title", scale=text * (0.86 if self.tight else 1.0)))
         self._intro.setFont(font("statement", scale=text))
         self._tab_row.setSpacing(round(8 * scale))
         self.foot.set_scale(text, margin, tight=self.tight)
         self._arrange()
+        self.questions.setContentsMargins(side, self.lead(), side, 0)
+
+    def lead(self) -> int:
+        """Return the height [px] above the questions."""
+        return 0
 
     def _arrange(self) -> None:
         """Divide the questions into parts that fit, and show the one that has the keyboard."""

@@ -386,6 +386,12 @@ class QuestionnaireWidget(QuestionsPage):
             field.set_sizes(sizes)
         return [list(asked[first : first + per_page]) for first in range(0, len(asked), per_page)]
 
+    def lead(self) -> int:
+        """Return the height [px] above the statements: few of them begin a third down the page."""
+        room, needed = self.room(tabs=False), self._heading.height() + sum(it.minimumHeight() for it in self.fields)
+        few = len(self.parts) == 1 and 2 * needed <= room
+        return max(0, self.foot.height() + room - 2 * self.height() // 3) if few else 0
+
     def _row_shown(self) -> StatementField:
         part = self.part
         return next((field for field in self.fields if field in part), self.fields[0])
