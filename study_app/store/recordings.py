@@ -207,7 +207,8 @@ def _opened(path: Path, secret: bytes | None) -> Iterator[Any]:
     except OSError as error:
         raise cannot_read(path, error) from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
-        raise _damaged(path, error) from error
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise StoreError(f"{path} is damaged ({reason}): restore it from a copy") from error
 
 
 def _read(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
@@ -275,11 +276,6 @@ def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:
         first = facts[name]
         if len(first) not in (0, 3) or not all(number is None or isinstance(number, int | float) for number in first):
             raise ValueError(f"{name} is not a force")
-
-
-def _damaged(path: Path, error: Exception) -> StoreError:
-    reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-    return StoreError(f"{path} is damaged ({reason}): restore it from a copy")
 
 
 class SamplesFile:

@@ -134,7 +134,10 @@ def scan(path: Path) -> Contents:
             damage = f"{path}, line {number}: its n is {shown}: lines are missing or duplicated; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
         version = line.get("version", version)
-        if (wrong := problem(line) or _unknown(line, version)) is not None:
+        wrong = problem(line)
+        if wrong is None and version == study_app.__version__ and line["event"] not in EVENTS:
+            wrong = f"has an event {shortened(line['event'])}, which version {version} does not write"
+        if wrong is not None:
             damage = f"{path}, line {number} {wrong}: it was changed; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
         if (wrong := _break(line, hashed.hexdigest(), chained=chained)) is not None:
@@ -144,13 +147,6 @@ def scan(path: Path) -> Contents:
         hashed.update(piece + b"\n")
         chained = "previous" in line
     return Contents(lines, whole_bytes, torn_bytes=len(tail), hash=hashed)
-
-
-def _unknown(line: Mapping[str, Any], version: Any) -> str | None:
-    """Return a message if a line claims this program's version but has an event unknown to it, else None."""
-    if version != study_app.__version__ or line["event"] in EVENTS:
-        return None
-    return f"has an event {shortened(line['event'])}, which version {version} does not write"
 
 
 def _break(line: Mapping[str, Any], before: str, *, chained: bool) -> str | None:

@@ -229,13 +229,14 @@ def _group(start: events.SessionStarted) -> Row:
 def _response(session: Row, about: Row, answer: events.Response, answered_at: str) -> Row:
     """Return the row of an answer; only in format 2 it says its kind, and the answer as text and as number."""
     value = answer.value
+    plain = answer.kind is None or value is None
     row = {
         **session,
         "form": None,
         "after_block": None,
         **about,
         "kind": answer.kind,
-        "response": value if answer.kind is None or value is None else _text(value),
+        "response": " ".join(value) if isinstance(value, list | tuple) else value if plain else str(value),
         "value": value if isinstance(value, int | float) else None,
         "item": answer.item,
         "number": answer.number,
@@ -247,11 +248,6 @@ def _response(session: Row, about: Row, answer: events.Response, answered_at: st
         "answered_at": answered_at,
     }
     return {name: row[name] for name in header(tables_of(2 if answer.kind else 1)["responses"])}
-
-
-def _text(value: Any) -> str:
-    """Return an answer as text: of several options their ids with spaces between, "" where none was chosen."""
-    return " ".join(value) if isinstance(value, list | tuple) else str(value)
 
 
 def _trial(session: Row, line: events.TrialStarted) -> Row:

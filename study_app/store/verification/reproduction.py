@@ -51,7 +51,9 @@ def reproduced(session_folder: Path) -> Reproduced:
     seed, participant, row_of = ran["seed"], ran["participant"], ran.get("row_of")
     complete = ran["status"] == "completed"
     try:
-        protocol = own_protocol(whole_protocol(ran["protocol"], key), _group(lines, key), ran["session"])
+        entry = events.start_of(lines).entry
+        group = None if entry is None else group_of(key.groups, key.nonce, entry)
+        protocol = own_protocol(whole_protocol(ran["protocol"], key), group, ran["session"])
         schedule = build_schedule(protocol, participant, seed, row_of)
         recorded = recorded_trials(opened(lines, key) if lines and events.start_of(lines).own_codes else lines)
     except (KeyError, TypeError, AttributeError, ValueError):  # the reason could reveal a condition
@@ -151,12 +153,6 @@ class _Compared:
     def _note(self, block: Block, trial: int, follows: bool) -> None:
         of_block = self.trials.setdefault(block.id, {})
         of_block[trial] = follows and of_block.get(trial, True)
-
-
-def _group(lines: Sequence[events.Event], key: blinding.Key) -> str | None:
-    """Return the group that the participant's entry gives, None in a study without groups."""
-    entry = events.start_of(lines).entry
-    return None if entry is None else group_of(key.groups, key.nonce, entry)
 
 
 def recorded_trials(lines: Iterable[events.Event]) -> tuple[RecordedTrial | int, ...]:

@@ -92,7 +92,9 @@ def _verify_study(folder: Path, copy: tuple[Path, Proofs] | None, found: Finding
         raise StoreError(
             f"{folder} is not a study folder (no {study.description.name}): name one such as results/rek2024"
         )
-    key = _key(study, found)
+    key = None
+    with found.reading(study.key):
+        key = blinding.read_key(study.path)
     early = listed(study.fingerprints)
     withdrawn = _withdrawn(study, found)
     sessions = [check_session(Place(study, one, name), key, found) for one in study.sessions()]
@@ -148,14 +150,6 @@ def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[
     for participant, entry in begun.items():
         if shared[entry] > 1:
             found.error(study.allocated, f"entry {entry} of participant {participant} is another participant's, too")
-
-
-def _key(study: StudyFolder, found: Findings) -> Key | None:
-    try:
-        return blinding.read_key(study.path)
-    except StoreError as error:
-        found.failure(study.key, error)
-        return None
 
 
 def _withdrawn(study: StudyFolder, found: Findings) -> dict[str, Tombstone]:
