@@ -1,6 +1,7 @@
 """The commands: what they print, and the one line and exit code a user gets for bad input."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from study_app.session import replay
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import MachineSettings, save
 from study_app.store.workstation import load as load_settings
+from tests.compiled import needs_servo
 
 pytestmark = pytest.mark.slow
 
@@ -196,3 +198,17 @@ def test_verify_says_last_what_concerns_sharing(liquid_study: Run) -> None:
     assert [line.partition(":")[0] for line in first] == ["warning", "warning"]
     assert shared.startswith("to share it: dataset_description.json: ")
     assert verdict == "2 sessions: sound"
+
+
+@needs_servo
+def test_a_blinded_report_says_once_how_to_open_the_key_and_which_limits_were_broken(
+    tmp_path: Path, liquid_study: Run
+) -> None:
+    source = source_bytes("demo").decode()
+    assert "frame_gap_ms = 250" in source
+    (tmp_path / "own.toml").write_text(source.replace("frame_gap_ms = 250", "frame_gap_ms = 2"), encoding="utf-8")
+    liquid_study("rehearse", "own.toml", "--no-recordings", "--results", "results")
+    liquid_study("report", "results", "--to", "report")
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert re.search("4 of 4 trials broke one: [^.]*frame gap at most 2 ms in 4", page)
+    assert page.count("liquid-study unblind RESULTS --by NAME --reason TEXT") == 1

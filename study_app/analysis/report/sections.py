@@ -47,6 +47,7 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.statistics.outcome import FEW
 from study_app.protocol.orders.balance import Evenness
+from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import named
 
 
@@ -93,7 +94,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if not study.revealed:
         yield (
             "The key is sealed: settings are codes, and only counts and comparisons without an order are shown. Who "
-            "decides by them to go on or to stop makes chance findings likelier."
+            "decides by them to go on or to stop makes chance findings likelier. Unblind in Results, or the command "
+            "liquid-study unblind RESULTS --by NAME --reason TEXT, opens it."
         )
         if study.own_codes:
             yield "Each participant has own codes until the key is open, so settings are not compared."
@@ -535,10 +537,22 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         "Age of what was drawn, less the delay asked for: mean over trials of each trial's mean, and the trial whose "
         "mean was farthest off; on the program's clock, without the display's own latency. Within limits: "
         + "; ".join(_limit(what, limit) for what, limit in limits.items())
-        + ". Trials beyond them are counted all the same, unless they are excluded above."
+        + f". {_beyond(study, limits)}Trials beyond them are counted all the same, unless they are excluded above."
         + ("" if study.revealed else " Until unblinding delay error and force withheld are sealed, and not judged."),
         "soft",
     )
+
+
+def _beyond(study: Study, limits: Mapping[str, float]) -> str:
+    """Return which limits how many trials broke, as a sentence; empty where none did."""
+    rows = study.trials[study.trials["counted"] & (study.trials["phase"] == "main")]
+    records: list[dict[str, Any]] = [dict(row.dropna()) for _, row in rows.iterrows()]
+    broken = [broken_limits(row, limits) for row in records]
+    if not any(broken):
+        return ""
+    counts = Counter(limit for one in broken for limit in one)
+    listed = ", ".join(f"{_limit(what, limits[what])} in {count}" for what, count in counts.items())
+    return f"{sum(map(bool, broken))} of {len(rows)} trials broke one: {listed}. "
 
 
 def _limit(what: str, limit: float) -> str:
