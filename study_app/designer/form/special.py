@@ -197,12 +197,14 @@ class QuestionRows(Themed, QWidget):
         self.column = vbox(spacing=0, margins=0, parent=self)
         self.rows: list[QuestionRow] = []
         self._shown: object = ((), ())
+        self.hide()
 
     def show_lines(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...] = ()) -> None:
         """Show questions, each in the languages, whose names are above them."""
         if self._shown == (lines, languages):
             return
         self._shown = (lines, languages)
+        self.setVisible(bool(lines))
         for old in self.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
             remove_widget(old)
         self.rows = []
