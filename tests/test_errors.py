@@ -11,6 +11,7 @@ from study_app.devices.doctor import DeviceFailure, DeviceFailureNotFound
 from study_app.devices.falcon.boot import BootFailure
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure
 from study_app.errors import Problem, ProtocolError, StudyError
+from study_app.store.recordings import SealedRecording
 from study_app.store.study_versions import ChangedOutsideError
 from study_app.workers.server import Stopped
 
@@ -22,7 +23,7 @@ USB = UsbFailure("busy", "opening it", -6)
 EXAMPLES = [
     *(
         kind(f"what, value, hint of {kind.__name__}")
-        for kind in [*PLAIN, Stopped, Refused, ChangedOutsideError, NotPlayableError]
+        for kind in [*PLAIN, Stopped, Refused, ChangedOutsideError, NotPlayableError, SealedRecording]
         if kind is not ProtocolError
     ),
     PROTOCOL,
