@@ -85,11 +85,11 @@ def test_a_look_is_planned_and_its_alpha_is_less_than_that_of_all() -> None:
 def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
     protocol = parse(LOOKED.replace("looks = [6, 12]", 'trends = "slopes"').encode(), "looked.toml")
     planned = plan(protocol, felt_in(protocol))
-    counts = count(planned, (6,), 1, 0, 10)["delays", "found"]
+    counts = count(planned, (10,), 1, 0, 10)["delays", "found"]
     items, x = planned.blocks[1].items, np.array(planned.blocks[1].delays_ms)[:, None] / 100
     shown = 0
     for number in range(10):
-        given = people(planned, 6, 1, number)[1].answers(1.0)
+        given = people(planned, 10, 1, number)[1].answers(1.0)
         ps = [mixed(given[:, :, at], x, planned.decided.direction(one.id)).p or 1.0 for at, one in enumerate(items)]
         shown += (holm(ps)[0] or 1.0) <= 0.05
     assert counts[0, FULL, 0] == shown > 0

@@ -23,7 +23,7 @@ from study_app.analysis.levels.statistic import (
     unit,
 )
 from study_app.analysis.levels.thresholds import Exponents, Thresholds
-from study_app.analysis.results import LevelsResult, number
+from study_app.analysis.results import LevelsResult, listed, number
 from study_app.protocol.trials.presentation import arrangement_of
 from study_app.psychophysics.detection import Sensitivity, rating
 from study_app.psychophysics.grid import Z_95
@@ -60,6 +60,18 @@ class SensitivityEstimate:
     criterion: float | None = None
     model: str | None = None
     other: float | None = None
+
+
+BIASED: Final = 0.2
+"""A criterion of two intervals beyond which thresholds are biased by more than a few percent."""
+
+
+def prefers(one: SensitivityEstimate) -> bool:
+    """Return whether a participant prefers one of two intervals, by more than chance explains."""
+    if one.criterion is None or one.d_prime is None or one.high is None:
+        return False
+    error = (one.high - one.d_prime) / Z_95 / math.sqrt(2)  # of a criterion, whose rates are those of d′
+    return abs(one.criterion) > max(BIASED, 2 * error)
 
 
 def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SensitivityEstimate]:
@@ -182,6 +194,17 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
             else None,
             *shares,
         )
+
+    def limits(self) -> Iterator[str]:
+        if self.found.design != "2ifc" or self.found.vary is None:
+            return
+        biased = [one for one in self.own(self.found) if prefers(one)]
+        if biased:
+            people = listed([f"{one.participant} ({number(one.criterion)})" for one in biased])
+            yield (
+                f"{self.found.title}: one interval is preferred by {people}: c beyond ±{BIASED:g} and chance. Their "
+                "thresholds are too high, by about a tenth at ±0.5."
+            )
 
     def explained(self) -> str:
         shares = "Percentages are shares of the answers." if self.rows[0].shares else ""

@@ -23,7 +23,7 @@ from study_app.analysis.data.blocks import Decided, Item, Setting, read_decided,
 from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
 from study_app.analysis.statistics.equivalence import p_above, sizes
-from study_app.analysis.statistics.outcome import SIDES, false_discovery, holm
+from study_app.analysis.statistics.outcome import FEW, SIDES, false_discovery, holm
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.groups import groups_with
@@ -251,7 +251,7 @@ def slopes(rising: Array, block: Planned, both_ways: NDArray[np.bool_]) -> Array
     delays = np.array(block.delays_ms) - np.mean(np.array(block.delays_ms))
     own = np.einsum("snki,k->sin", rising, delays)
     ps = np.ones(own.shape[:2])
-    varied = np.ptp(own, axis=-1) > 0
+    varied = (np.ptp(own, axis=-1) > 0) & (own.shape[-1] >= FEW)
     ps[varied] = ttest_1samp(own[varied], 0.0, axis=-1, alternative="greater").pvalue
     return np.where(both_ways, np.minimum(1.0, 2 * np.minimum(ps, 1 - ps)), ps)
 

@@ -123,8 +123,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if study.n < FEW and results.blocks:
         people = counted(study.n, "participant")
         yield (
-            f"{people[:1].upper()}{people[1:]}: below {FEW} no bootstrap interval is given, since it does not hold "
-            "there. An effect that is not shown here may well exist."
+            f"{people[:1].upper()}{people[1:]}: below {FEW} no bootstrap interval and no mixed model is given, since "
+            "they do not hold there. An effect that is not shown here may well exist."
         )
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import f as variance_ratio
 from scipy.stats import t as student
 
-from study_app.analysis.statistics.outcome import NO_VARIATION, Array, Interval, Outcome, complete
+from study_app.analysis.statistics.outcome import FEW, NO_VARIATION, Array, Interval, Outcome, complete
 from study_app.analysis.statistics.trend import Direction
 from study_app.errors import AnalysisError
 
@@ -60,8 +60,9 @@ def mixed(values: ArrayLike, columns: ArrayLike | None = None, direction: Direct
     )
     own = rows @ np.linalg.pinv(np.column_stack([np.ones(len(design)), design]))[1:].T
     covariance = np.atleast_2d(np.cov(own, rowvar=False)) if n > 1 else np.zeros((several, several))
-    if n <= several or np.linalg.matrix_rank(covariance, tol=1e-12) < several:
-        note = f"{several + 1} or more participants are needed" if n <= several else NO_SPREAD
+    fewest = max(FEW, several + 1)
+    if n < fewest or np.linalg.matrix_rank(covariance, tol=1e-12) < several:
+        note = f"no mixed model below {fewest} participants: it finds too much there" if n < fewest else NO_SPREAD
         note = NO_VARIATION if n and not np.ptp(rows, axis=1).any() else note
         return replace(found, no_interval=note, note=note)
     means, errors = own.mean(axis=0), np.sqrt(np.diag(covariance) / n)

@@ -1,6 +1,8 @@
 """d′, criterion and shares of answers per participant, standard, comparison and level, from rows of tracks."""
 
 import math
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -8,7 +10,7 @@ import pytest
 from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
-from study_app.analysis.levels.sensitivities import SensitivityEstimate, sensitivities
+from study_app.analysis.levels.sensitivities import Sensitivities, SensitivityEstimate, prefers, sensitivities
 from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import Stimulus
@@ -48,6 +50,23 @@ def test_2ifc_has_d_prime_criterion_and_share_of_first() -> None:
     assert one.high is not None
     assert one.high - one.low == pytest.approx(2 * (one.high - one.d_prime), abs=1e-9)
     assert (one.standard, one.n, one.participant) == (8.0, 2 * TRIALS, "P001")
+
+
+@pytest.mark.parametrize(("bias", "least", "most"), [(0.0, 0.0, 0.08), (0.5, 0.4, 1.0), (1.0, 0.9, 1.0)])
+def test_a_preference_for_an_interval_is_named(bias: float, least: float, most: float) -> None:
+    """Of people with 100 trials whose criterion is 0.35 where the answers are shifted by 0.5."""
+    draw, found = np.random.default_rng(4), []
+    for person in range(200):
+        for number in range(100):
+            shift = (1.3 if number % 2 == 0 else -1.3) + bias
+            first = draw.random() < norm.cdf(shift / math.sqrt(2))
+            letters = arrangement_text(default_design("2ifc"), number % 2)
+            found.append((f"P{person}", "b", 8.0, "8/1", 0.2, letters, "first" if first else "second", None, True))
+    _, *people = sensitivities(block("2ifc"), pd.DataFrame(found, columns=NAMES))
+    assert least <= np.mean([prefers(one) for one in people]) <= most
+    of_block = SimpleNamespace(title="Block", design="2ifc", vary="damping", statistics={Sensitivities.key: people})
+    shown = Sensitivities(cast("Any", of_block))
+    assert bool(list(shown.limits())) == (most > 0)
 
 
 def test_yes_no_takes_false_alarms_from_the_noise_trials() -> None:
