@@ -374,8 +374,8 @@ class Analysis(Table):
     )
     trends: Literal["ranks", "slopes"] = later(
         default="ranks",
-        description="What tests whether answers follow the delay: signs of each participant's rank correlation, or a "
-        "linear mixed model with random slopes.",
+        description="What tests whether answers follow the delay; ranks: signs of each participant's rank correlation; "
+        "slopes: a linear mixed model with random slopes.",
     )
     looks: tuple[Annotated[int, Field(ge=2, le=100_000)], ...] = later(
         default=(),
@@ -384,7 +384,8 @@ class Analysis(Table):
     )
     spending: Literal["obrien-fleming", "pocock"] = later(
         default="obrien-fleming",
-        description="How the looks share alpha (Lan and DeMets 1983): most of it at the last one, or about evenly.",
+        description="How the looks share alpha (Lan and DeMets 1983); obrien-fleming: most of it at the last one; "
+        "pocock: about evenly.",
     )
     published: tuple[Published, ...] = later(default=(), description="Published values to compare with.")
     contrasts: tuple[Contrast, ...] = later(default=(), description="Hypotheses that are tested, and reported first.")
