@@ -139,18 +139,20 @@ _OF_LENGTHS: Final = {
     "maxItems": "at most {} entries",
     "maxLength": "at most {} characters",
 }
-_WORDS: Final = {"design": "Trial design", "designs": "Trial designs"}
-"""Labels of keys whose names are unclear: a study has a design, too."""
 _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |\.?\Z)")
 
 
 LABELS: Final = {
     "between_s": "Between trials",
+    "delay_ms": "Visual delay",
+    "design": "Trial design",  # a study has a design, too
+    "designs": "Trial designs",
     "feedback_s": "Feedback duration",
     "level_error_ms": "Level error of delays",
+    "obrien-fleming": "O’Brien–Fleming",
     "participants": "Participants planned",
 }
-"""Labels of keys whose names are unclear or ambiguous, without their unit."""
+"""Labels of keys and values whose names are unclear or ambiguous, without their unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,7 +335,7 @@ def label_of(step: str | int) -> str:
         return LABELS[step]
     unit = _suffix(step)
     plain = step.removesuffix(f"_{unit}") if unit else step
-    return _WORDS.get(plain) or plain.replace("_", " ").strip().capitalize()
+    return plain.replace("_", " ").strip().capitalize()
 
 
 def unit_of(key: str) -> str:
