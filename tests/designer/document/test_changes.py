@@ -180,8 +180,8 @@ def study() -> Study:
 @pytest.mark.parametrize(
     ("values", "why"),
     [
-        ((2000,), "2000 is not permitted: Delay is at most 1000"),
-        ((-5, 30), "-5 is not permitted: Delay is at least 0"),
+        ((2000,), "2000 is not permitted: Visual delay is at most 1000"),
+        ((-5, 30), "-5 is not permitted: Visual delay is at least 0"),
         ((30, 30.0), "30 is there twice, or is the value of the original"),
         ((30, 0), "0 is there twice, or is the value of the original"),
         ((), "a series has 1 to 24 copies"),
