@@ -225,12 +225,12 @@ class _StepCode(JITCodeLibrary):
         return 0
 
     def serialize_using_object_code(self) -> Any:
-        """Return it for the cache: there is no object code."""
+        """Return bitcode for the cache: this code is never translated on its own."""
         return self.serialize_using_bitcode()  # type: ignore[no-untyped-call]
 
     @property
     def codegen(self) -> Any:
-        """The part of the code generator that a finished function needs."""
+        """The object whose `set_env` numba calls."""
         return self
 
     def set_env(self, _name: str, _environment: Any) -> None:
@@ -250,26 +250,36 @@ class _Cache(FunctionCache):
     def _index_key(self, *of: Any) -> Any:
         return (*super()._index_key(*of), self.of_step)  # type: ignore[no-untyped-call]
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load code as it was compiled: a step for its callers only."""
+        codegen = target_context.codegen()
+        library = codegen._library_class  # noqa: SLF001 - numba has no public way to it
+        codegen._library_class = _StepCode if self.of_step else library  # noqa: SLF001
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        finally:
+            codegen._library_class = library  # noqa: SLF001
+
 
 class _Kernel(CPUDispatcher):
     """A compiled function. What a call from Python needs is compiled only if Python calls it."""
 
+    _cache: Any
     _compiler: Any
-    _of_step = False
 
     def enable_caching(self) -> None:
         """Use the cache on disk."""
         self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
 
     def _choose(self, of_step: bool) -> None:
-        self._of_step = self._cache.of_step = of_step
+        self._cache.of_step = of_step
         self.targetoptions["no_cpython_wrapper"] = of_step
         self._compiler.pipeline_class = _StepCompiler if of_step else Compiler
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Compile it for a compiled function that calls it."""
         with global_compiler_lock:
-            before = self._of_step
+            before = self._cache.of_step
             self._choose(True)
             try:
                 return super().get_call_template(args, kws)
@@ -277,10 +287,10 @@ class _Kernel(CPUDispatcher):
                 self._choose(before)
 
     def compile(self, sig: Any) -> Any:
-        """Compile it; if Python calls it, again where it is compiled as a step only."""
+        """Compile it. What was compiled for compiled callers alone is compiled again for Python."""
         with global_compiler_lock:
             arguments = tuple(normalize_signature(sig)[0])  # type: ignore[no-untyped-call]
-            if not self._of_step and arguments in self.overloads and not _is_callable(self.overloads[arguments]):
+            if not self._cache.of_step and arguments in self.overloads and not _is_callable(self.overloads[arguments]):
                 del self.overloads[arguments]
             return super().compile(sig)
 
