@@ -321,6 +321,9 @@ class FormCard(Card):
         self._show_parts(form, before if stays else None)
         if not stays:
             self.area.verticalScrollBar().setValue(0)
+            keyboard = self.window().focusWidget()
+            if keyboard is not None and self.inside.isAncestorOf(keyboard):
+                self._reveal(keyboard)
         self.show_repairs(self._known)
         self.show_selected(self._together)
         self.show_help()
@@ -337,14 +340,19 @@ class FormCard(Card):
         inside_form = keyboard is not None and self.inside.isAncestorOf(keyboard)
         old, self._parts, self.rows, self.adds = self._parts, {}, [], {}
         for key, make, row in self._wanted(form):
-            part = old.pop(key, None) or make()
-            self._parts[key] = part
+            kept = old.pop(key, None)
+            part = self._parts[key] = kept or make()
             if isinstance(part, RowWidget) and row is not None:
-                part.show_row(row)
+                if before is None and kept is not None:
+                    part.begin(row)
+                else:
+                    part.show_row(row)
                 self.rows.append(part)
             elif isinstance(part, AddKeys):
                 self.adds |= {(*form.path, *inner): made for inner, made in part.buttons.items()}
         gone = next((part for part in old.values() if inside_form and part.isAncestorOf(keyboard)), None)
+        typed = keyboard if gone is not None and isinstance(keyboard, TypedLine | TypedText) else None
+        marked = (0, 0, 0) if typed is None else typed.marked()
         if gone is not None and keyboard is not None:
             keyboard.clearFocus()  # else Qt hands the keyboard on
         self._drop(old)
@@ -355,6 +363,10 @@ class FormCard(Card):
                 part.show()  # at once: a layout shows it later, and what is hidden takes no keyboard
         if gone is not None:
             self._refocus(form, before, gone)
+        if typed is not None and before is not None and self._focused is not None:
+            for part in self._focused.findChildren(QWidget):
+                if type(part) is type(typed) and part.accessibleName() == typed.accessibleName():
+                    part.take_over(typed, marked)
 
     def _refocus(self, form: Form, before: Form | None, gone: QWidget) -> None:
         """Give the keyboard of a part that is gone to the row in its place, or that it added; else to the first row."""

@@ -433,7 +433,7 @@ class LinesField(EntryList):
     def show_value(self) -> None:
         super().show_value()
         for line, value in zip(self.lines, self.row.row.value or (), strict=False):
-            if not line.property("state"):
+            if not (self.refusal and line.property("state")):
                 line.show_text(written(value))
 
     def _copy(self) -> None:

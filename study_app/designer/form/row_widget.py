@@ -8,7 +8,7 @@ from typing import Final
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QBoxLayout, QVBoxLayout, QWidget
 
 from study_app.designer.document.steps import RemoveKey, SwitchKey
 from study_app.designer.form.drawn_fields import LEVELS, TRIAL
@@ -230,6 +230,21 @@ class RowWidget(Themed, QWidget):
             self.refusal = ""
             self.row = row
             self.field.show_row(row)
+        self.say()
+
+    def begin(self, row: FormRow) -> None:
+        """Show a row of another element: nothing typed, refused or selected in this one stays."""
+        for field in (self.field, *self.field.findChildren(Field)):
+            field.refusal = ""
+        typed = [part for part in self.field.findChildren(QWidget) if isinstance(part, TypedLine | TypedText)]
+        for part in typed:
+            part.show_refused(False)
+        for entries in self.field.findChildren(QAbstractItemView):
+            entries.clearSelection()
+        self.refusal, self.row = "", row
+        self.field.show_row(row)
+        for part in typed:
+            part.begin_value()
         self.say()
 
     def say(self) -> None:

@@ -277,7 +277,7 @@ class TargetsField(Field):
             view.show_targets(self.row.facts, self.chosen)
         for lines, point in zip(self.lines, self.row.facts.points, strict=True):
             for axis, line in enumerate(lines):
-                if not line.property("state"):
+                if not (self.refusal and line.property("state")):
                     line.show_text("" if point is None else f"{point[axis]:g}")
 
     def _pick(self, number: int) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QEvent, QMimeData, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QResizeEvent
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QResizeEvent, QTextCursor
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.gui.kit.commands import keys_of
@@ -99,6 +99,21 @@ class _Typed(_Base):
         """
         raise NotImplementedError
 
+    def take_over(self, before: _Typed, marked: tuple[int, int, int]) -> None:
+        """Take the keyboard of a field of the same name, with its caret and what Esc restores."""
+        self.setFocus(Qt.FocusReason.OtherFocusReason)
+        self.mark(*marked[:2])
+        self._before = before._before
+
+    def mark(self, start: int, end: int) -> None:
+        """Mark the text from a place to another; the caret comes to the end."""
+        raise NotImplementedError
+
+    def begin_value(self) -> None:
+        """Take what is shown as the value of another element: nothing is refused, and Esc restores it."""
+        self.show_refused(False)
+        self._before = self.words()
+
     def restore(self) -> None:
         """Hand on what was there when the keyboard came."""
         self._rest.stop()
@@ -188,6 +203,12 @@ class TypedLine(_Typed, QLineEdit):
         at, length = self.cursorPosition(), len(self.text().encode("utf-16-le", "surrogatepass")) // 2
         return (self.selectionStart(), self.selectionEnd(), length) if self.hasSelectedText() else (at, at, length)
 
+    def mark(self, start: int, end: int) -> None:
+        if start == end:
+            self.setCursorPosition(end)
+        else:
+            self.setSelection(start, end - start)
+
     def show_text(self, text: str) -> None:
         if not self.pending and text != self.text():
             at = self.cursorPosition()
@@ -226,6 +247,12 @@ class TypedText(_Typed, QPlainTextEdit):
     def marked(self) -> tuple[int, int, int]:
         at = self.textCursor()
         return at.selectionStart(), at.selectionEnd(), self.document().characterCount() - 1  # a separator ends it
+
+    def mark(self, start: int, end: int) -> None:
+        cursor, last = self.textCursor(), self.document().characterCount() - 1
+        cursor.setPosition(min(start, last))
+        cursor.setPosition(min(end, last), QTextCursor.MoveMode.KeepAnchor)
+        self.setTextCursor(cursor)
 
     def sizeHint(self) -> QSize:
         return QSize(120, 118)

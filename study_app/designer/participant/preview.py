@@ -420,7 +420,7 @@ class ParticipantPreview(Card):
         self._ball: ProgrammedBall | None = None
         self._ball_of: object = None
         self._since_s = 0.0
-        self._photodiode = True
+        self._photodiode = False
         self._after_form = delayed(self, 0, self._follow)  # of another selection the form is painted first
         editing.opened_other.connect(self._begin)
         editing.changed.connect(self._after_form.start)
