@@ -187,6 +187,7 @@ class _Showing:
                     self._chosen,
                     store.clock.seconds,
                     shares_screen=screens[0] is screens[1],
+                    photodiode=True,
                     in_step=self._refresh_hz is None,
                 )
                 plan = self._protocol, schedule, FIRST

@@ -14,7 +14,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -241,8 +241,7 @@ class LabOpening(QObject):
 class LabSaving(QObject):
     """The liquids at hand; writes presets, one at a time, and looks which liquids there are then.
 
-    ``said`` tells what was written or opened last. ``failed`` carries what
-    was met instead.
+    ``said`` tells what was written or opened last. ``failed`` carries what was met instead.
     """
 
     failed = Signal(object)
@@ -252,7 +251,7 @@ class LabSaving(QObject):
         super().__init__()
         self.liquids = liquids
         self.said = ""
-        self._pool = ThreadPoolExecutor(1, thread_name_prefix="preset")
+        self._before: threading.Thread | None = None
         self._files: list[tuple[Scene, Path]] = []
         self._done.connect(self._tell, Qt.ConnectionType.QueuedConnection)
 
@@ -280,12 +279,26 @@ class LabSaving(QObject):
 
     def wait(self, patience_s: float = PATIENCE_S) -> None:
         """Wait until everything is on the disk, and tell of it."""
-        wait([self._pool.submit(lambda: None)], patience_s)
-        QCoreApplication.sendPostedEvents(self)
+        if self._before is not None:
+            self._before.join(patience_s)
+            QCoreApplication.sendPostedEvents(self)
 
     def _begin(self, write: Callable[[], str], more: tuple[str, ...]) -> None:
         at_hand = (*(it.source for it in self.liquids), *more)
-        self._pool.submit(lambda: (write(), liquids_at_hand(saved=at_hand))).add_done_callback(self._done.emit)
+        # Not a pool, whose threads Python waits for at its end: a drive may never answer.
+        self._before = threading.Thread(
+            target=self._write, args=(self._before, write, at_hand), name="preset", daemon=True
+        )
+        self._before.start()
+
+    def _write(self, before: threading.Thread | None, write: Callable[[], str], at_hand: tuple[str, ...]) -> None:
+        if before is not None:
+            before.join()
+        try:
+            found: object = write(), liquids_at_hand(saved=at_hand)
+        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
+            found = error
+        self._done.emit(found)
 
     def _save(self, path: Path, setting: Setting) -> str:
         save(path, preset_text(setting))
@@ -296,12 +309,12 @@ class LabSaving(QObject):
         file = next((path for scene, path in self._files if scene == setting.scene and path.is_file()), None)
         return use_in_study(study, setting, file)
 
-    def _tell(self, written: Future[tuple[str, tuple[Choice, ...]]]) -> None:
-        if error := written.exception():
-            self.failed.emit(error)
+    def _tell(self, found: Exception | tuple[str, tuple[Choice, ...]]) -> None:
+        if isinstance(found, Exception):
+            self.failed.emit(found)
             return
-        self.said, found = written.result()
-        self.liquids = tuple(dict.fromkeys((*self.liquids, *found)))
+        self.said, written = found
+        self.liquids = tuple(dict.fromkeys((*self.liquids, *written)))
 
 
 PREPARING: Final = "Loading the force model …"
@@ -541,6 +554,9 @@ class LabController(QObject):
                 self._cancel()
             case "stop", *_:
                 self._stop_force()
+            case "diagnose", *_:  # the main window opens the diagnosis then, which needs the device
+                self.trouble = self.view().trouble
+                self._let_go()
             case "fade in", *_:
                 self._fade_in()
             case "path", name if live is not None:

@@ -496,7 +496,9 @@ class MainController(QObject):
         return made
 
     def _lab_asked(self, what: str, _details: object) -> None:
-        if what == "diagnose" and self.lab_and_designer.lab is not None:
+        if what in {"enter", "device", "fade in"}:
+            self.devices.end_diagnosis()  # it would hold the device
+        elif what == "diagnose" and self.lab_and_designer.lab is not None:
             self.devices.diagnose(self.lab_and_designer.lab.device, self.window)
 
     def _home(self) -> HomePlace:
@@ -588,6 +590,7 @@ class MainController(QObject):
     def _start(self, chosen: NewSession) -> None:
         if self.live is not None:
             return
+        self.devices.end_diagnosis()  # it would hold the device
         self.machine.remember_operator(chosen.operator)
         self.live = LiveSession(chosen, self.window.theme, asks=True)
         self.live.over.connect(self._return)

@@ -143,7 +143,7 @@ class SessionBridge(QObject):
         participant.event.connect(self._event)
         participant.left.connect(operator.come_forward)
         if self.strip is not None:
-            self.strip.stop.pressed.connect(lambda: operator.ask("stop"))
+            self.strip.stop.pressed.connect(self._stop_force)
             self.strip.operator.clicked.connect(operator.come_forward)
             operator.header.page.show()
         participant.painted.connect(self._painted)
@@ -210,7 +210,7 @@ class SessionBridge(QObject):
     def fail(self, error: BaseException) -> None:
         """Zero force, then say what failed: to the journal, if it still takes it, and to the operator.
 
-        Where no more failed than one of the cockpit's panels, that is switched off, and the session goes on.
+        Where no more failed than one of the cockpit's panels, that is disabled, and the session goes on.
         """
         if name := self.operator.panel_of(error):
             self.operator.tell_of_failure(name, error)
@@ -231,7 +231,7 @@ class SessionBridge(QObject):
             log.error("and could not be recorded: %s", second)  # noqa: TRY400 - one line, the first has the trace
 
     def _handle_uncaught(self, error: BaseException) -> bool:
-        """Handle an exception that no slot caught; return whether it was only a panel's, which is switched off."""
+        """Handle an exception that no slot caught; return whether it was only a panel's, which is disabled."""
         panel = self.operator.panel_of(error)
         self.fail(error)
         return bool(panel)
@@ -330,43 +330,44 @@ class SessionBridge(QObject):
     @guarded_session_slot
     def _asked(self, what: str, details: tuple[Any, ...]) -> None:
         """Do what the operator asks for; zero force comes before anything that could fail or wait for the disk."""
-        now_s, post = self._now(), self._post
+        post = self._post
         match what:
             case "stop":
                 self._stop_force()
             case "resume":
-                post(ResumeRequested(now_s, "operator"))
+                post(ResumeRequested(self._now(), "operator"))
                 if self.strip is not None:
                     self.participant.come_forward()
             case "pause":
-                post(PauseRequested(now_s, "operator"))
+                post(PauseRequested(self._now(), "operator"))
             case "repeat":
-                post(RepeatRequested(now_s, *details))
+                post(RepeatRequested(self._now(), *details))
             case "note" | "mark":
-                post(Note(now_s, what, *details or ("",)))
+                post(Note(self._now(), what, *details or ("",)))
             case "exclude":
                 self._exclude(*details)
             case "end":
-                post(EndRequested(now_s, *details))
-            case "diagnose":  # a device that is looked at must not push
+                post(EndRequested(self._now(), *details))
+            case "diagnose":
                 self._diagnose()
             case "reconnect":
                 self._reconnect()
             case "failed":
                 name, error = details
-                log.error("the panel %r failed and was disabled: %s", name, error, exc_info=error)
+                log.error("the panel %r failed and is disabled: %s", name, error, exc_info=error)
                 self.record_note(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
             case "page":
                 self.participant.come_forward()
             case "close":
                 self._close()
 
+    @guarded_session_slot
     def _stop_force(self) -> None:
         self.parts.servo.stop_force()
         self._post(ForceStopped(self._now(), "operator"))
 
     def _diagnose(self) -> None:
-        """Zero force and a pause first."""
+        """Have the device examined: zero force and a pause first, for it must not push meanwhile."""
         self.parts.servo.stop_force()
         try:
             if not self.runner.finished:
@@ -485,7 +486,7 @@ def make_participant_window(
     *,
     shares_screen: bool,
     text_scale: float = 1.0,
-    photodiode: bool = True,
+    photodiode: bool,
     in_step: bool = True,
 ) -> ParticipantWindow:
     """Return the participant's window, not shown yet.

@@ -567,7 +567,8 @@ class TankNote(Card):
         self.fade_in.setVisible(not waiting and not view.force_on and view.may_fade_in)
         self.fade_in.show_action("", "Try again" if view.trouble else "Fade in again")
         self.dismiss.setVisible(bool(view.trouble) and view.force_on)
-        self.diagnose.setVisible(self.fade_in.isVisibleTo(self) and bool(view.trouble) and view.device.diagnosable)
+        stopped = view.device.state == "stopped"
+        self.diagnose.setVisible(self.fade_in.isVisibleTo(self) and stopped and view.device.diagnosable)
         self.show()
         self.raise_()
         self.place()

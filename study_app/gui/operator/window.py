@@ -176,7 +176,9 @@ class OperatorWindow(QMainWindow):
         self.question: Question | None = None
         self._asks_about = ""  # the setting that the question is about
         self._failed: set[str] = set()
-        self._panels: dict[QWidget, str] = {
+        self._panels: dict[QWidget, str] = {  # in a slim window "Now" and "Counts" are outside the rail
+            self.rail.now: "Now",
+            self.rail.tally: "Counts",
             self.rail: "Session",
             self.tiles: "Servo",
             self.lateness: "Tick lateness",
@@ -222,7 +224,9 @@ class OperatorWindow(QMainWindow):
         self.ask(what)
 
     def draw(self, name: str, how: Callable[[], object]) -> None:
-        """Draw what the session does not depend on; where that fails, say so once, and go on."""
+        """Draw what the session does not depend on; where that fails, say so once, and draw it no more."""
+        if name in self._failed:
+            return
         try:
             how()
         except Exception as error:  # noqa: BLE001 - told, and passed on to the log and the journal
@@ -247,6 +251,8 @@ class OperatorWindow(QMainWindow):
         clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
         if name not in self._failed:
             self._failed.add(name)
+            for panel, known in self._panels.items():
+                panel.setEnabled(panel.isEnabled() and known != name)
             self.show_message("A part of this window failed", f"{name}: this panel failed. The session continues.")
             self.ask("failed", name, error)
 
@@ -265,7 +271,7 @@ class OperatorWindow(QMainWindow):
             ("Counts", self.rail.tally.show_view),
             ("Servo", self.tiles.show_view),
             ("Notes", self.notes.show_view),
-            ("Steps", self.rail.show_view),
+            ("Session", self.rail.show_view),
             ("Device", self.device.show_view),
         ):
             self.draw(name, partial(show, view))
