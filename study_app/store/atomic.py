@@ -27,7 +27,7 @@ _MOST_LEVELS = 64  # of JSON, so that code may process a value recursively
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # without those of hidden files: markers are created and removed
 
 
-def write_file(path: Path, content: bytes, *, waits: bool = True) -> None:
+def write_file(path: Path, content: bytes | bytearray, *, waits: bool = True) -> None:
     """Write ``content`` to ``path``, replacing an existing file in one step.
 
     Written under a temporary name, flushed to the disk, renamed over the old file, and the folder's entry flushed. On
@@ -142,7 +142,7 @@ def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
         raise cannot_write(path, error) from error
 
 
-def write_whole(file: BinaryIO, content: bytes) -> None:
+def write_whole(file: BinaryIO, content: bytes | bytearray) -> None:
     """Write all of ``content`` to an unbuffered ``file``, in as many writes as the system needs."""
     rest = memoryview(content)
     while rest:
@@ -254,17 +254,17 @@ def is_there(path: Path) -> bool:
 
 
 def refuse_special(path: Path) -> None:
-    """Refuse a folder that is a link, or that holds a pipe or device, before anything is copied or deleted.
+    """Refuse a folder that is or holds a link, a pipe or a device, before anything is copied or deleted.
 
     Raises
     ------
     StoreError
         Names what it is.
     """
-    if path.is_symlink():
-        raise StoreError(f"{path} is a link to {path.readlink()}: replace the link by the folder itself")
     for inside in (path, *paths_in(path)):
-        if is_there(inside) and not inside.is_symlink() and not inside.is_file() and not inside.is_dir():
+        if inside.is_symlink():
+            raise StoreError(f"{inside} is a link to {inside.readlink()}: replace the link by what it leads to")
+        if is_there(inside) and not inside.is_file() and not inside.is_dir():
             raise StoreError(f"{inside} is neither a file nor a folder: remove it")
 
 
@@ -352,7 +352,7 @@ def _ends_whole(file: BinaryIO, size: int) -> bool:
     return file.read(1) == b"\n"
 
 
-def write_through(path: Path, content: bytes, *, waits: bool = True, mode: int = 0o666) -> None:
+def write_through(path: Path, content: bytes | bytearray, *, waits: bool = True, mode: int = 0o666) -> None:
     """Write a new file ``path`` and, with ``waits``, flush it to the disk."""
     with open(path, "xb", buffering=0, opener=lambda name, flags: os.open(name, flags, mode)) as file:
         write_whole(file, content)

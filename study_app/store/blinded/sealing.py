@@ -22,12 +22,12 @@ from study_app.store.journals import journal_events as events
 MARK: Final = b"This file is sealed until the study is unblinded: liquid-study unblind RESULTS\n"
 SAMPLE_BYTES: Final = 64
 """Of a sealed recording per sample: more than the samples of any device take."""
-FRAMES_BYTES_PER_S: Final = 4_000
+FRAMES_BYTES_PER_S: Final = 6_000
 """Of the sealed frames of a recording: more than 240 frames per second take."""
 _FACTS_BYTES: Final = 16_384  # of a recording without rows
 _TAG_BYTES = 16
 _BLOCK_BYTES = 1024
-_PIECE_BYTES = 65_536  # encrypted at once: other threads wait for so long
+_PIECE_BYTES = 65_536  # encrypted at once
 _LENGTH_BYTES = 8
 
 
@@ -55,24 +55,28 @@ def sealed_bytes(seconds: float, bytes_per_s: float) -> int:
     return _FACTS_BYTES + round(bytes_per_s * 2.0 ** math.ceil(math.log2(max(seconds, 1.0))))
 
 
-def seal_file(content: bytes, size: int, secret: bytes) -> bytes:
+def seal_file(content: bytes, size: int, secret: bytes) -> bytearray:
     """Return the content of a file, sealed into ``size`` bytes, doubled where they are too few."""
-    said = len(content).to_bytes(_LENGTH_BYTES) + content
-    while size < len(said):
+    while size < _LENGTH_BYTES + len(content):
         size *= 2
-    said = said.ljust(size, b"\0")
+    sealed, start = bytearray(len(MARK) + _TAG_BYTES + size), len(MARK) + _TAG_BYTES
+    said = memoryview(sealed)[start:]
+    said[: _LENGTH_BYTES + len(content)] = len(content).to_bytes(_LENGTH_BYTES) + content
     tag = _tag(MARK, said, secret)
-    return MARK + tag + _in_pieces(said, tag, secret)
+    sealed[:start] = MARK + tag
+    _combine_pieces(said, tag, secret)
+    return sealed
 
 
 def open_file(sealed: bytes, secret: bytes) -> bytes | None:
     """Return the content that `seal_file` sealed; None if it was changed, or was sealed with another secret."""
     start = len(MARK) + _TAG_BYTES
     tag = sealed[len(MARK) : start]
-    said = _in_pieces(sealed[start:], tag, secret)
+    said = memoryview(bytearray(sealed))[start:]
+    _combine_pieces(said, tag, secret)
     if not hmac.compare_digest(tag, _tag(MARK, said, secret)):
         return None
-    return said[_LENGTH_BYTES:][: int.from_bytes(said[:_LENGTH_BYTES])]
+    return bytes(said[_LENGTH_BYTES : _LENGTH_BYTES + int.from_bytes(said[:_LENGTH_BYTES])])
 
 
 def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
@@ -85,17 +89,18 @@ def _measured(said: bytes, names: frozenset[str]) -> dict[str, Any]:
     return {name: value for name, value in items if name in names and events.holds(name, value)}
 
 
-def _tag(whose: bytes, said: bytes, secret: bytes) -> bytes:
+def _tag(whose: bytes, said: bytes | memoryview, secret: bytes) -> bytes:
     tag = hmac.new(secret, whose, "sha256")
     tag.update(said)  # other threads run meanwhile
     return tag.digest()[:_TAG_BYTES]
 
 
-def _in_pieces(text: bytes, tag: bytes, secret: bytes) -> bytes:
-    pieces = range(0, len(text), _PIECE_BYTES)
-    return b"".join(_combined(text[at : at + _PIECE_BYTES], tag + at.to_bytes(8), secret) for at in pieces)
+def _combine_pieces(text: memoryview, tag: bytes, secret: bytes) -> None:
+    """Encrypt a text in its place, or decrypt it, so that other threads run meanwhile."""
+    for at in range(0, len(text), _PIECE_BYTES):
+        text[at : at + _PIECE_BYTES] = _combined(text[at : at + _PIECE_BYTES], tag + at.to_bytes(8), secret)
 
 
-def _combined(text: bytes, tag: bytes, secret: bytes) -> bytes:
+def _combined(text: bytes | memoryview, tag: bytes, secret: bytes) -> bytes:
     stream = hashlib.shake_256(secret + tag).digest(len(text))
     return (int.from_bytes(text) ^ int.from_bytes(stream)).to_bytes(len(text))

@@ -143,7 +143,7 @@ class _Compared:
             return
         steps = [one.steps for one in own if isinstance(one, events.Stepped)]
         if isinstance(line, events.Responses):
-            follows = line.items[0].value == sum(steps)
+            follows = bool(line.items) and line.items[0].value == sum(steps)
         else:
             follows = set_to == setting.level(setting.reached(steps))
         if not follows:

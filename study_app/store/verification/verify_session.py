@@ -261,14 +261,16 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:
         found.error(path, f"its status is {held.get('status')!r}, the journal's {last.status!r}; rebuild renews it")
     sequence = protocol.get("sequence") if isinstance(protocol := held.get("protocol"), dict) else None
-    was_last = any(isinstance(line, events.PageLeft) and sequence and line.page == sequence[-1] for line in lines)
+    steps = sequence if isinstance(sequence, list) else []
+    left = sum(isinstance(line, events.PageLeft) and line.page in steps[-1:] for line in lines)
+    was_last = bool(steps) and left >= steps.count(steps[-1])
     if isinstance(last, events.SessionEnded) and last.status != "completed" and was_last:
         found.error(folder.journal, f"its status is {last.status!r}, though the last page was left: it was changed")
 
 
 def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[str]:
     """Return the fields of a receipt that the journal contradicts, beside those that are copied from its first line."""
-    start, resumed = events.start_of(lines), {line.at for line in lines if isinstance(line, events.SessionResumed)}
+    start, resumed = events.start_of(lines), [line.at for line in lines if isinstance(line, events.SessionResumed)]
     expected: dict[str, Any] = {"started_at": start.at}
     if not isinstance(lines[-1], events.SessionEnded):
         expected |= {"status": receipt.UNFINISHED, "reason": "", "ended_at": None}
@@ -297,9 +299,9 @@ def _removed(lines: Sequence[events.Event]) -> Iterator[str]:
             chosen[line.trial] = line.n
         elif isinstance(line, events.Responses | events.TrialStarted | events.PassedOver) and line.trial is not None:
             chosen.pop(line.trial, None)
-        goes_on = isinstance(line, events.SessionEnded) and line.status == "completed"
+        completed = isinstance(line, events.SessionEnded) and line.status == "completed"
         for trial, number in list(chosen.items()):
-            if goes_on or (isinstance(line, events.TrialStarted) and line.trial > trial):
+            if completed or (isinstance(line, events.TrialStarted) and line.trial > trial):
                 del chosen[trial]
                 yield f"line {number} is an answer in trial {trial}, which was never confirmed: a line was removed"
 

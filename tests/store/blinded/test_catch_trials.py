@@ -147,5 +147,5 @@ def test_sessions_of_versions_without_catch_trials_are_reproduced_and_unblinded(
         writer = csv.DictWriter(file, rows[0], lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
-    write_checksums(session, {})
+    write_checksums(session)
     assert verify(study).errors == ()
