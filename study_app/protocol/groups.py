@@ -104,8 +104,13 @@ def every_step(protocol: HasSteps) -> Steps:
     return tuple(dict.fromkeys(step for steps in of_groups for step in steps))
 
 
-def follows(protocol: HasSteps, form: str, blocks: Container[str]) -> tuple[str | None, ...]:
-    """Return the blocks that a form comes after, None before the first; empty if no session has the form twice."""
+def follows(
+    protocol: HasSteps, form: str, blocks: Container[str], exchanged: Container[str] = ()
+) -> tuple[str | None, ...]:
+    """Return the blocks that a form comes after, None before the first; empty if no session has the form twice.
+
+    After one of the blocks that are ``exchanged`` any of them that a session has can come.
+    """
     found: dict[str | None, None] = {}
     again = False
     for group in protocol.groups or (None,):
@@ -113,7 +118,9 @@ def follows(protocol: HasSteps, form: str, blocks: Container[str]) -> tuple[str 
             again |= steps.count(form) > 1
             before: str | None = None
             for step in steps:
-                if step == form:
+                if step == form and before in exchanged:
+                    found |= dict.fromkeys(one for one in steps if one in exchanged)
+                elif step == form:
                     found[before] = None
                 before = step if step in blocks else before
     return tuple(found) if again else ()

@@ -202,10 +202,15 @@ def _filled(
             whole["short"] = {**dict.fromkeys(languages, name.replace("_", " ").capitalize()), **short}
         if "scale" in item and "scale" not in written:
             whole["scale"] = scale_name(of, item["scale"])
-        fields = KINDS.get(whole.get("kind", STATEMENT), Statement).model_fields
+        fields = KINDS[item.get("kind", STATEMENT)].model_fields
         ask(path, name, whole, *(key for key in ("text", "low", "high") if key in fields))
-        if "options" in item:
-            choices = _by_id(written, "options")
+        if "options" in item and isinstance(written.get("options", ()), list | tuple):
+            choices, possible = _by_id(written, "options"), [one["id"] for one in item["options"]]
+            faults += [
+                unknown((*place, *(path or ()), *where, "id"), f'"{one}" is not an option of {name}', one, possible)
+                for one, (where, _) in choices.items()
+                if one not in possible
+            ]
             whole["options"] = tuple(
                 _merged(one, choices.get(one["id"], ((), {}))[1], languages) for one in item["options"]
             )

@@ -20,9 +20,10 @@ from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.checks.force_limits import beyond_slope_limit, by_stimulus
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.durations import expected_duration_s
+from study_app.protocol.orders.durations import recordings_of
 from study_app.protocol.orders.sequences import enrolment
 from study_app.protocol.trials.presented_levels import highest_damping
+from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, SAMPLE_BYTES, sealed_bytes
 from study_app.video.sources import VideosFound
 
 if TYPE_CHECKING:
@@ -39,7 +40,6 @@ RATE_WARNING, RATE_FAILURE = 0.02, 0.5  # relative error of the servo's rate
 LEAST_REFRESH_HZ = 50.0
 SLOW_PROBE_S = 0.1
 TABLES_BYTES = 20_000_000
-RECORDED_BYTES_PER_S = 136e3  # at most, while they are sealed: once opened, half an hour takes 30 to 100 MB
 MOST_OF_A_TICK = 0.2  # share of a tick that the force model may take
 SAME = 1.1  # greatest ratio of two errors that count as equal
 _UNKNOWN = {"delay_s": "delay", "count_m": "encoder count", "mass_kg": "mass"}
@@ -225,7 +225,9 @@ def _surroundings(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         value, well = f"{facts.probe_s * 1e3:.1f} ms", facts.probe_s <= SLOW_PROBE_S
         yield _warned("Results folder", value, "time to write a file", "Use a local disk.", well=well)
 
-    recorded = RECORDED_BYTES_PER_S * expected_duration_s(protocol) if facts.recordings else 0.0
+    rates = SAMPLE_BYTES * protocol.device.rate_hz, FRAMES_BYTES_PER_S  # while they are sealed
+    planned = recordings_of(protocol) if facts.recordings else ()
+    recorded = sum(count * sum(sealed_bytes(each_s, rate) for rate in rates) for count, each_s in planned)
     needed = SPARE * (TABLES_BYTES + recorded)
     about = f"a session needs about {_megabytes(needed)} MB"
     if facts.free_bytes is None:

@@ -211,7 +211,7 @@ def _unperceived(protocol: Protocol, without_force: str) -> Iterator[str]:
         of_liquids = protocol.compared_in(block.id) == "liquids" if vary is None else vary not in OF_CONDITION
         if without_force and of_liquids and block.phase == "main":
             seen = ": participants see how the liquids slow the ball down, and feel nothing"
-            seen = ", and the ball is hidden: nobody perceives its liquids" if hides else seen
+            seen = ", and the ball is hidden: nobody perceives its liquids" if len(hides) == len(conditions) else seen
             yield f"blocks.{block.id}: {without_force} gives no force{seen}"
 
 

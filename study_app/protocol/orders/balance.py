@@ -124,7 +124,7 @@ def balance(protocol: Protocol, participants: Sequence[str], seed: int, session:
             title = protocol.text(protocol.blocks[block.id].title, protocol.study.languages[0])
             counted = evenness(block.codes, [codes_of(orders.study, block, who, seed) for who in participants])
             blocks.append(BlockBalance(block.id, title, block.order, block.repetitions, counted, unnumbered))
-    if orders.block_order != "fixed":
+    if orders.block_order != "fixed" and sum(block.phase == "main" for block in orders.blocks) > 1:
         order: CodeOrder = "williams" if orders.block_order == "balanced" else "shuffled"
         of_blocks = _of_blocks(orders, participants, seed)
         blocks.append(BlockBalance("", "The main blocks", order, 1, of_blocks, unnumbered))
@@ -157,10 +157,10 @@ def block_order_words(protocol: Protocol) -> str:
     found = _of_blocks(orders, numbered(planned), 1) if planned is not None else None
     rows = row_count("williams", blocks)
     words = f"balanced: {rows} orders, by the number in the participant's id"
-    if found is None or planned is None:
+    if planned is None or found is None:
         return f"{words}; any multiple of {rows} participants is even"
-    times = _range([count for line in found.positions for count in line])
-    even = f"{_times(found.positions[0][0])}" if found.positions_even else times
+    counts = [count for line in found.positions for count in line]
+    even = _times(counts[0]) if found.positions_even else _range(counts)
     more = "" if found.balanced else f"; {planned + -planned % rows} would be even"
     return f"{words}; {planned} participants have each block in each place {even}{more}"
 

@@ -126,7 +126,10 @@ def every_step_of(protocol: Mapping[str, Any]) -> tuple[str, ...]:
 
 def follows_in(protocol: Mapping[str, Any], form: str) -> tuple[str | None, ...]:
     """Return what `follows` returns, of the protocol in a receipt."""
-    return follows(_KeptSteps.model_validate(protocol), form, protocol["blocks"])
+    blocks = protocol["blocks"]
+    main = [name for name, block in blocks.items() if block.get("phase", "main") == "main"]
+    exchanged = main if protocol["study"].get("block_order", "fixed") != "fixed" else ()
+    return follows(_KeptSteps.model_validate(protocol), form, blocks, exchanged)
 
 
 def _items(questions: Questionnaire | None) -> dict[str, Any]:

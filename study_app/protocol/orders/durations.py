@@ -92,6 +92,15 @@ def step_duration_s(
     return block_duration_s(protocol, protocol.blocks[step], language, of_task)
 
 
+def recordings_of(protocol: Protocol) -> Iterator[tuple[int, float]]:
+    """Yield how many recordings a session has of each block, and how long each of them is expected to take [s]."""
+    for block in (protocol.blocks[step] for step in protocol.steps if step in protocol.blocks):
+        method = method_of(protocol, block) if block.stimulus is not None else None
+        intervals = 1 if block.design is None else design_of(protocol, block).intervals
+        longer_s = method.most_s / 2 if isinstance(method, Adjustment) else 0.0
+        yield order_of(protocol, block).trials * intervals, protocol.tasks[block.task].expected_s + longer_s
+
+
 def answering_s(questionnaire: Questionnaire) -> float:
     """Return how long a questionnaire takes each time it is asked [s]."""
     return PAGE_S + ANSWER_S * len(questionnaire.items)

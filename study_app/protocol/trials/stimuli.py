@@ -217,12 +217,14 @@ LAPSES: Final = (0.0, 0.02, 0.04)
 LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
 ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.05)
 ANALYSIS_LAPSE_PRIOR: Final = (0.25, 0.3, 0.2, 0.15, 0.1)
-SESSION_SD: Final = 0.065
-"""Standard deviation of a person's threshold from one session to the next [decades].
+MEASURED_SESSION_SD: Final = 0.049
+"""Standard deviation of a person's threshold from one session to the next [decades], with [0.034, 0.077].
 
-Six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) show 0.049 [0.034, 0.077] between series of 400 trials
-(``tests/benchmarks/analysis/people.py --spread``); people differ in it, so that it is more than the best one.
+Of six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) between series of 400 trials
+(``tests/benchmarks/analysis/people.py --spread``).
 """
+SESSION_SD: Final = 0.065
+"""What intervals allow for [decades]: people differ in it, so that it is more than the best estimate."""
 BEYOND_DECADES: Final = 0.2
 """How far beyond the ends of the levels a threshold is looked for."""
 
