@@ -40,6 +40,9 @@ SAMPLES: Final = {
     "--by": "AK",
     "--reason": '"why"',
     "--to": "folder",
+    "--path": "circle",
+    "--measured": "measured.csv",
+    "--fit": "viscosity_pa_s",
     "--liquid": "water",
     "--hours": "1",
 }
@@ -66,8 +69,8 @@ class GroupedCommands(click.Group):
         for old, new in RENAMED.get(args[0] if args else "", {}).items():
             if any(word.partition("=")[0] == old for word in args):
                 click.echo(f"{old} is {new} now" if new else f"{old} is no longer needed", err=True)
-            words = (word.replace(f"{old}=", f"{new}=" if new else "", 1) for word in args)
-            args[:] = [new if word == old else word for word in words if word != old or new]
+            words = [word for word in args if word != old or new]
+            args[:] = [_renamed(word, old, new) for word in words]
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -81,14 +84,20 @@ class GroupedCommands(click.Group):
                 )
 
 
+def _renamed(word: str, old: str, new: str) -> str:
+    """Return a word of the command line with the present name of an option; without a name its value alone."""
+    option, equals, value = word.partition("=")
+    return word if option != old else f"{new}{equals}{value}" if new else value
+
+
 def example_of(ctx: click.Context) -> str:
     """Return a command with its arguments and required options; empty without any."""
     words: list[str] = []
     for one in ctx.command.params:
         name = one.opts[0] if isinstance(one, click.Option) else (one.metavar or one.name or "").strip("[]")
-        if isinstance(one, click.Argument):
+        if isinstance(one, click.Argument) and (one.required or name in SAMPLES):
             words.append(SAMPLES.get(name, name))
-        elif one.required:
+        elif isinstance(one, click.Option) and one.required:
             words += [name, SAMPLES.get(name, str(one.metavar))]
     return " ".join((ctx.command_path, *words)) if words else ""
 
