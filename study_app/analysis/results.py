@@ -380,9 +380,7 @@ def lead(found: BlockResult) -> str:
 
 def statistic(outcome: Outcome) -> str:
     """Return a statistic with its sign."""
-    text = {"chi2": "χ²", "sum of chi2": "sum of χ²", "likelihood ratio": "LR"}.get(
-        outcome.statistic_name, outcome.statistic_name
-    )
+    text = {"chi2": "χ²", "sum of chi2": "sum of χ²"}.get(outcome.statistic_name, outcome.statistic_name)
     return f"{text} {number(outcome.statistic)}"
 
 

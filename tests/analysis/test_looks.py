@@ -8,12 +8,13 @@ import pytest
 from click.testing import CliRunner
 from scipy.stats import norm, ttest_rel
 
+from study_app.analysis.data.blocks import Spending
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import FULL, count, people, plan
 from study_app.analysis.report.sections import first_page
 from study_app.analysis.statistics.mixed_model import mixed
-from study_app.analysis.statistics.outcome import Spending, alpha_of_looks, holm
+from study_app.analysis.statistics.outcome import alpha_of_looks, holm
 from study_app.cli import commands
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse

@@ -10,8 +10,7 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import codebook_bytes
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold
-from study_app.analysis.findings.mixed_models import MixedModel
-from study_app.analysis.findings.statement_tests import DelayTrend, SessionsDiffer, SettingsDiffer
+from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel, SessionsDiffer, SettingsDiffer
 from study_app.analysis.report.sections import block, methods
 from study_app.analysis.results import BlockResult, Results, all_of, said_of_presentations
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study

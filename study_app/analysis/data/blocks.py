@@ -8,10 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Self, TypeAlias, get_args
 
-from study_app.analysis.statistics.outcome import Spending, alpha_of_looks
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase
-from study_app.protocol.model import Contrast, Protocol, Published
+from study_app.protocol.model import Analysis, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import every_step_of, follows_in
 from study_app.protocol.questionnaires import Score
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
@@ -326,6 +325,7 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
 
 
 Direction: TypeAlias = Literal["increasing", "decreasing"]
+Spending: TypeAlias = Literal["obrien-fleming", "pocock"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -334,7 +334,8 @@ class Decided:
 
     ``made`` is False where there was none; ``changed`` where sessions were run under different ones, of which this is
     the first: in both cases everything found is exploratory. Where ``looks`` are planned, ``alpha`` is that of the
-    number ``look`` of them; 0: before the first one, where everything is exploratory, too.
+    number ``look`` of them, and ``planned_alpha`` that of all; 0: before the first one, where everything is
+    exploratory, too.
     """
 
     made: bool
@@ -349,6 +350,7 @@ class Decided:
     looks: tuple[int, ...] = ()
     spending: Spending = "obrien-fleming"
     look: int | None = None
+    planned_alpha: float | None = None
     trends: Literal["ranks", "slopes"] = "ranks"
 
     @property
@@ -359,12 +361,21 @@ class Decided:
     @property
     def alphas(self) -> tuple[float, ...]:
         """The significant p at each planned look; ``alpha`` is that of all of them."""
+        from study_app.analysis.statistics.outcome import alpha_of_looks  # noqa: PLC0415 - loads scipy
+
         return alpha_of_looks(self.looks, self.alpha, self.spending) if self.looks else (self.alpha,)
 
     def at(self, n: int) -> Self:
         """Return what holds with so many participants: at the last planned look that they reach."""
         look = sum(planned <= n for planned in self.looks)
-        return replace(self, alpha=self.alphas[max(look, 1) - 1], look=look) if self.looks else self
+        alpha = self.alphas[max(look, 1) - 1]
+        return replace(self, alpha=alpha, look=look, planned_alpha=self.alpha) if self.looks else self
+
+    def alpha_words(self) -> str:
+        """Return the planned alpha, and what is left of it at a look."""
+        if self.planned_alpha is None:
+            return f"{self.alpha:g}"
+        return f"{self.planned_alpha:g} over all looks, {self.alpha:.2g} at this one"
 
     def look_words(self) -> str:
         """Return which planned look this is, in a sentence; nothing where one is planned."""
@@ -374,8 +385,8 @@ class Decided:
         if self.look == 0:
             return f"Looks are planned at {planned}, none of which is reached: everything found is exploratory."
         return (
-            f"This is look {self.look} of {len(self.looks)}, planned at {planned}: a p of at most {self.alpha:.2g} "
-            f"counts (alpha is shared by {SPENDINGS[self.spending]} spending)."
+            f"This is look {self.look} of {len(self.looks)}, planned at {planned}: an adjusted p of at most "
+            f"{self.alpha:.2g} counts (alpha is shared by {SPENDINGS[self.spending]} spending)."
         )
 
     def is_primary(self, item: str) -> bool:
@@ -389,6 +400,11 @@ class Decided:
 
 SPENDINGS: Final[Mapping[Spending, str]] = {"obrien-fleming": "O'Brien–Fleming", "pocock": "Pocock"}
 NOTHING_DECIDED: Final = Decided(False, False, 0.05, None, (), (), (), (), None)
+
+
+def decisions(protocol: Protocol) -> Decided:
+    """Return what a protocol decides, the defaults where it has no table."""
+    return read_decided([(protocol.analysis or Analysis()).model_dump(mode="json")])
 
 
 def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:

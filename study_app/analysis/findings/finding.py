@@ -52,7 +52,6 @@ class BlockAnswers:
     single: Mapping[str, Array]
     sessions: Mapping[str, Array]
     verdicts_only: bool = False
-    sites: tuple[str, ...] = ()
     over_all: Outcome | Failure | None = None
     gate: float = 0.0
 
@@ -102,8 +101,7 @@ def block_answers(study: Study, block: Block, seed: int, failures: Failures) -> 
     }
     single = {item: answers_ for item, (answers_, _) in given.items()}
     sessions = {item: numbers for item, (_, numbers) in given.items()}
-    found = of_tables(block, study.decided, people, single, sessions, seed=seed, failures=failures)
-    return replace(found, sites=tuple(map(study.site_of, people))) if study.sites else found
+    return of_tables(block, study.decided, people, single, sessions, seed=seed, failures=failures)
 
 
 def of_tables(

@@ -207,12 +207,14 @@ class DelayTrend(StatementTests):
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY),)
-        outcomes: Mapping[str, Outcome] = {
-            item: trend(values, answers.decided.direction(item), seed=answers.intervals)
-            for item, values in answers.values.items()
-        }
+        outcomes: Mapping[str, Outcome]
         if answers.decided.trends == "slopes":
             outcomes = mixed_models(answers)
+        else:
+            outcomes = {
+                item: trend(values, answers.decided.direction(item), seed=answers.intervals)
+                for item, values in answers.values.items()
+            }
         return judged(outcomes, answers, f"{answers.block.id}: trend over delay"), ()
 
     def methods(self) -> Iterator[str]:
@@ -225,9 +227,9 @@ class DelayTrend(StatementTests):
                 f"Trends over the delay were tested by {by} "
                 f"({_first_tested(trends).outcome.method.split(',')[0]}), which is about the "
                 f"population, one-sided where a direction was stated {stated}, {families(trends)}; where a trend "
-                "showed, the longest delay was dropped and the test repeated until it no longer did, which gives an "
-                "upper bound of the lowest delay that is noticed (every step at alpha over the number of statements, "
-                "so that the error rate holds over all of them)."
+                "showed, the rank correlations were tested again without the longest delay until none showed, which "
+                "gives an upper bound of the lowest delay that is noticed (every step at alpha over the number of "
+                "statements, so that the error rate holds over all of them)."
             )
 
 
@@ -513,3 +515,45 @@ def _pair_interval(pair: Pair) -> str:
     outcome = pair.tested.outcome
     one_way = outcome.effect is not None and abs(outcome.effect) == 1.0
     return f"– (all {_differing(pair)} one way)" if one_way else interval(outcome.interval)
+
+
+class MixedModel(StatementTests):
+    """The linear mixed model of every statement: exploratory, unless it is the planned test of trends."""
+
+    key = "mixed"
+    place = 13
+    row_place = 5
+    what = "mixed model"
+    part = "mixed model"
+    asks = "settings differ, mixed model"
+    title = "Mixed model"
+
+    @classmethod
+    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
+        if answers.k < 2:
+            return (), (NotTested(cls.what, ONE_DELAY if answers.block.kind == "delays" else "there is one setting"),)
+        if answers.block.kind == "delays" and answers.decided.trends == "slopes":
+            return (), ()  # it is the test of trends
+        family = f"{answers.block.id}: mixed model"
+        return in_family(mixed_models(answers), answers, family, false_discovery, FDR, primary=False), ()
+
+    def section(self) -> Iterator[str]:
+        yield from super().section()
+        per = "per 100 ms of delay" if self.found.delays_ms else "against the first"
+        effects = [
+            f"{short(self.found, one.item)}: "
+            + listed([f"{number(slope)} {interval(ends)}" for slope, ends in zip(it.slopes, it.intervals, strict=True)])
+            for one in self.value
+            if isinstance(it := one.outcome, Mixed) and it.slopes
+        ]
+        if effects:
+            yield paragraph(f"Slopes in points {per}, with 95 % intervals: {'; '.join(effects)}.", "soft")
+
+    @classmethod
+    def common_methods(cls, blocks: Sequence[BlockResult]) -> Iterator[str]:
+        if any(one.outcome.p is not None for found in blocks for one in cls.of(found)):
+            yield (
+                "Besides, answers as numbers were fitted by linear mixed models with a random intercept and random "
+                "slopes of each participant (t of the mean slope, Hotelling's T²), corrected by their false discovery "
+                "rate and exploratory."
+            )

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -66,12 +66,20 @@ BIASED: Final = 0.2
 """A criterion of two intervals beyond which thresholds are biased by more than a few percent."""
 
 
-def prefers(one: SensitivityEstimate) -> bool:
-    """Return whether a participant prefers one of two intervals, by more than chance explains."""
-    if one.criterion is None or one.d_prime is None or one.high is None:
-        return False
-    error = (one.high - one.d_prime) / Z_95 / math.sqrt(2)  # of a criterion, whose rates are those of d′
-    return abs(one.criterion) > max(BIASED, 2 * error)
+def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
+    """Return the mean criterion over all standards of each participant who prefers one of two intervals.
+
+    It is further from 0 than `BIASED` and than twice its standard error.
+    """
+    found = dict[str, list[tuple[float, float]]]()
+    for one in of_people:
+        if one.participant is None or one.criterion is None or one.d_prime is None or one.high is None:
+            continue
+        error = (one.high - one.d_prime) / Z_95 / math.sqrt(2)  # of a criterion, whose rates are those of d′
+        found.setdefault(one.participant, []).append((one.criterion, error))
+    means = {person: np.mean([criterion for criterion, _ in rows]) for person, rows in found.items()}
+    errors = {person: math.hypot(*(error for _, error in rows)) / len(rows) for person, rows in found.items()}
+    return {person: float(mean) for person, mean in means.items() if abs(mean) > max(BIASED, 2 * errors[person])}
 
 
 def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SensitivityEstimate]:
@@ -198,12 +206,11 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
     def limits(self) -> Iterator[str]:
         if self.found.design != "2ifc" or self.found.vary is None:
             return
-        biased = [one for one in self.own(self.found) if prefers(one)]
-        if biased:
-            people = listed([f"{one.participant} ({number(one.criterion)})" for one in biased])
+        if biased := preferences(self.own(self.found)):
+            people = listed([f"{person} ({number(criterion)})" for person, criterion in biased.items()])
             yield (
-                f"{self.found.title}: one interval is preferred by {people}: c beyond ±{BIASED:g} and chance. Their "
-                "thresholds are too high, by about a tenth at ±0.5."
+                f"{self.found.title}: one interval is preferred by {people}: the criterion c is further from 0 than "
+                f"{BIASED:g} and than twice its standard error. Their thresholds are estimated too high."
             )
 
     def explained(self) -> str:

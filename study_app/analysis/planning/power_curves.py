@@ -334,8 +334,8 @@ def _explained(question: Question, found: Powers) -> list[str]:
             return [
                 f"Two one-sided t tests within ±{found.plan.decided.equivalence_bound} points, with which changing "
                 "signs, signed ranks and the bootstrap-t must agree, and with "
-                f"{enough(found.plan.decided.alpha)}. Where the model's difference is near the bound or beyond it, "
-                "finding equivalence would be wrong, and few should."
+                f"{enough(found.plan.decided.alphas[-1])}. Where the model's difference is near the bound or beyond "
+                "it, finding equivalence would be wrong, and few should."
             ]
         case "contrast":
             return ["Paired t tests of each participant's mean answers, by Holm over the hypotheses."]

@@ -10,7 +10,7 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from study_app import __version__
-from study_app.analysis.data.blocks import SPENDINGS, read_decided, spoken
+from study_app.analysis.data.blocks import SPENDINGS, decisions, spoken
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.report.html_page import bullets, heading, paragraph
@@ -85,7 +85,6 @@ def read_commitment(folder: Path) -> Commitment | None:
         ) from error
 
 
-DEFAULTS: Final = Analysis()
 FAMILIES: Final[dict[Family, str]] = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 
 
@@ -125,7 +124,7 @@ def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
 
 
 def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[str]:
-    questionnaire, decided = protocol.questionnaire_of(block.id), protocol.analysis or DEFAULTS
+    questionnaire, decided = protocol.questionnaire_of(block.id), protocol.analysis or Analysis()
     if questionnaire is None or len(block.conditions) < 2:
         return
     texts = {item.id: text_in(item.text, language) for item in questionnaire.statements}
@@ -182,7 +181,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     asked = [block for block in protocol.main_blocks if block.design is None and block.questionnaire is not None]
     if not asked:
         return
-    decided = protocol.analysis or DEFAULTS
+    decided = decisions(protocol)
     kinds = {protocol.compared_in(block.id) for block in asked}
     if "delays" in kinds:
         by = "changing the signs of each participant's rank correlation with the delay"
@@ -190,8 +189,9 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             by = "linear mixed models with random intercepts and slopes of each participant (t of the mean slope)"
         yield (
             f"Delays: a trend in the population, by {by}, in the stated direction, otherwise two-sided, stepping down "
-            "from the longest delay; equivalence to no delay by two one-sided tests, where a bound is given, with "
-            f"{least(decided.alpha)}; the detection threshold from agreement, where it shows a trend."
+            "from the longest delay by rank correlations; equivalence to no delay by two one-sided tests, where a "
+            "bound is given, with "
+            f"{least(decided.alphas[-1])}; the detection threshold from agreement, where it shows a trend."
         )
     if others := kinds - {None, "delays"}:
         yield (
@@ -282,7 +282,7 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
     """Yield how many participants there are and why."""
     planned = "Their number is not decided: there is no stopping rule."
     if one.participants is not None:
-        decided = read_decided([(protocol.analysis or DEFAULTS).model_dump(mode="json")])
+        decided = decisions(protocol)
         planned = (
             f"{one.participants} are planned. The study ends when so many sessions that count are complete; the key is "
             "opened, and anything tested, only then."

@@ -250,10 +250,11 @@ def slopes(rising: Array, block: Planned, both_ways: NDArray[np.bool_]) -> Array
     """Return the p (studies, items) that slopes over the delay rise; as `trend`, by the mixed model."""
     delays = np.array(block.delays_ms) - np.mean(np.array(block.delays_ms))
     own = np.einsum("snki,k->sin", rising, delays)
-    ps = np.ones(own.shape[:2])
+    rising_p, falling_p = np.ones((2, *own.shape[:2]))
     varied = (np.ptp(own, axis=-1) > 0) & (own.shape[-1] >= FEW)
-    ps[varied] = ttest_1samp(own[varied], 0.0, axis=-1, alternative="greater").pvalue
-    return np.where(both_ways, np.minimum(1.0, 2 * np.minimum(ps, 1 - ps)), ps)
+    rising_p[varied] = ttest_1samp(own[varied], 0.0, axis=-1, alternative="greater").pvalue
+    falling_p[varied] = 1 - rising_p[varied]
+    return np.asarray(np.where(both_ways, np.minimum(1.0, 2 * np.minimum(rising_p, falling_p)), rising_p))
 
 
 def signed(answers: Array, rng: np.random.Generator) -> Array:
@@ -381,7 +382,8 @@ def _delays(
     found = _family(block, decided, ps) & shown[:, None]
     counted = _counted(found, shown, effects)
     at_full = found.reshape(effects, studies, -1)[FULL]
-    counted["lowest"] = _step_down(rising[FULL], at_full, both_ways, decided.alpha, rng)
+    first = rising.shape[3] if decided.trends == "slopes" else rising.shape[3] - 1
+    counted["lowest"] = _step_down(rising[FULL], at_full, both_ways, decided.alpha, rng, first)
     if decided.equivalence_bound is not None:
         here = answers[[0, FULL]]
         away = here[:, :, :, 1:] - here[:, :, :, :1]
@@ -391,17 +393,23 @@ def _delays(
 
 
 def _step_down(
-    rising: Array, shown: NDArray[np.bool_], both_ways: NDArray[np.bool_], alpha: float, rng: np.random.Generator
+    rising: Array,
+    shown: NDArray[np.bool_],
+    both_ways: NDArray[np.bool_],
+    alpha: float,
+    rng: np.random.Generator,
+    first: int,
 ) -> NDArray[np.bool_]:
     """Return whether a trend is shown up to each delay or a shorter one (studies, items, delays).
 
-    ``shown`` (studies, items) says where the trend over all delays is; the steps after it are not corrected.
+    ``shown`` (studies, items) says where the trend over all delays is; rank correlations over less than ``first``
+    delays are tested, without a correction.
     """
     _, _, k, items = rising.shape
     found = np.zeros((len(shown), items, k), dtype=bool)
     going = shown
     for longest in range(k - 1, 0, -1):
-        if longest < k - 1:
+        if longest < first:
             going = going & (trend(ranks(rising[:, :, : longest + 1]), both_ways, rng) <= alpha)
         found[:, :, longest] = going
     return found

@@ -17,7 +17,7 @@ from scipy.stats import nct
 from scipy.stats import t as student
 
 from study_app import __version__
-from study_app.analysis.data.blocks import read_decided, spoken
+from study_app.analysis.data.blocks import decisions, spoken
 from study_app.analysis.data.measures import Array
 from study_app.analysis.planning.power_curves import WANTED, interval
 from study_app.analysis.statistics.outcome import student_interval
@@ -318,7 +318,7 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
         rows = [] if one.measure != "threshold" or len(one.blocks) < 2 else [*_spreads(precisions, *one.blocks)]
         if not rows:
             continue
-        alpha = read_decided([decided.model_dump(mode="json")]).alphas[-1]
+        alpha = decisions(precisions.protocol).alphas[-1]
         tail = alpha / (2 if one.expected is None else 1)
         yield from ("", f"## Contrast: {one.described()}", "")
         yield (

@@ -124,7 +124,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         people = counted(study.n, "participant")
         yield (
             f"{people[:1].upper()}{people[1:]}: below {FEW} no bootstrap interval and no mixed model is given, since "
-            "they do not hold there. An effect that is not shown here may well exist."
+            "they need more. An effect that is not shown here may well exist."
         )
 
 
@@ -162,7 +162,7 @@ def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) ->
     quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
     yield (
         f"Answers were given on scales of seven points and are taken as ordinal: medians, quartiles ({quartiles}), "
-        "never means, except in the test of equivalence, which concerns the mean difference."
+        "never means, except in the test of equivalence, which concerns the mean difference, and in mixed models."
     )
     for found in blocks:
         yield from said_of_presentations(found)
@@ -219,18 +219,24 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     if decided.binding:
         which = "all statements were primary" if not decided.primary else f"primary: {', '.join(decided.primary)}"
         yield (
-            f"These decisions were made before the first session: alpha = {decided.alpha:g}, {which}. "
+            f"These decisions were made before the first session: alpha = {decided.alpha_words()}, {which}. "
             "Different questions are not corrected for each other."
         )
-    elif decided.made:
+    elif decided.changed:
         yield (
             "The decisions about the analysis changed between sessions, so all results are exploratory; the "
-            f"decisions of the first session were used (alpha = {decided.alpha:g})."
+            f"decisions of the first session were used (alpha = {decided.alpha_words()})."
         )
+    elif decided.made:
+        yield decided.look_words()
     else:
         yield f"No decisions were made beforehand: all results are exploratory, with alpha = {decided.alpha:g}."
     for finding in all_findings():
         yield from finding.common_methods(blocks)
+    yield (
+        "Missing answers were never replaced; tests over several settings use participants who answered under all of "
+        "them, comparisons of two those who answered under both."
+    )
     measured = results.performance
     if measured is not None and measured.recorded:
         yield (
@@ -264,7 +270,7 @@ def first_page(results: Results, limits: Sequence[str]) -> Markup:
         ],
         limits=list(limits),
         shown=LIMITS_SHOWN,
-        empty=empty_studies(max(found.n for found in results.blocks)) if given else "",
+        empty=empty_studies(max(found.n for found in results.blocks)) if given and not results.decided.looks else "",
     )
 
 
@@ -338,7 +344,7 @@ def verdicts_mean(results: Results) -> Iterator[str]:
     if not results.blocks:
         return
     yield heading(2, "What the words of verdicts mean")
-    yield paragraph(VERDICTS_MEAN.format(alpha=f"{results.decided.alpha:g}"))
+    yield paragraph(VERDICTS_MEAN.format(alpha=f"{results.decided.alpha:.4g}"))
 
 
 def counts_of_answers(results: Results) -> Iterator[str]:

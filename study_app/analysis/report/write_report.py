@@ -366,7 +366,7 @@ def _again(study: Study, results: Results) -> Iterator[str]:
     bound = decided.equivalence_bound
     rows = [
         ("Decided before the first session", "yes" if decided.binding else "no: everything is exploratory"),
-        ("Alpha", f"{decided.alpha:g}"),
+        ("Alpha", decided.alpha_words()),
         ("Bound of equivalence", "none" if bound is None else f"±{bound:g}"),
         ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),
         ("Seed of the analysis", str(results.seed)),

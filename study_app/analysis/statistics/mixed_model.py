@@ -2,7 +2,8 @@
 
 answer = μ + x·β + (1, x)·b + error, with b, a participant's own intercept and slopes, normal about zero with any
 covariance; Laird & Ware (1982), Biometrics 38, 963–974. Where everybody answered under all settings, the estimate of β
-by restricted likelihood is the mean over participants of their own least-squares slopes, with their covariance over n:
+by restricted likelihood is the mean over participants of their own least-squares slopes, with their covariance over n,
+unless a variance of slopes would be estimated at its bound, 0:
 Student's t tests one slope, Hotelling's T² (1931, Ann. Math. Stat. 2, 360–378) several. People may have trends of their
 own around zero: the test is about the population. Points of the scale are taken as numbers with equal steps.
 """
@@ -62,7 +63,8 @@ def mixed(values: ArrayLike, columns: ArrayLike | None = None, direction: Direct
     covariance = np.atleast_2d(np.cov(own, rowvar=False)) if n > 1 else np.zeros((several, several))
     fewest = max(FEW, several + 1)
     if n < fewest or np.linalg.matrix_rank(covariance, tol=1e-12) < several:
-        note = f"no mixed model below {fewest} participants: it finds too much there" if n < fewest else NO_SPREAD
+        few = f"no mixed model below {fewest} participants: slopes of so few would have to be normal"
+        note = few if n < fewest else NO_SPREAD
         note = NO_VARIATION if n and not np.ptp(rows, axis=1).any() else note
         return replace(found, no_interval=note, note=note)
     means, errors = own.mean(axis=0), np.sqrt(np.diag(covariance) / n)
@@ -76,12 +78,13 @@ def mixed(values: ArrayLike, columns: ArrayLike | None = None, direction: Direct
     reach = float(student.ppf((1 + SURE) / 2, n - 1)) * errors
     ends = zip((means - reach).tolist(), (means + reach).tolist(), strict=True)
     intervals = tuple(Interval(low, high, SURE, "Student's t") for low, high in ends)
-    freedom = f"t({n - 1})" if several == 1 else f"F({several}, {n - several})"
+    sides = f"one-sided ({direction})" if direction else "two-sided"
+    freedom = f"t({n - 1}), {sides}" if several == 1 else f"F({several}, {n - several})"
     return replace(
         found,
         statistic=statistic,
         p=p,
-        method=f"random intercepts and slopes, {freedom}, {f'one-sided ({direction})' if direction else 'two-sided'}",
+        method=f"random intercepts and slopes, {freedom}",
         effect=float(means[0]) if several == 1 else None,
         interval=intervals[0] if several == 1 else None,
         no_interval="" if several == 1 else "no single effect: one slope for each setting",
@@ -91,7 +94,7 @@ def mixed(values: ArrayLike, columns: ArrayLike | None = None, direction: Direct
     )
 
 
-NO_SPREAD: Final = "no spread: differences between settings are the same for every participant"
+NO_SPREAD: Final = "no spread: some differences between settings are the same for every participant"
 
 
 def _design(settings: int, columns: ArrayLike | None) -> Array:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
-from typing import Final, Literal, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,7 +33,7 @@ SAMPLES: Final = 1999
 """Bootstrap samples of an interval."""
 
 FEW: Final = 10
-"""Below so many participants neither a bootstrap interval nor a mixed model is offered: they do not hold there."""
+"""Below so many participants neither a bootstrap interval nor a mixed model is given: see `bootstrap` and `mixed`."""
 
 TOO_FEW: Final = f"no interval below {FEW} participants: resampling so few covers far less than it claims"
 NO_VARIATION: Final = "no variation: every participant answered alike under all settings"
@@ -102,13 +102,12 @@ def draws_for(alpha: float, usual: int, members: int = 1) -> int:
 SIDES: Final = {"higher": "greater", "lower": "less", None: "two-sided"}
 """The alternative of a test, by what is expected of the first of two."""
 
-Spending: TypeAlias = Literal["obrien-fleming", "pocock"]
 NODES: Final = 200
 """Of the quadrature over the statistic of a look."""
 
 
 @lru_cache(maxsize=64)
-def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: Spending) -> tuple[float, ...]:
+def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple[float, ...]:
     """Return the largest two-sided p that is significant at each look: the error rate of all of them is ``alpha``.
 
     Parameters

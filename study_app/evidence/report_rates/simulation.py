@@ -19,20 +19,18 @@ import numpy as np
 from scipy.special import expit
 from scipy.stats import binomtest
 
-from study_app.analysis.data.blocks import Block, Decided
+from study_app.analysis.data.blocks import Block, Decided, Spending
 from study_app.analysis.data.measures import Array
 from study_app.analysis.evaluate import evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, common_ms
 from study_app.analysis.findings.finding import FOUND, BlockAnswers, of_tables
-from study_app.analysis.findings.mixed_models import MixedModel
 from study_app.analysis.findings.recognition import LiquidRecognition
-from study_app.analysis.findings.statement_tests import DelayTrend, OverAll, Pairs, SettingsDiffer, gated
+from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel, OverAll, Pairs, SettingsDiffer, gated
 from study_app.analysis.planning.power_curves import interval
 from study_app.analysis.planning.simulated_studies import Opinions, Plan, people
 from study_app.analysis.report.sections import answers as answered
 from study_app.analysis.results import BlockResult, Failures, Results
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.outcome import Spending
 from study_app.analysis.statistics.thresholds import noticed
 from study_app.evidence.table import Evidence, Table
 
@@ -344,7 +342,8 @@ def _report(
 
 def _claims(found: BlockResult) -> bool:
     """Return whether anything in the section of a block says that settings differ or that a delay is noticed."""
-    tests = [*SettingsDiffer.of(found), *DelayTrend.of(found), *(pair.tested for pair in Pairs.of(found))]
+    pairs = [pair.tested for pair in Pairs.of(found)]
+    tests = [*SettingsDiffer.of(found), *DelayTrend.of(found), *MixedModel.of(found), *pairs]
     low = any(one.over_all_ms is not None for one in LowestDelay.of(found))
     return any(one.verdict in FOUND for one in tests) or low or _recognised(found) or _printed(found)
 

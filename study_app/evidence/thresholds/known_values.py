@@ -33,7 +33,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.simulated import OBSERVER, Observer, as_requested, normal, simulate_study
 from study_app.protocol.streams import Draw, stream
-from study_app.protocol.trials.stimuli import DELAYS
+from study_app.protocol.trials.stimuli import DELAYS, MEASURED_SESSION_SD
 from study_app.protocol.trials.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
 from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
 from study_app.session.replay import replay
@@ -58,8 +58,8 @@ EXPONENT: Final = 0.44
 """Of perceived thickness over viscosity (Stevens & Guirao 1964)."""
 POINTS: Final = 64
 LAPSES_MOST: Final = 0.05
-BETWEEN_SESSIONS: Final = 10**0.049
-"""Factor between a person's thresholds of several sessions, as measured (`protocol.trials.stimuli.SESSION_SD`)."""
+BETWEEN_SESSIONS: Final = 10**MEASURED_SESSION_SD
+"""Factor between a person's thresholds of several sessions, as measured."""
 
 PEOPLE: Final = 10
 REHEARSED: Final = 3
@@ -390,12 +390,12 @@ def validate(
 ) -> list[Verdict]:
     """Return all verdicts on known values, each with the source of its protocol; studies of all seeds count together.
 
-    ``progress`` is called with what is done, and the share of it.
+    Sessions are rehearsed with the first seed. ``progress`` is called with what is done, and the share of it.
     """
     verdicts: list[Verdict] = []
     every: list[StudyFound] = []
     rehearsals = [executor.submit(rehearsed, one, source, seeds[0]) for source, one in known]
-    cases = [(number, seed) for seed in seeds for number in range(studies)]
+    cases = [(number, seed) for seed in dict.fromkeys(seeds) for number in range(studies)]
     for (_, one), rehearsal in zip(known, rehearsals, strict=True):
 
         def counted(done: int, name: str = one.name) -> None:

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
-from study_app.analysis.levels.sensitivities import Sensitivities, SensitivityEstimate, prefers, sensitivities
+from study_app.analysis.levels.sensitivities import Sensitivities, SensitivityEstimate, preferences, sensitivities
 from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.presentation import arrangement_text
 from study_app.protocol.trials.stimuli import Stimulus
@@ -63,10 +63,12 @@ def test_a_preference_for_an_interval_is_named(bias: float, least: float, most: 
             letters = arrangement_text(default_design("2ifc"), number % 2)
             found.append((f"P{person}", "b", 8.0, "8/1", 0.2, letters, "first" if first else "second", None, True))
     _, *people = sensitivities(block("2ifc"), pd.DataFrame(found, columns=NAMES))
-    assert least <= np.mean([prefers(one) for one in people]) <= most
+    biased = preferences(people)
+    assert least <= len(biased) / len(people) <= most
     of_block = SimpleNamespace(title="Block", design="2ifc", vary="damping", statistics={Sensitivities.key: people})
     shown = Sensitivities(cast("Any", of_block))
-    assert bool(list(shown.limits())) == (most > 0)
+    (said,) = shown.limits()
+    assert [person for person in (one.participant for one in people) if f"{person} (" in said] == list(biased)
 
 
 def test_yes_no_takes_false_alarms_from_the_noise_trials() -> None:

@@ -20,7 +20,7 @@ TESTS = {
     "findings.statement_tests.friedman": ("liquids", "test of settings"),
     "findings.statement_tests.global_permutation": ("liquids", "test over all statements"),
     "findings.recognition.recognition": ("liquids", "test of recognition"),
-    "findings.mixed_models.mixed_models": ("liquids", "mixed model"),
+    "findings.statement_tests.mixed_models": ("liquids", "mixed model"),
     "findings.statement_tests.trend": ("delays", "test of a trend"),
     "findings.delays.step_down": ("delays", "lowest delay that shows"),
     "findings.delays.tost": ("delays", "test of equivalence"),

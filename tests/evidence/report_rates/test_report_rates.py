@@ -5,9 +5,8 @@ import pytest
 from study_app.analysis.evaluate import evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
 from study_app.analysis.findings.finding import of_tables
-from study_app.analysis.findings.mixed_models import MixedModel
 from study_app.analysis.findings.recognition import LiquidRecognition
-from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer
+from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel, Pairs, SettingsDiffer
 from study_app.analysis.planning.simulated_studies import Plan, plan
 from study_app.evidence.report_rates import simulation as studies
 from study_app.evidence.report_rates.simulation import (
