@@ -57,6 +57,11 @@ def counted(number: int, noun: str, plural: str = "") -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {plural or noun + 's'}"
 
 
+def capitalised(words: str) -> str:
+    """Return words with a capital at their begin; the other letters stay."""
+    return words[:1].upper() + words[1:]
+
+
 def minutes(seconds: float) -> str:
     """Return the time of a running clock: 68 s as "1:08"; an hour and more as "1:02:03"."""
     whole = max(0, int(seconds))

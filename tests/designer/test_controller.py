@@ -86,7 +86,7 @@ def test_a_draft_is_kept_on_leaving_and_found_again_until_it_is_discarded(design
     again = type(designer.controller)(designer.results)
     again.open("kitchen")
     assert again.editing.opened.study.text == draft.text
-    assert again.place.banner_words.text().startswith("Draft of today")
+    assert again.place.banner.words.text().startswith("Draft of today")
     again.saving.answer_banner("discard")
     assert again.editing.opened.study.text == before
     assert draft_of(designer.file) is None
@@ -116,7 +116,7 @@ def test_a_file_changed_outside_is_taken_in_or_asked_about_and_never_overwritten
 def test_a_shipped_study_is_read_only_and_can_be_copied(designer: Any, name: str) -> None:
     before = shipped_file(name).read_bytes()
     designer.open(name)
-    assert "ships with the program" in designer.place.banner_words.text()
+    assert "ships with the program" in designer.place.banner.words.text()
     text = designer.text
     designer.editing.ask(SetValue(("study", "version"), "9"))
     designer.editing.ask(RetypeFile("format = 1\n"))
@@ -134,7 +134,7 @@ def test_a_shipped_study_is_read_only_and_can_be_copied(designer: Any, name: str
 def test_a_file_that_may_not_be_written_is_read_only(designer: Any) -> None:
     designer.file.chmod(0o444)
     designer.open()
-    assert "may not write" in designer.place.banner_words.text()
+    assert "may not write" in designer.place.banner.words.text()
 
 
 def test_a_file_that_is_not_utf_8_is_refused_with_a_message(designer: Any) -> None:

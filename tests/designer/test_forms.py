@@ -55,6 +55,18 @@ def test_esc_restores_the_value_of_a_field_that_was_left_with_a_refused_text(qtb
     assert (line.text(), row.wrong.isVisible()) == (str(value), False)
 
 
+def test_the_refusal_of_a_value_of_one_of_several_kinds_is_shown(designer: Any) -> None:
+    levels = ("methods", "easy", "levels")
+    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.go_to(*levels[:2])
+    row = designer.form_row(*levels)
+    designer.fill(row.field.inner.line, "0.5 x")
+    assert row.wrong.isVisible()
+    assert "Esc restores it" in row.wrong.sentence.text()
+    designer.hit("Escape")
+    assert not row.wrong.isVisible()
+
+
 QUESTIONNAIRE = ("questionnaires", "liquid")
 ITEMS = (*QUESTIONNAIRE, "items")
 
@@ -121,6 +133,58 @@ def test_a_row_that_stays_keeps_its_widget_caret_and_keyboard(qtbot: Any, design
     designer.editing.ask(RenameElement(("blocks", "liquids"), "fluids"))
     assert designer.keyboard is line
     assert (line.cursorPosition(), designer.form_row("blocks", "fluids", "title")) == (2, title)
+
+
+def test_typing_on_after_a_rest_keeps_the_caret_where_the_key_is_new_in_the_file(qtbot: Any, designer: Any) -> None:
+    view = ("conditions", "thin", "view")
+    designer.change(("format = 1", "format = 2"))
+    designer.open("kitchen", *view[:2])
+    line = designer.field(*view).line
+    line.setFocus()
+    qtbot.keyClicks(designer.keyboard, "f")
+    qtbot.waitUntil(lambda: designer.value(*view) == "f")  # the row can be removed now: it has another widget
+    assert designer.keyboard is not line
+    qtbot.keyClicks(designer.keyboard, "ront")
+    designer.keyboard.flush()
+    assert designer.value(*view) == "front"
+    designer.hit("Escape")
+    assert not designer.value(*view)
+
+
+@pytest.mark.parametrize("typed", ["12x", ""])
+def test_the_next_element_shows_nothing_of_the_one_before(qtbot: Any, designer: Any, typed: str) -> None:
+    thin, thick = (("liquids", name, "density_kg_m3") for name in ("thin", "thick"))
+    designer.open("kitchen", *thin[:2])
+    before = designer.text
+    row = designer.form_row(*thin)
+    row.field.line.setFocus()
+    if typed:
+        designer.fill(row.field.line, typed)
+        assert row.wrong.isVisible()
+    designer.go_to(*thick[:2])
+    assert designer.form_row(*thick) is row
+    assert (row.field.line.text(), row.field.refusal, row.field.line.property("state") or "") == ("1400", "", "")
+    row.field.line.setFocus()
+    designer.hit("Escape")
+    designer.go_to(*thin[:2])
+    assert row.field.line.text() == "1000"
+    assert designer.text == before
+
+
+def test_the_next_element_has_no_selected_entries_and_shows_the_field_with_the_keyboard(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids", width=1100)
+    entries = designer.field("blocks", "liquids", "conditions").list
+    designer.click_on(entries.viewport(), at=entries.visualItemRect(entries.item(0)).center())
+    assert entries.selectedItems()
+    last = designer.place.form.rows[-1]
+    designer.place.form.focus(last.row.row.path)
+    designer.go_to("blocks", "delays")
+    assert designer.field("blocks", "delays", "conditions").list is entries
+    assert not entries.selectedItems()
+    area = designer.place.form.area
+    assert area.verticalScrollBar().maximum()
+    assert designer.place.form.inside.isAncestorOf(designer.keyboard)
+    assert area.viewport().rect().contains(designer.keyboard.mapTo(area.viewport(), designer.keyboard.rect().center()))
 
 
 def test_a_question_is_shown_whole_and_typed_as_one_paragraph(qtbot: Any, designer: Any) -> None:

@@ -94,7 +94,7 @@ def test_edits_of_a_read_only_study_whose_file_changed_are_asked_about_once_it_c
     opening = open_alone(session)
     drafted.file.write_text(drafted.file.read_text() + "# outside\n")
     drafted.controller.enter()
-    assert "session of this study is under way" in drafted.place.banner_words.text()
+    assert "session of this study is under way" in drafted.place.banner.words.text()
     assert [action for action, _ in drafted.place.view.banner.actions] == ["copy"]
     assert 'version = "0.7"' in drafted.text
     opening.release()
@@ -113,7 +113,7 @@ def test_a_draft_goes_where_the_files_content_is_taken(drafted: Any) -> None:
 def test_a_deleted_file_is_written_anew_where_mine_is_kept(drafted: Any) -> None:
     drafted.file.unlink()
     drafted.controller.enter()
-    assert drafted.place.banner_words.text() == "Another program deleted or moved this file"
+    assert drafted.place.banner.words.text() == "Another program deleted or moved this file"
     next(iter(drafted.place.banner.buttons.values())).click()
     assert not drafted.place.banner.isVisible()
     drafted.saving.save()
@@ -132,7 +132,7 @@ def test_a_file_that_cannot_be_read_is_said_at_once_until_it_can_be(
             broken.setattr("study_app.designer.document.document.Document.changed_outside", unreadable)
             designer.saving.look_again()
             designer.saving.look_again()
-            assert designer.place.banner_words.text() == "Kitchen.toml cannot be read: Input/output error"
+            assert designer.place.banner.words.text() == "Kitchen.toml cannot be read: Input/output error"
         designer.saving.look_again()
         assert not designer.place.banner.isVisible()
     assert said == ["Kitchen.toml cannot be read: Input/output error"] * 2
@@ -144,7 +144,7 @@ def test_saving_says_that_the_study_cannot_be_run_until_it_is_edited(drafted: An
     assert count > 10
     drafted.saving.save()
     words = f"Saved. It cannot be run yet: {count} problems"
-    assert drafted.place.banner_words.text() == words
+    assert drafted.place.banner.words.text() == words
     assert drafted.place.banner.isVisible()
     assert said == [words]
     next(iter(drafted.place.banner.buttons.values())).click()
@@ -165,7 +165,7 @@ def test_the_line_about_a_draft_ends_by_undo_by_saving_and_by_closing_it(designe
         assert not banner.close_button.isVisible(), "a read-only study stays one"
         keep(designer.file, Draft(f"{text}# {end}\n", content_hash(designer.file.read_bytes())))
         designer.open()
-        assert designer.place.banner_words.text().startswith("Draft of today")
+        assert designer.place.banner.words.text().startswith("Draft of today")
         designer.editing.ask(SetText(TITLE, "en", end))
         assert banner.isVisible()
         if end == "undo":
@@ -209,7 +209,7 @@ def never_saved(designer: Any) -> Any:
 
 def test_a_study_that_was_never_saved_is_discarded_once_that_is_confirmed(never_saved: Any) -> None:
     place, file = never_saved.place, never_saved.file.with_name("mine.toml")
-    assert place.banner_words.text().endswith(", never saved")
+    assert place.banner.words.text().endswith(", never saved")
     next(iter(place.banner.buttons.values())).click()
     assert "cannot be undone" in " ".join(one.text() for one in place.prompt.findChildren(QLabel))
     assert place.prompt.cancel.hasFocus()

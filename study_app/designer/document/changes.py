@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from study_app.designer.document.fields import initial, new_text, node_at, table_of, tags
-from study_app.designer.document.names import ITEMS
+from study_app.designer.document.names import ITEMS, languages_of
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Edit, Move, Set, Unset
 from study_app.designer.document.toml_text import Refused
@@ -49,15 +49,9 @@ def _table(study: Study, path: Path) -> Mapping[str, Any]:
     return value if isinstance(value, Mapping) else {}
 
 
-def languages_of(study: Study) -> tuple[str, ...]:
-    """Return the languages of a study; a file that names none has English."""
-    found = tuple(str(code) for _, code in entries(study.document, "study.languages.*"))
-    return found or ("en",)
-
-
 def with_language(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that add a language: plain texts become tables, whose new texts are missing."""
-    there = languages_of(study)
+    there = languages_of(study.document)
     if code in there:
         raise Refused(f"the study is in {language_name(code)} already")
     if code not in LANGUAGES:
@@ -68,7 +62,7 @@ def with_language(study: Study, code: str) -> tuple[Edit, ...]:
 
 def without_language(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that remove a language and its texts."""
-    there = languages_of(study)
+    there = languages_of(study.document)
     if code not in there or len(there) == 1:
         raise Refused("a study has at least one language")
     gone = (Unset((*path, code)) for path, text in texts_of(study) if isinstance(text, Mapping) and code in text)
@@ -77,7 +71,7 @@ def without_language(study: Study, code: str) -> tuple[Edit, ...]:
 
 def filled_in(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that copy the first language's texts to missing texts of a language."""
-    first = languages_of(study)[0]
+    first = languages_of(study.document)[0]
     found: list[Edit] = []
     for path, text in texts_of(study):
         if isinstance(text, Mapping) and code not in text and first in text:

@@ -71,9 +71,9 @@ class Document:
     def edit(
         self, words: str, *edits: Edit, text: str | None = None, select: Place | None = None, key: object = None
     ) -> None:
-        """Make a step of another text, of edits one after the other, or of both; an edit without effect is none.
+        """Replace the text, apply edits in their order, or both, as one step; if nothing changes, there is no step.
 
-        It continues the last step where that was made with the same ``key`` not long ago. Refused edits change nothing.
+        A step with the ``key`` of the last step, made within `JOIN_S`, is joined to it. Refused edits change nothing.
         """
         study, splices = (self.study, ()) if text is None else self.study.typed(text)
         if edits or text is None:

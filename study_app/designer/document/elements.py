@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 from study_app.designer.document.fields import Row, counted_elements, label_of, refused_at, row_at, rows, singular
-from study_app.designer.document.names import ITEMS, named_at, uses
+from study_app.designer.document.names import ITEMS, languages_of, named_at, uses
 from study_app.designer.document.study import Study
 from study_app.number_text import counted, exact_duration
 from study_app.protocol.groups import sequences_in
@@ -92,9 +92,8 @@ def study_title(document: Mapping[str, Any]) -> str:
 
 def _called(document: Mapping[str, Any], value: Mapping[str, Any]) -> str:
     text = next((value[key] for key in TITLES if key in value), None)
-    language = next((name for _, name in entries(document, "study.languages.*")), None)
     if isinstance(text, Mapping):
-        text = text.get(language) or next(iter(text.values()), None)
+        text = text.get(languages_of(document)[0]) or next(iter(text.values()), None)
     return text if isinstance(text, str) and text.strip() else ""
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias
 
-from study_app.designer.document.names import choices_at, sections_at
+from study_app.designer.document.names import choices_at, languages_of, sections_at
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.ranges import REASON
 from study_app.ids import free_id
@@ -410,7 +410,7 @@ def _initial(document: Mapping[str, Any], row: Row, node: Node) -> Any:
     entry = node.get("additionalProperties")
     if kind == "tables" and isinstance(entry, Mapping) and entry.get("type") == "array":
         points = [f"Point {number}" for number in range(1, POINTS + 1)]
-        return dict.fromkeys(_languages(document) or ["en"], points)
+        return dict.fromkeys(languages_of(document), points)
     return _tables(document, path, node) if kind == "list" else {}
 
 
@@ -445,12 +445,8 @@ def _text(document: Mapping[str, Any], path: Path, node: Node, *, localised: boo
 
 
 def _in_languages(document: Mapping[str, Any], words: str) -> Any:
-    languages = _languages(document)
+    languages = languages_of(document)
     return dict.fromkeys(languages, words) if len(languages) > 1 else words
-
-
-def _languages(document: Mapping[str, Any]) -> list[str]:
-    return [str(name) for _, name in entries(document, "study.languages.*")]
 
 
 def _number(node: Node, otherwise: float) -> float:

@@ -8,7 +8,7 @@ from typing import Any, Final
 from study_app.designer.document.additions import added
 from study_app.designer.document.changes import short_of
 from study_app.designer.document.fields import label_of, row_at
-from study_app.designer.document.names import references_to, renamed
+from study_app.designer.document.names import languages_of, references_to, renamed
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Rename, Set, WriterError, apply, insert_block, same
 from study_app.designer.document.toml_text import Editor, Refused, applied, spans_of, tables
@@ -147,7 +147,7 @@ def _questions_of(study: Study, selected: Path, pasted_text: str) -> tuple[str, 
     at = int(selected[3]) if len(selected) == 4 else len(items) - 1
     like = items[at] if 0 <= at < len(items) and isinstance(items[at], Mapping) else {}
     kind = {key: like[key] for key in ("kind", "scale") if key in like}
-    languages = [str(code) for _, code in entries(study.document, "study.languages.*")]
+    languages = languages_of(study.document)
     now, taken = study, _ids(study, form)
     paths: list[Path] = []
     for line in lines:

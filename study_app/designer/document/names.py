@@ -87,6 +87,11 @@ def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str]
     return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
 
 
+def languages_of(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the languages of a study; a file that names none has English."""
+    return tuple(str(code) for _, code in entries(document, "study.languages.*")) or ("en",)
+
+
 def id_at(document: Document, thing: Path) -> str:
     """Return the id of a table or item; "" where there is none."""
     return str(_item_id(document, thing) or thing[-1]) if value_at(document, thing) is not None else ""
@@ -96,7 +101,7 @@ def suggested_id(document: Document, thing: Path, recorded: frozenset[str] = fro
     """Return the free id that the text of a table or item gives in the first language; "" for its own, or no text."""
     text = value_at(document, (*thing, "text" if _item_id(document, thing) is not None else "title"))
     if isinstance(text, Mapping):
-        text = text.get(next((code for _, code in entries(document, "study.languages.*")), "en"))
+        text = text.get(languages_of(document)[0])
     wanted = id_of(text, MAX_FROM_TEXT) if isinstance(text, str) else ""
     own = id_at(document, thing)
     free = free_id(taken_beside(document, thing) | (recorded - {own}), wanted) if wanted else ""

@@ -15,25 +15,17 @@ from study_app.designer.document.additions import (
     listings,
     number_row,
 )
-from study_app.designer.document.changes import (
-    filled_in,
-    followed,
-    languages_of,
-    moved,
-    switched,
-    with_language,
-    without_language,
-)
+from study_app.designer.document.changes import filled_in, followed, moved, switched, with_language, without_language
 from study_app.designer.document.elements import step_of, title_of
 from study_app.designer.document.fields import counted_elements, initial, label_of, row_at, rows, singular
 from study_app.designer.document.fragments import pasted
-from study_app.designer.document.names import deletions, named_at, renamed, replaced, with_references
+from study_app.designer.document.names import deletions, languages_of, named_at, renamed, replaced, with_references
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Edit, Insert, Move, Set, Unset
 from study_app.designer.document.toml_text import Refused, retyped
 from study_app.ids import free_id
 from study_app.protocol.questionnaires import written_out
-from study_app.protocol.source.document import Path, entries, names, value_at
+from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import language_name
 
 Recorded: TypeAlias = Callable[[Path], frozenset[str]]
@@ -95,7 +87,7 @@ class SetText(Request):
     text: str
 
     def step(self, at: Situation) -> Step:
-        languages = [str(code) for _, code in entries(at.study.document, "study.languages.*")] or [self.language]
+        languages = languages_of(at.study.document)
         value = value_at(at.study.document, self.path)
         if isinstance(value, Mapping):
             edit = Set((*self.path, self.language), self.text)
@@ -236,7 +228,7 @@ class AddInstrument(Request):
     name: str
 
     def step(self, at: Situation) -> Step:
-        table, scales = written_out(self.name, languages_of(at.study))
+        table, scales = written_out(self.name, languages_of(at.study.document))
         taken, there = names(at.study.document, "questionnaires"), names(at.study.document, "scales")
         path = ("questionnaires", free_id(taken, self.name.replace("-", "_")))
         edits = (Set(("scales", name), scale) for name, scale in scales.items() if name not in there)

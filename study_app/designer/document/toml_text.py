@@ -367,20 +367,6 @@ def tables(path: tuple[str | int, ...], value: Mapping[str, Any], newline: str, 
     return newline.join(["".join(f"{line}{newline}" for line in lines), *inner])
 
 
-def wrapped(text: str) -> str:
-    """Return a text of paragraphs with lines of at most 120 characters, as it is written between triple quotes."""
-    return "\n\n".join(_filled(part) for part in re.split(r"\n[ \t]*\n", text)) + "\n"
-
-
-def _filled(paragraph: str) -> str:
-    lines = [""]
-    for word in paragraph.split():
-        if lines[-1] and len(lines[-1]) + 1 + len(word) > WIDTH:
-            lines.append("")
-        lines[-1] += f" {word}" if lines[-1] else word
-    return "\n".join(lines)
-
-
 def _string(value: str, like: str, newline: str) -> str:
     if "\n" in value and "\r" not in value:
         # tomlkit writes another line break before a text that begins with one: with the sign, none does.

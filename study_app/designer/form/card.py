@@ -253,7 +253,7 @@ class AddKeys(QWidget):
 
 
 class FormCard(Card):
-    """Draws a `Form`; a part that stays, of this or another element, keeps its widget with caret, focus and place.
+    """Shows a `Form`; a part that both the old and the new form have keeps its widget, with caret and focus.
 
     Signals: ``asked`` (a request), ``repair_asked`` (problem, words).
     """
@@ -386,12 +386,12 @@ class FormCard(Card):
     def _wanted(self, form: Form) -> Iterator[tuple[object, Callable[[], QWidget], FormRow | None]]:
         """Yield the parts of a form from top to bottom: what tells each apart, what makes it, and its row."""
         for number, section in enumerate(form.sections):
-            at = form.path[:1], number, section.path[len(form.path) :]
+            at = form.path[:1], section.title, section.path[len(form.path) :]
             if number:
                 yield ("rule", at), Rule, None
             if section.title:
                 removable = section.path != form.path and not self.read_only
-                yield ("title", at, section.title), partial(self._heading, section, removable=removable), None
+                yield ("title", at), partial(self._heading, section, removable=removable), None
             if section.faults:
                 words = "\n".join(section.faults)
                 yield ("faults", at, words), partial(label, words, "label", "bad", wraps=True), None

@@ -45,7 +45,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import smooth_painter
 from study_app.gui.widgets.numbers import Range
-from study_app.number_text import duration, exact_duration
+from study_app.number_text import capitalised, duration, exact_duration
 from study_app.protocol.model import Reach
 from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
 from study_app.protocol.source.document import Path
@@ -117,7 +117,7 @@ def level_axis(study: Study, row: Row) -> LevelAxis | None:
     ticks = (log_ticks if log else even_ticks)(least * factor, most * factor, MOST_TICKS)
     shown = {name: one for name, one in limits.items() if one.level <= most}
     spacing = "in ratio" if log else "even"
-    beyond = "".join(f" {one.words[:1].upper()}{one.words[1:]}." for one in shown.values())
+    beyond = "".join(f" {capitalised(one.words)}." for one in shown.values())
     return LevelAxis(
         low,
         high,

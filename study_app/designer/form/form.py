@@ -7,13 +7,14 @@ from typing import Any, Final
 from study_app.designer.document.additions import number_rows
 from study_app.designer.document.elements import FIRST, brief, kind_of, place_words, position_of, title_of, used_by
 from study_app.designer.document.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
-from study_app.designer.document.names import named_at
+from study_app.designer.document.names import languages_of, named_at
 from study_app.designer.document.study import Study
 from study_app.designer.form.row_widget import EDITORS
 from study_app.designer.form.rows import NO_QUESTIONS, STUDY_LANGUAGES, Entry, Form, FormRow, Section, question_lines
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language
 from study_app.designer.outline.outline_rows import icon_of
-from study_app.protocol.source.document import Path, Places, entries, places_of, value_at
+from study_app.number_text import capitalised
+from study_app.protocol.source.document import Path, Places, places_of, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 ENTRIES: Final = "Entries"
@@ -137,7 +138,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     faults = tuple(_sentence(fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path)
     if path == STUDY_LANGUAGES:
         row = replace(row, choices=tuple(Choice(code, language_name(code)) for code in LANGUAGES))
-    codes = [str(code) for _, code in entries(document, "study.languages.*")] or ["en"]
+    codes = languages_of(document)
     number = None
     if row.kind == "either":
         number = next((index for index, one in enumerate(row.either) if _fits(one, row.value)), 0)
@@ -196,7 +197,7 @@ def _fits(row: Row, value: Any) -> bool:
 
 
 def _sentence(message: str, hint: str) -> str:
-    sentence = f"{message[:1].upper()}{message[1:]}"
+    sentence = capitalised(message)
     return f"{sentence} ({hint})" if hint else sentence
 
 

@@ -36,6 +36,7 @@ from study_app.gui.widgets.boxes import add_layout, hbox, insert_layout, vbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import label
+from study_app.number_text import capitalised
 
 KINDS = {
     "numbers": "Numbers", "vector": "Numbers", "number": "One number", "whole number": "One number", "text": "Text",
@@ -248,7 +249,8 @@ class RowWidget(Themed, QWidget):
         self.say()
 
     def say(self) -> None:
-        found = [sentence for sentence in (self.refusal, self.field.refusal, *self.row.faults) if sentence]
+        refused = [field.refusal for field in (self.field, *self.field.findChildren(Field)) if field.refusal]
+        found = [sentence for sentence in (self.refusal, *refused, *self.row.faults) if sentence]
         times = Counter(found)
         if found or "wrong" in self.__dict__:
             said = (one if count == 1 else f"{count} × {one}" for one, count in times.items())
@@ -262,7 +264,7 @@ class RowWidget(Themed, QWidget):
             if not isinstance(part, TypedLine | TypedText):
                 continue
             part.setAccessibleDescription(self.field.accessibleDescription())
-            if not self.field.refusal:
+            if not refused:
                 blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
                 part.show_refused(bool(self.row.faults) and blamed)
 
@@ -302,7 +304,7 @@ class RowWidget(Themed, QWidget):
         permitted = f"Permitted: {self.row.bounds}{reason}." if self.row.bounds and not row.choices else ""
         words = " ".join(filter(None, (sentence or row.help, permitted)))
         words = " ".join(words.replace("`", "").split())
-        return f"{words[:1].upper()}{words[1:]}"
+        return capitalised(words)
 
 
 def special_editor_of(row: FormRow) -> SpecialEditor | None:

@@ -1,13 +1,14 @@
 """What a form shows: its rows in sections, their words, and the lines of a questionnaire."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from study_app.designer.document.changes import is_copied
 from study_app.designer.document.fields import Choice, Row, label_of, singular
+from study_app.designer.document.names import languages_of
 from study_app.designer.document.study import Study
-from study_app.protocol.source.document import Path, entries, value_at
+from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}
@@ -38,7 +39,7 @@ class QuestionLines:
 
 def question_lines(study: Study, path: Path) -> QuestionLines:
     """Return a line for each question of the list at ``path``."""
-    codes = [str(code) for _, code in entries(study.document, "study.languages.*")] or ["en"]
+    codes = languages_of(study.document)
     listed = value_at(study.document, path)
     items = listed if isinstance(listed, tuple) else ()
     numbers = {str(item.get("id")): at for at, item in enumerate(items, start=1) if isinstance(item, Mapping)}
@@ -49,7 +50,7 @@ def question_lines(study: Study, path: Path) -> QuestionLines:
 
 
 def _line(
-    study: Study, path: Path, item: Mapping[str, Any], codes: list[str], numbers: Mapping[str, int]
+    study: Study, path: Path, item: Mapping[str, Any], codes: Sequence[str], numbers: Mapping[str, int]
 ) -> QuestionLine:
     kind, text = str(item.get("kind", STATEMENT)), item.get("text", "")
     texts = [text.get(code, "") for code in codes] if isinstance(text, Mapping) else [text, *[""] * (len(codes) - 1)]

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEve
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QSizePolicy, QWidget
 
 from study_app.designer.document.fields import Row
+from study_app.designer.document.names import languages_of
 from study_app.designer.document.steps import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import ChoiceField, Field, LanguagesField, SpecialEditor, add_button
@@ -31,7 +32,7 @@ from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.protocol.orders.sequences import borders_even, row_count
-from study_app.protocol.source.document import entries, value_at
+from study_app.protocol.source.document import value_at
 from study_app.protocol.wording.languages import language_name
 
 ROUNDS: Final = 3
@@ -96,8 +97,7 @@ class ScalePoints:
 def scale_points(study: Study, row: Row) -> ScalePoints:
     """Return the points of a scale, for the languages of the study and others that it has."""
     labels = row.value if isinstance(row.value, Mapping) else {}
-    codes = [str(code) for _, code in entries(study.document, "study.languages.*")] or ["en"]
-    codes = list(dict.fromkeys([*codes, *labels]))
+    codes = list(dict.fromkeys([*languages_of(study.document), *labels]))
     columns = [labels[code] if isinstance(labels.get(code), tuple) else () for code in codes]
     count = max(map(len, columns), default=0)
     points = tuple(tuple(str(column[at]) if at < len(column) else "" for column in columns) for at in range(count))

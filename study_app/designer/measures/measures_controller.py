@@ -32,6 +32,7 @@ from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems.problems import ProblemRow, RepairSearch, problem_rows
 from study_app.gui.participant.page_widgets import parts_of
 from study_app.gui.widgets.background import delayed
+from study_app.number_text import capitalised
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import words
@@ -207,7 +208,7 @@ class MeasuresController(QObject):
 
     def _fail(self, sentence: str) -> None:
         log.info("simulations failed: %s", sentence)
-        self._failed = f"{sentence[:1].upper()}{sentence[1:]}."
+        self._failed = f"{capitalised(sentence)}."
         self._idle.start()
 
     def _warn(self, warnings: tuple[str, ...]) -> None:
@@ -216,7 +217,7 @@ class MeasuresController(QObject):
             self.warned.emit()
 
     def _simulated(self) -> Simulated:
-        """Return what is known of what is wanted; before that, what was known of the block last."""
+        """Return the answer of the current simulation; until it is done, the last answer of the same block."""
         wanted = self._wanted
         if wanted is None:
             return Simulated()

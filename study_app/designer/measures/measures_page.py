@@ -21,6 +21,7 @@ from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.numbers import NumberField
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
+from study_app.number_text import capitalised
 from study_app.protocol.checks.force_limits import clipped, clipped_unpaced
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ class PlotCard(Card):
         observed, waiting = shown.simulated.observed, shown.simulated.waiting
         self.heading_unit.show_text(heading if observed else "")
         said = FAILED[2] if shown.simulated.failed else waiting
-        self.legend.setText(f"{said[:1].upper()}{said[1:]}" if said else self._legend)
+        self.legend.setText(capitalised(said) if said else self._legend)
         self.plot.show_observed(of, observed, grey=shown.earlier or bool(waiting))
 
 
@@ -181,7 +182,7 @@ def clipped_sentence(of: LevelBlock) -> str:
     if of.limits is None:
         return NO_FORCES
     messages = [fault.message for fault in clipped(of.protocol, [of.block], ASSUMED_TICKS)]
-    said = ". ".join(f"{one[:1].upper()}{one[1:]}" for one in messages)
+    said = ". ".join(capitalised(one) for one in messages)
     return said or clipped_unpaced(of.protocol, [of.block]) or ""
 
 

@@ -4,10 +4,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from study_app.designer.document.changes import languages_of
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import label_of
-from study_app.designer.document.names import blocks_using
+from study_app.designer.document.names import blocks_using, languages_of
 from study_app.designer.document.study import Study
 from study_app.designer.measures.cards import (
     MOST_LINES,
@@ -38,7 +37,7 @@ from study_app.designer.measures.study_facts import (
 from study_app.designer.problems.problems import ProblemRow
 from study_app.haptics.model.gate import calls_for
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
-from study_app.number_text import counted, duration, duration_figure, duration_range
+from study_app.number_text import capitalised, counted, duration, duration_figure, duration_range
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, order_of
@@ -189,11 +188,7 @@ def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:
 
 
 def _range(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberCard:
-    title, found, words = (
-        f"{of.words.name[:1].upper()}{of.words.name[1:]}s it can measure",
-        simulated.measurable,
-        of.words,
-    )
+    title, found, words = (f"{capitalised(of.words.name)}s it can measure", simulated.measurable, of.words)
     if found is None:
         return _unknown(title, words.unit, simulated)
     clipped = of.clipped_words
@@ -338,7 +333,7 @@ def text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     if study.unreadable:
         return ()
     missing = ", ".join(f"{count} in {language_name(code)}" for code, count in facts.missing.items())
-    codes = languages_of(study)
+    codes = languages_of(study.document)
     languages = " and ".join(language_name(code) for code in codes) if len(codes) < 3 else f"{len(codes)} languages"
     found: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
     if not missing:
@@ -503,4 +498,4 @@ def _path(study: Study, name: str, section: str = "") -> Path:
 def _sentence(words: str) -> str:
     """Return words as a sentence; a place in the file, such as "designs.pair.feedback:", stays as it is."""
     place = "." in words.partition(":")[0].partition(" ")[0]
-    return f"{words if place else words[:1].upper() + words[1:]}."
+    return f"{words if place else capitalised(words)}."

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from typing import Any, Final
 
-from study_app.designer.document.changes import is_copied, languages_of, texts_of
+from study_app.designer.document.changes import is_copied, texts_of
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import alternatives, initial, is_localised, label_of
-from study_app.designer.document.names import named_at
+from study_app.designer.document.names import languages_of, named_at
 from study_app.designer.document.study import Study, with_value, without_value
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
@@ -18,7 +18,7 @@ from study_app.protocol.load import examined
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
-from study_app.protocol.source.document import Path, entries, has, value_at
+from study_app.protocol.source.document import Path, has, value_at
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.wording.languages import language_name
@@ -43,7 +43,7 @@ class Revealing:
 
 def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
     """Return for each language how many texts it has, and how many it should have."""
-    languages = languages_of(study)
+    languages = languages_of(study.document)
     counted = {code: [0, 0] for code in languages}
     for _, value in texts_of(study):
         for place, code in enumerate(languages):
@@ -60,7 +60,7 @@ def missing_texts(study: Study) -> dict[str, int]:
 
 def copied_texts(study: Study) -> dict[str, int]:
     """Return for each further language how many of its texts are those of the first one, or of a new question."""
-    first, *others = languages_of(study)
+    first, *others = languages_of(study.document)
     texts = [value for _, value in texts_of(study) if isinstance(value, Mapping)]
     counted = {code: sum(is_copied(value, code, first) for value in texts) for code in others}
     return {code: count for code, count in counted.items() if count}
@@ -74,7 +74,7 @@ def own_texts(study: Study, counts: Mapping[str, tuple[int, int]]) -> dict[str, 
 
 def to_translate(study: Study) -> tuple[str, ...]:
     """Return a warning for each language with copied texts; they prevent no session."""
-    first = language_name(languages_of(study)[0])
+    first = language_name(languages_of(study.document)[0])
     return tuple(
         f"study.languages: {counted(count, 'text')} to translate to {language_name(code)}, as in {first} so far"
         for code, count in copied_texts(study).items()
@@ -204,7 +204,7 @@ def _restored(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[P
     path, value = fault.path, value_at(document, fault.path)
     sound = value_at(before, _path_before(document, path, before))
     if fault.kind == "one language" and isinstance(value, str):
-        return path, dict.fromkeys((str(code) for _, code in entries(document, "study.languages.*")), value)
+        return path, dict.fromkeys(languages_of(document), value)
     if fault.kind == "alike":  # each place gets its number of marks: the text looks the same and reads as no other
         marks = _MARK * (1 + max((step for step in path if isinstance(step, int)), default=0))
         texts = value.items() if isinstance(value, Mapping) else ()
@@ -282,11 +282,8 @@ def _initial(document: Any, path: Path) -> Any:
 
 
 def _text(document: Any) -> Any:
-    codes = [str(code) for _, code in entries(document, "study.languages.*")]
+    codes = languages_of(document)
     return dict.fromkeys(codes, TEXT) if len(codes) > 1 else TEXT
-
-
-MOST_PARTICIPANTS: Final = 200
 
 
 @dataclass(frozen=True, slots=True)

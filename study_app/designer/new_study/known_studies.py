@@ -11,6 +11,7 @@ from typing import Any, Final
 from study_app.designer.document.document import Document
 from study_app.designer.document.elements import study_title, title_of
 from study_app.designer.document.fields import row_at, unit_of
+from study_app.designer.document.names import languages_of
 from study_app.designer.document.study import Study, read
 from study_app.designer.new_study.new_study import taken_names, template
 from study_app.designer.new_study.templates import FOLDER, QUESTIONS, templates
@@ -26,7 +27,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
 from study_app.protocol.source.document import Path as Place
-from study_app.protocol.source.document import entries, names
+from study_app.protocol.source.document import names
 from study_app.protocol.source.files import find, shipped, shipped_file
 from study_app.protocol.wording.languages import LANGUAGES
 from study_app.store.drafts import draft_of, drafted_files, unsaved_files
@@ -151,7 +152,7 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
     protocol = study.protocol
     found = TemplateChoice(
         f"template:{name}", shown, question, recovery=known_answers().get(name),
-        study_title=title, languages=_languages(study.document), questions=tuple(_questions(name, study)),
+        study_title=title, languages=languages_of(study.document), questions=tuple(_questions(name, study)),
     )  # fmt: skip
     if protocol is None:
         return found
@@ -176,7 +177,7 @@ def copy_choice(source: str, document: Mapping[str, Any], note: str, name: str) 
     title, words = _described(document)
     return TemplateChoice(
         source, title or source, words, copy=True, note=note, name=name, study_title=title,
-        languages=_languages(document),
+        languages=languages_of(document),
     )  # fmt: skip
 
 
@@ -184,10 +185,6 @@ def _described(document: Mapping[str, Any]) -> tuple[str, str]:
     head = document.get("study", {})
     description = head.get("description", "") if isinstance(head, Mapping) else ""
     return study_title(document), " ".join(str(description).split())
-
-
-def _languages(document: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(str(code) for _, code in entries(document, "study.languages.*")) or ("en",)
 
 
 def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.designer.document.changes import filled_in, languages_of, with_language, without_language
+from study_app.designer.document.changes import filled_in, with_language, without_language
+from study_app.designer.document.names import languages_of
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.document.toml_text import Refused
@@ -72,9 +73,9 @@ def answered(study: Study, answers: Answers) -> Study:
     if answers.title:
         head = study.document["study"]
         by_language = isinstance(head, Mapping) and isinstance(head.get("title"), Mapping)
-        place = ("study", "title", languages_of(study)[0]) if by_language else ("study", "title")
+        place = ("study", "title", languages_of(study.document)[0]) if by_language else ("study", "title")
         study, _ = study.edited(Set(place, answers.title))
-    there = languages_of(study)
+    there = languages_of(study.document)
     for code in answers.languages:
         if code not in there:
             study, _ = study.edited(*with_language(study, code))

@@ -10,7 +10,6 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, QWidget
 
 from study_app.designer.document.additions import number_rows
-from study_app.designer.document.changes import languages_of
 from study_app.designer.document.elements import (
     FIRST,
     LABEL,
@@ -25,7 +24,7 @@ from study_app.designer.document.elements import (
     words_sought,
 )
 from study_app.designer.document.fields import label_of, node_at, row_at, rows, singular, tags
-from study_app.designer.document.names import named_at
+from study_app.designer.document.names import languages_of, named_at
 from study_app.designer.document.steps import AddElement, AddInstrument, ChangeLanguage, Do, GoTo
 from study_app.designer.document.study import Study
 from study_app.gui.theme.icons import icon
@@ -36,7 +35,7 @@ from study_app.gui.widgets.labels import label
 from study_app.number_text import counted, duration
 from study_app.protocol.formats import TABLES, is_second
 from study_app.protocol.questionnaires import instrument, instruments
-from study_app.protocol.source.document import Path, entries, names, value_at
+from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import LANGUAGES
 
 ICONS: Final = {
@@ -135,7 +134,7 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
         count = len(names(study.document, kind))
         note = str(count) if count else "none"
     elif path == FIRST:
-        note = " ".join(str(code).upper() for _, code in entries(study.document, "study.languages.*"))
+        note = " ".join(languages_of(study.document)).upper()
     elif path == ("device",) and isinstance(limit := value_at(study.document, FORCE_LIMIT), int | float):
         note = f"{limit:g} N"
     faults = counted(element.faults, "problem") if element.faults else ""
@@ -199,7 +198,7 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
     found += _questions(study, around) if not any(path[0] == QUESTIONNAIRES for path in lists) else ()
     found += _series(study, selected)
     found += _instruments() if second else ()
-    there = languages_of(study)
+    there = languages_of(study.document)
     found += [
         Addable(f"Language: {words.english_name}", "info", ChangeLanguage("add", code), "To every text of the study")
         for code, words in LANGUAGES.items()

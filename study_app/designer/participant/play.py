@@ -16,6 +16,7 @@ from study_app.gui.widgets.cards import SHADOW, Card, Icon, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import label
 
+MOST_PROBLEMS = 6
 KEEP = (("keep", "Keep as pilot"), ("delete", "Delete"))
 ROLES = {"play": "primary", "copy": "primary", "stop": "danger", "delete": "danger"}
 ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
@@ -146,12 +147,12 @@ def asks_for_device(title: str, step: str, *, has_force: bool) -> Notice:
     return Notice(words, (("play", "Play"), ("close", "Cancel")), "warn", "device")
 
 
-def refuses(problems: tuple[str, ...], most: int = 6) -> Notice:
+def refuses(problems: tuple[str, ...]) -> Notice:
     """Return why the study cannot be played from here."""
-    more = (f"and {len(problems) - most} more",) if len(problems) > most else ()
+    more = (f"and {len(problems) - MOST_PROBLEMS} more",) if len(problems) > MOST_PROBLEMS else ()
     words = "The study cannot be played from here: correct these problems first"
     actions = (("problems", "Show problems"), ("close", "Close"))
-    return Notice(words, actions, "bad", "warning", (*problems[:most], *more))
+    return Notice(words, actions, "bad", "warning", (*problems[:MOST_PROBLEMS], *more))
 
 
 def under_way(step: str, title: str) -> Notice:

@@ -7,7 +7,7 @@ from pathlib import Path as Folder
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from study_app.designer.document.document import Document
-from study_app.designer.document.names import named_at, named_places
+from study_app.designer.document.names import languages_of, named_at, named_places
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.document.toml_text import Refused
@@ -270,7 +270,7 @@ def playable(study: Study, path: Path, position: StepPosition | None = None) -> 
     position = position or StepPosition()
     if not study.is_toml:
         raise NotPlayableError(study.problems)
-    language = position.language or next((str(one) for _, one in entries(study.document, "study.languages.*")), "")
+    language = position.language or languages_of(study.document)[0]
     filled = _edited(study, tuple(_filled_texts(study, language)))
     found = filled
     if filled.protocol is None:
@@ -307,8 +307,7 @@ def _filled_texts(study: Study, language: str) -> Iterator[Edit]:
         if lacking and lacking != language and isinstance(text, Mapping) and text:
             yield Set((*fault.path, lacking), text.get(language) or next(iter(text.values())))
         elif fault.kind == "one language" and isinstance(text, str):
-            languages = [str(one) for _, one in entries(study.document, "study.languages.*")]
-            yield Set(fault.path, dict.fromkeys(languages, text))
+            yield Set(fault.path, dict.fromkeys(languages_of(study.document), text))
 
 
 def _from_step(study: Study, path: Path, name: str) -> Study:

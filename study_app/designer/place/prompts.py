@@ -149,7 +149,7 @@ class ConfirmCard(Prompt):
 
 @dataclass(frozen=True, slots=True)
 class SeriesPrompt:
-    """What a series is asked for with: the element, its title, and its numbers with their words and units."""
+    """The element that is copied, its title, and the path and label with unit of each of its numbers."""
 
     path: Path
     title: str
@@ -157,7 +157,7 @@ class SeriesPrompt:
 
 
 def series_prompt(study: Study, path: Path) -> SeriesPrompt | None:
-    """Return what a series is asked for with; None where an element has no number."""
+    """Return what the prompt for a series shows; None for an element without numbers."""
     fields = []
     for row in number_rows(study.document, path):
         words = ", ".join(label_of(step) for step in row.path[2:])

@@ -13,14 +13,13 @@ from study_app.gui.widgets.cards import fill_rounded, smooth_painter
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink
 
-INSIDE, BETWEEN = 3, 4
+INSIDE, BETWEEN, SEGMENT_PX = 3, 4, 28
 
 
 class _Segment(Themed, QAbstractButton):
-    def __init__(self, height: int) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self.setCheckable(True)
-        self._height = height - 2 * INSIDE
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
@@ -40,7 +39,7 @@ class _Segment(Themed, QAbstractButton):
         """Leave it to `Segments` which is chosen."""
 
     def sizeHint(self) -> QSize:
-        return QSize(round(QFontMetricsF(font("label", weight=600)).horizontalAdvance(self.text())) + 18, self._height)
+        return QSize(round(QFontMetricsF(font("label", weight=600)).horizontalAdvance(self.text())) + 18, SEGMENT_PX)
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -62,10 +61,10 @@ class Segments(Themed, QWidget):
 
     chosen = Signal(object)
 
-    def __init__(self, name: str, *, height: int = 34) -> None:
+    def __init__(self, name: str) -> None:
         super().__init__()
         self.setAccessibleName(name)
-        self._name, self._height = name, height
+        self._name = name
         self._values: tuple[object, ...] = ()
         self.tips: Mapping[object, str] = {}
         self.buttons: list[_Segment] = []
@@ -88,7 +87,7 @@ class Segments(Themed, QWidget):
         self.setFocusProxy(next((button for button in self.buttons if button.isChecked()), self.buttons[0]))
 
     def _add_button(self) -> None:
-        made, at = _Segment(self._height), len(self.buttons)
+        made, at = _Segment(), len(self.buttons)
         made.setAccessibleName(self._name)  # until it has words
         made.setAccessibleDescription(self._name)
         made.clicked.connect(lambda: self.chosen.emit(self._values[at]))

@@ -538,7 +538,6 @@ class DesignerPlace(Place):
         self.view = DesignerView()
         self.prompt: Prompt | None = None
         self.header, self.banner = DesignerHeader(), NoticeCard(of_playing=False)
-        self.banner_words = self.banner.words
         self.form, self.file, self.problems = FormCard(), FileCard(), ProblemsCard()
         self.outline, self.new_page = OutlineCard(), NewStudyPage()
         self.pane = RightPane()
@@ -683,7 +682,7 @@ class DesignerPlace(Place):
             self.close_prompt(elsewhere=True)
         writable = not view.header.read_only and not view.form.unreadable
         of_element = writable and view.form.id is not None
-        on = dict.fromkeys(("add", "paste", "up", "down"), writable)  # what has no place in an order is told so
+        on = dict.fromkeys(("add", "paste", "up", "down"), writable)  # "up" and "down" say why an element stays
         on |= dict.fromkeys(("duplicate", "rename", "delete"), of_element) | {"copy": len(view.form.path) > 1}
         for name, possible in on.items():
             self.commands[name].setEnabled(possible)

@@ -23,6 +23,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import Clamped, Elided, Ink, label
+from study_app.number_text import capitalised
 from study_app.protocol.source.document import Path, names, places_of
 from study_app.protocol.source.problems import Fault
 
@@ -107,7 +108,7 @@ def _placed(study: Study, sentence: str) -> tuple[Path, str]:
 def _row(study: Study, fault: Fault, line: int | None) -> ProblemRow:
     element = element_of(study, fault.path)
     inside = fault.path[len(element) :]
-    message = f"{fault.message[:1].upper()}{fault.message[1:]}"
+    message = capitalised(fault.message)
     name = ", ".join((kind_and_title(study.document, element), *map(label_of, inside)))
     return ProblemRow(fault, element, name, icon_of(element, study.document), message, fault.hint, line)
 
@@ -212,7 +213,7 @@ class NameRefusal(QWidget):
 
     def show_refusal(self, sentence: str, free: str = "") -> None:
         self._free = free
-        self.words.setText(f"{sentence[:1].upper()}{sentence[1:]}")
+        self.words.setText(capitalised(sentence))
         words = f"{self._does} {free}"
         self.use.show_action("", words if len(free) <= LONGEST else f"{self._does.split()[0]} it")
         self.use.setAccessibleName(words)

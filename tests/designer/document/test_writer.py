@@ -13,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 from study_app.designer.document.document import Document
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, WriterError, apply
-from study_app.designer.document.toml_text import Refused, comments_naming, tables, wrapped, written
+from study_app.designer.document.toml_text import Refused, comments_naming, tables, written
 from tests.designer.document.grown import texts
 from tests.designer.document.random_edits import check_edit, edit_of, holds_nothing
 
@@ -114,12 +114,6 @@ def test_written_is_read_back_as_the_same_value(value: Any, like: str, newline: 
     assert tomllib.loads(f"key = {written(value, like, newline)}{newline}")["key"] == value
     if isinstance(value, dict):
         assert tomllib.loads(tables(("a b", 0, "c"), value, newline)) == {"a b": {"c": value}}
-
-
-def test_wrapped_fills_lines_and_keeps_paragraphs() -> None:
-    text = wrapped("one " * 60 + "\n\ntwo")
-    assert max(map(len, text.splitlines())) <= 120
-    assert text.endswith("\n\ntwo\n")
 
 
 BEFORE_A_RULER = """\
