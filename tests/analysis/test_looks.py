@@ -9,18 +9,23 @@ from click.testing import CliRunner
 from scipy.stats import norm, ttest_rel
 
 from study_app.analysis.data.blocks import Spending
+from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
+from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel
+from study_app.analysis.planning.power_curves import power_markdown, powers
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import FULL, count, people, plan
-from study_app.analysis.report.sections import first_page
+from study_app.analysis.report.sections import first_page, methods
 from study_app.analysis.statistics.mixed_model import mixed
 from study_app.analysis.statistics.outcome import alpha_of_looks, holm
 from study_app.cli import commands
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
-from tests.analysis.made_up import everybody, liquids, study
+from study_app.session.simulated.answers_only import rehearse_answers
+from tests.analysis.made_up import delays, everybody, liquids, study
 from tests.analysis.power.test_power import felt_in
+from tests.studies import made_up
 
 CONTRAST = '{ measure = "different", blocks = ["delays"], conditions = ["delay_150", "delay_0"], expected = "higher" }'
 LOOKED = (
@@ -38,8 +43,11 @@ LOOKED = (
         ("pocock", (2.4380, 2.4268, 2.4101, 2.3966, 2.3859)),
     ],
 )
-def test_bounds_are_those_of_published_tables(spending: Spending, bounds: tuple[float, ...]) -> None:
-    """Five equal looks, two-sided alpha of 0.05: Reboussin et al. 2000, Control. Clin. Trials 21, 190-207 (ld98)."""
+def test_bounds_are_those_of_the_program_ld98(spending: Spending, bounds: tuple[float, ...]) -> None:
+    """Five equal looks, two-sided alpha of 0.05, as computed by the program ld98 of Reboussin, DeMets, Kim & Lan.
+
+    The program is described in Control. Clin. Trials 21 (2000), 190-207.
+    """
     found = norm.isf(np.array(alpha_of_looks((5, 10, 15, 20, 25), 0.05, spending)) / 2)
     assert found == pytest.approx(bounds, abs=3e-4)
     assert alpha_of_looks((7, 12), 0.05, spending)[0] < alpha_of_looks((9, 12), 0.05, spending)[0] < 0.05
@@ -94,7 +102,16 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
         ps = [mixed(given[:, :, at], x, planned.decided.direction(one.id)).p or 1.0 for at, one in enumerate(items)]
         shown += (holm(ps)[0] or 1.0) <= 0.05
     assert counts[0, FULL, 0] == shown > 0
-    assert "linear mixed models with random intercepts and slopes" in preregistration(protocol, "0" * 64)
+    told = "linear mixed models with random intercepts and slopes of each participant (t of the mean slope)"
+    assert told in preregistration(protocol, "0" * 64)
+    assert told in power_markdown(powers(planned, (10,), 10, 10, 1, count(planned, (10,), 1, 0, 10)))
+    settings = delays((0, 50, 100))
+    made = study(settings, list(everybody(settings, 12, lambda person, _s, code, _i: int(code[1]) + person % 3)))
+    made = replace(made, decided=replace(made.decided, trends="slopes"))
+    (found,) = (results := evaluate(made)).blocks
+    assert {one.outcome.test for one in DelayTrend.of(found)} == {"linear mixed model"}
+    assert not MixedModel.of(found), "each statement is tested once"
+    assert f"Trends over the delay were tested by {told}, which" in methods(made, results)
 
 
 @pytest.mark.parametrize(("n", "said"), [(5, "none of which is reached"), (6, "look 1 of 2"), (13, "look 2 of 2")])
@@ -105,6 +122,17 @@ def test_the_first_page_says_which_look_it_is(n: int, said: str) -> None:
     assert said in first_page(results, ())
     assert results.decided.binding == (n >= 6)
     assert results.decided.alpha == pytest.approx(alpha_of_looks((6, 12), 0.05, "obrien-fleming")[int(n > 12)])
+
+
+@pytest.mark.slow
+def test_the_look_is_that_of_the_sessions_on_disk(tmp_path: Path) -> None:
+    file = tmp_path / "looked.toml"
+    file.write_text(LOOKED.replace("participants = 12\nlooks = [6, 12]", "participants = 3\nlooks = [2, 3]"))
+    folder = rehearse_answers(
+        str(file), participants=2, seed=1, results=tmp_path / "study", features=made_up(str(file))
+    )
+    decided = load_study(folder).decided
+    assert (decided.look, decided.planned_alpha, decided.alpha) == (1, 0.05, decided.alphas[0])
 
 
 def test_the_sizes_of_power_are_the_looks(tmp_path: Path) -> None:

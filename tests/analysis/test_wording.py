@@ -11,7 +11,7 @@ from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import codebook_bytes
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold
 from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel, SessionsDiffer, SettingsDiffer
-from study_app.analysis.report.sections import block, methods
+from study_app.analysis.report.sections import block, conduct, limits, methods
 from study_app.analysis.results import BlockResult, Results, all_of, said_of_presentations
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 
@@ -40,6 +40,25 @@ def test_decisions_that_changed_are_told_as_that_and_not_as_none() -> None:
     kept = study_of(8)
     told = methods(kept, evaluate(kept))
     assert "a bound of ±1 point, decided before the first session, and 90 % intervals" in told
+
+
+def test_codes_of_participants_are_told_while_the_key_is_sealed() -> None:
+    made = study_of(4)
+    own = replace(made, settings={}, protocol={**made.protocol, "study": {"codes": "participant"}})
+    said = "A code means another setting for each participant until the key is open: no settings are compared."
+    assert [said in " ".join(limits(it, evaluate(it))) for it in (own, made)] == [True, False]
+
+
+def test_trials_beyond_a_limit_are_counted_by_limit() -> None:
+    made = study_of(4)
+    gaps = [300.0, 300.0, *[1.0] * (len(made.trials) - 2)]
+    broken = replace(
+        made,
+        trials=made.trials.assign(worst_frame_gap_ms=gaps),
+        protocol={**made.protocol, "limits": {"frame_gap_ms": 250.0}},
+    )
+    told = " ".join(conduct(broken, evaluate(broken)))
+    assert "frame gap at most 250 ms. 2 of 12 trials broke one: frame gap at most 250 ms in 2. Trials" in told
 
 
 def test_pooled_versions_of_a_protocol_are_named() -> None:

@@ -334,8 +334,8 @@ class Decided:
 
     ``made`` is False where there was none; ``changed`` where sessions were run under different ones, of which this is
     the first: in both cases everything found is exploratory. Where ``looks`` are planned, ``alpha`` is that of the
-    number ``look`` of them, and ``planned_alpha`` that of all; 0: before the first one, where everything is
-    exploratory, too.
+    number ``look`` of them (0: before the first one, where everything is exploratory, too), and ``planned_alpha`` that
+    of all.
     """
 
     made: bool
@@ -360,10 +360,11 @@ class Decided:
 
     @property
     def alphas(self) -> tuple[float, ...]:
-        """The significant p at each planned look; ``alpha`` is that of all of them."""
+        """The significant p at each planned look."""
         from study_app.analysis.statistics.outcome import alpha_of_looks  # noqa: PLC0415 - loads scipy
 
-        return alpha_of_looks(self.looks, self.alpha, self.spending) if self.looks else (self.alpha,)
+        alpha = self.planned_alpha or self.alpha
+        return alpha_of_looks(self.looks, alpha, self.spending) if self.looks else (alpha,)
 
     def at(self, n: int) -> Self:
         """Return what holds with so many participants: at the last planned look that they reach."""
@@ -397,6 +398,12 @@ class Decided:
         """Return where answers to a statement were expected to go as delay grows; None: nothing was expected."""
         return "increasing" if item in self.rising else "decreasing" if item in self.falling else None
 
+
+TRENDS: Final = {
+    "ranks": "changing the signs of each participant's rank correlation of answers and delays",
+    "slopes": "linear mixed models with random intercepts and slopes of each participant (t of the mean slope)",
+}
+"""How a trend over the delay is tested, in words."""
 
 SPENDINGS: Final[Mapping[Spending, str]] = {"obrien-fleming": "O'Brien–Fleming", "pocock": "Pocock"}
 NOTHING_DECIDED: Final = Decided(False, False, 0.05, None, (), (), (), (), None)

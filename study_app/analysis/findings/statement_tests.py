@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from study_app import number_text
-from study_app.analysis.data.blocks import KINDS
+from study_app.analysis.data.blocks import KINDS, TRENDS
 from study_app.analysis.data.measures import medians
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import Drawing, Picture
@@ -220,16 +220,15 @@ class DelayTrend(StatementTests):
     def methods(self) -> Iterator[str]:
         if trends := self.value:
             stated = "beforehand" if self.results.decided.binding else "by the protocol"
-            by = "changing the signs of each participant's rank correlation of answers and delays"
-            if self.results.decided.trends == "slopes":
-                by = "linear mixed models with random intercepts and slopes of each participant"
+            by = TRENDS[self.results.decided.trends]
+            if self.results.decided.trends == "ranks":
+                by += f" ({_first_tested(trends).outcome.method.split(',')[0]})"
             yield (
-                f"Trends over the delay were tested by {by} "
-                f"({_first_tested(trends).outcome.method.split(',')[0]}), which is about the "
-                f"population, one-sided where a direction was stated {stated}, {families(trends)}; where a trend "
-                "showed, the rank correlations were tested again without the longest delay until none showed, which "
-                "gives an upper bound of the lowest delay that is noticed (every step at alpha over the number of "
-                "statements, so that the error rate holds over all of them)."
+                f"Trends over the delay were tested by {by}, which is about the population, one-sided where a "
+                f"direction was stated {stated}, {families(trends)}; where a trend showed, the rank correlations were "
+                "tested again without the longest delay until none showed, which gives an upper bound of the lowest "
+                "delay that is noticed (every step at alpha over the number of statements, so that the error rate "
+                "holds over all of them)."
             )
 
 

@@ -18,6 +18,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from study_app import __version__
 from study_app import figure_style as style
+from study_app.analysis.data.blocks import TRENDS
 from study_app.analysis.data.measures import Array
 from study_app.analysis.figures.page_layout import Style
 from study_app.analysis.planning.simulated_studies import (
@@ -325,10 +326,12 @@ def _explained(question: Question, found: Powers) -> list[str]:
         case "settings differ":
             return ["Friedman's permutation test, or signed ranks where two settings are compared."]
         case "trend":
-            return ["The trend of participants' rank correlations, in the direction that the protocol states."]
+            by = TRENDS[found.plan.decided.trends]
+            return [f"A trend by {by}, one-sided where the protocol states a direction."]
         case "lowest delay":
             return [
-                "The same, stepping down from the longest delay: what it finds bounds the noticeable one from above."
+                "Rank correlations are tested again without the longest delay, as long as a trend shows: what is found "
+                "bounds the noticeable delay from above."
             ]
         case "equivalence":
             return [

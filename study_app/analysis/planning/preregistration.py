@@ -10,7 +10,7 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from study_app import __version__
-from study_app.analysis.data.blocks import SPENDINGS, decisions, spoken
+from study_app.analysis.data.blocks import SPENDINGS, TRENDS, decisions, spoken
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.report.html_page import bullets, heading, paragraph
@@ -184,13 +184,10 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     decided = decisions(protocol)
     kinds = {protocol.compared_in(block.id) for block in asked}
     if "delays" in kinds:
-        by = "changing the signs of each participant's rank correlation with the delay"
-        if decided.trends == "slopes":
-            by = "linear mixed models with random intercepts and slopes of each participant (t of the mean slope)"
         yield (
-            f"Delays: a trend in the population, by {by}, in the stated direction, otherwise two-sided, stepping down "
-            "from the longest delay by rank correlations; equivalence to no delay by two one-sided tests, where a "
-            "bound is given, with "
+            f"Delays: a trend in the population, by {TRENDS[decided.trends]}, one-sided in the stated direction, "
+            "otherwise two-sided; where a trend shows, rank correlations are tested again without the longest delay "
+            "until none shows; equivalence to no delay by two one-sided tests, where a bound is given, with "
             f"{least(decided.alphas[-1])}; the detection threshold from agreement, where it shows a trend."
         )
     if others := kinds - {None, "delays"}:
@@ -199,9 +196,9 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             "signed ranks where two conditions are compared."
         )
     yield (
-        "No statement counts whose part of the study shows no difference by the permutation test over all its "
-        "statements, corrected by Holm over the parts; the report's first page says nothing else. Contrasts are a Holm "
-        "family of their own."
+        "A statement counts only where the permutation test over all statements of its block shows a difference, "
+        "corrected by Holm over the blocks; the report's first page states only what counts. Contrasts are corrected "
+        "by Holm among themselves."
     )
     yield (
         f"α = {decided.alpha:g}; primary statements ({', '.join(decided.primary) or 'all'}) are corrected by Holm, the "
@@ -291,7 +288,7 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
             f"{listed([str(look) for look in decided.looks])} sessions that count are complete; an adjusted p of at "
             f"most {listed([f'{level:.2g}' for level in decided.alphas])} is significant there "
             f"({SPENDINGS[decided.spending]} spending of alpha, Lan and DeMets 1983). The study ends at the first look "
-            "at which all that is primary is shown, otherwise at the last one."
+            "at which all primary statements and contrasts are shown, otherwise at the last one."
         )
     wanted = (
         ""

@@ -5,9 +5,10 @@ people with the same noise answer at every size of the effect, and the first of 
 curves are smooth; the studies are independent of each other.
 
 All of them meet the same random rearrangements of participants' answers; sums over participants are then products of
-matrices of whole numbers, exact in single precision. Each p is (1 + those as extreme) / (1 + ``DRAWS``).
+matrices of whole numbers, exact in single precision.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ from study_app.analysis.data.blocks import Decided, Item, Setting, read_decided,
 from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
 from study_app.analysis.statistics.equivalence import p_above, sizes
-from study_app.analysis.statistics.outcome import FEW, SIDES, false_discovery, holm
+from study_app.analysis.statistics.outcome import FEW, SIDES, false_discovery, holm, p_of_draws
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.groups import groups_with
@@ -230,7 +231,7 @@ def friedman(ranked: Single, rng: np.random.Generator) -> tuple[Array, Array]:
     weights = np.divide(1.0, spread, out=np.zeros(spread.shape), where=spread > 0)
     of_all = np.einsum("dsi,si->ds", squares, weights.astype(np.float32))
     seen_of_all = np.einsum("si,si->s", seen, weights.astype(np.float32))
-    return _p(squares, seen), _p(of_all, seen_of_all * np.float32(1 - 1e-5))
+    return p_of_draws(squares, seen), p_of_draws(of_all, seen_of_all * np.float32(1 - 1e-5))
 
 
 def trend(ranked: Single, both_ways: NDArray[np.bool_], rng: np.random.Generator) -> Array:
@@ -266,19 +267,15 @@ def signed(answers: Array, rng: np.random.Generator) -> Array:
     whole = ranked.sum(axis=1)
     up = (rng.random((PLANNED_DRAWS, n)) < 0.5).astype(np.float32) @ ranked.T
     seen = np.where(flat > 0, ranked, 0).sum(axis=1)
-    p = _p(np.maximum(up, whole - up), np.maximum(seen, whole - seen))
+    p = p_of_draws(np.maximum(up, whole - up), np.maximum(seen, whole - seen))
     return p.reshape(studies, items)
-
-
-def _p(drawn: Single, seen: Single) -> Array:
-    """Return the share of drawn statistics (draws, …) that are as extreme as those seen (…)."""
-    return np.asarray((1 + (drawn >= seen).sum(axis=0)) / (1 + PLANNED_DRAWS))
 
 
 def equivalent(differences: Array, bound: float, alpha: float, rng: np.random.Generator) -> NDArray[np.bool_]:
     """Return whether equivalence of differences (studies, people, …) within ± ``bound`` is shown as in the report."""
     rows = np.moveaxis(differences, 1, -1)
-    shown = shows_equivalence(rows.reshape(-1, rows.shape[-1]), bound, alpha, rng, PLANNED_DRAWS)
+    draws = max(PLANNED_DRAWS, math.ceil(2 / alpha))
+    shown = shows_equivalence(rows.reshape(-1, rows.shape[-1]), bound, alpha, rng, draws)
     return np.asarray(shown.reshape(rows.shape[:-1]))
 
 

@@ -98,7 +98,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "liquid-study unblind RESULTS --by NAME --reason TEXT, opens it."
         )
         if study.own_codes:
-            yield "Each participant has own codes until the key is open, so settings are not compared."
+            yield "A code means another setting for each participant until the key is open: no settings are compared."
         if study.sites:
             yield (
                 "Each site has a key of its own: until the keys of all sites are open, the code of a setting begins "

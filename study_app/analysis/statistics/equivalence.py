@@ -31,6 +31,7 @@ from study_app.analysis.statistics.outcome import (
     checked,
     clopper_pearson,
     doubled_ranks,
+    p_of_draws,
 )
 from study_app.analysis.statistics.rank_tests import signed, signed_p
 from study_app.errors import AnalysisError
@@ -366,4 +367,4 @@ def p_above(values: Array, positive: NDArray[np.bool_], up: NDArray[np.float32])
     """
     seen = np.where(positive, values, 0).sum(axis=1).astype(np.float32) * np.float32(1 - 1e-6)
     drawn = up @ values.T.astype(np.float32)
-    return np.asarray((1 + (drawn >= seen).sum(axis=0)) / (1 + len(up)))
+    return p_of_draws(drawn, seen)

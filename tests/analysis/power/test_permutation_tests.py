@@ -1,5 +1,7 @@
 """The sweep's tests over many studies at once, against the report's one by one."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,15 @@ def test_friedman_is_the_reports(n: int, k: int) -> None:
     assert np.abs(of_all - np.array(together)).max() < 2 * CLOSE  # that one is drawn, too
 
 
+def test_a_p_that_no_draw_reaches_is_near_the_reports() -> None:
+    answers = answered(2, (12, 12, 3, 2), rise=1.0)
+    drawn, _ = simulated_studies.friedman(simulated_studies.ranks(answers), rng())
+    exact = np.array([[friedman(study[:, :, item]).p for item in range(2)] for study in answers])
+    rare = exact < 1e-4
+    assert rare.any()
+    assert np.abs(np.log10(drawn[rare] / exact[rare])).max() < 0.7
+
+
 @pytest.mark.parametrize("n", [5, 14])
 def test_the_trend_is_the_reports(n: int) -> None:
     answers = answered(3, (20, n, 7, 2), rise=0.15)
@@ -59,6 +70,9 @@ def test_where_everybody_answers_alike_nothing_is_found() -> None:
     assert (ps == 1).all()
     assert (of_all == 1).all()
     assert (simulated_studies.trend(simulated_studies.ranks(same), np.array([False, True]), rng()) == 1).all()
+    block = SimpleNamespace(delays_ms=(0.0, 50.0, 100.0))
+    for untested in (same, answered(1, (2, 9, 3, 2), rise=1.0)):
+        assert (simulated_studies.slopes(untested, block, np.array([False, True])) == 1).all()
     assert (simulated_studies.signed(same[:, :, :2], rng()) == 1).all()
     assert simulated_studies.equivalent(same[:, :, 0] - same[:, :, 1], 1.0, 0.05, rng()).all()
     assert not simulated_studies.equivalent((same[:, :, 0] - same[:, :, 1])[:, :13], 1.0, 0.05, rng()).any()

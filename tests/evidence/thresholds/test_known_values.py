@@ -14,11 +14,13 @@ from study_app.evidence.thresholds.known_values import (
     Estimated,
     KnownExponent,
     KnownThreshold,
+    Rehearsed,
     StudyFound,
     coverage,
     judged,
     known_value,
     rehearsed,
+    validate,
 )
 from study_app.protocol.load import load, parse
 from study_app.protocol.simulated import OBSERVER, Comparison, Observer
@@ -143,6 +145,20 @@ def test_the_limit_of_a_coverage_follows_from_the_number_of_all_studies() -> Non
     (alone,), (pooled,) = coverage("one seed", seed), coverage("two seeds", 2 * seed)
     assert (alone.value, alone.limit, alone.holds) == ("91.5 %", "95 ± 4.6 %", True)
     assert (pooled.value, pooled.limit, pooled.holds) == ("91.5 %", "95 ± 3.3 %", False)
+
+
+@pytest.mark.slow
+def test_studies_of_all_seeds_count_together_and_each_seed_once(
+    threshold: KnownThreshold, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(known_values, "rehearsed", lambda *_: Rehearsed(1.0, 0, (0.24,) * 3))
+    told = []
+    with ThreadPoolExecutor(1) as executor:
+        rows = validate([(b"", threshold)], 2, (1, 2, 1), executor, lambda words, _share: told.append(words))
+    assert "small: 4 of 4 studies" in told
+    found = [threshold.simulate(number, seed) for seed in (1, 2) for number in range(2)]
+    own = [*threshold.verdicts(found), *coverage("small", found)]
+    assert rows[: len(own)] == own
 
 
 @pytest.mark.nightly
