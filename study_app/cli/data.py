@@ -286,11 +286,10 @@ def verify(results: Path, fingerprints: Path | None) -> None:
     with progress() as show:
         show("checking every file")
         found = verify_folder(results, fingerprints)
-    described = [one for one in found.warnings if one.place.endswith("dataset_description.json")]
-    warnings = [one for one in found.warnings if one not in described]
-    for kind, findings in (("error", found.errors), ("warning", warnings), ("to share it", described)):
-        for finding in findings:
-            click.echo(f"{kind}: {finding}")
+    for finding in found.errors:
+        click.echo(f"error: {finding}")
+    for finding in sorted(found.warnings, key=lambda one: one.shares):
+        click.echo(f"{'to share it' if finding.shares else 'warning'}: {finding}")
     running = f", {found.running} running" if found.running else ""
     click.echo(f"{counted(found.sessions, 'session')}{running}: {'sound' if found.sound else 'not sound'}")
     end_if(not found.sound)

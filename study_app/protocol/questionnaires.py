@@ -202,7 +202,11 @@ def _filled(
             whole["short"] = {**dict.fromkeys(languages, name.replace("_", " ").capitalize()), **short}
         if "scale" in item and "scale" not in written:
             whole["scale"] = scale_name(of, item["scale"])
-        fields = KINDS[item.get("kind", STATEMENT)].model_fields
+        kind = item.get("kind", STATEMENT)
+        if whole.get("kind", kind) != kind:
+            faults.append(Fault((*place, *(path or ()), "kind"), f'is "{kind}" in {of}: leave it out', kind="surplus"))
+            whole["kind"] = kind
+        fields = KINDS[kind].model_fields
         ask(path, name, whole, *(key for key in ("text", "low", "high") if key in fields))
         if "options" in item and isinstance(written.get("options", ()), list | tuple):
             choices, possible = _by_id(written, "options"), [one["id"] for one in item["options"]]

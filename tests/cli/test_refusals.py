@@ -4,6 +4,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import click
 import pytest
 from click.testing import CliRunner
 
@@ -154,6 +155,33 @@ def test_a_survey_of_liquids_is_written_into_a_folder(monkeypatch: pytest.Monkey
 def test_at_the_bench_enter_alone_answers_only_the_question_to_let_go() -> None:
     asked: Any = SimpleNamespace(ask=lambda kind, _words: kind)
     assert [_ask_operator(asked)(kind, "") for kind in ("let-go", "hang")] == ["let-go", "reading"]
+
+
+@pytest.mark.parametrize(
+    ("command", "words", "taken"),
+    [
+        ("run", ("--by=AK", "--by", "AK"), ("--operator=AK", "--operator", "AK")),
+        ("run", ("--operator", "AK, not --by=BM", "--site=x"), ("--operator", "AK, not --by=BM", "--site=x")),
+        ("merge", ("--site", "A=x", "--site=Delft=x", "B=a --site=b"), ("A=x", "Delft=x", "B=a --site=b")),
+        ("exclude", ("--by=AK", "--reason", "--by=BM"), ("--by=AK", "--reason", "--by=BM")),
+    ],
+)
+def test_former_options_are_renamed_and_texts_that_contain_them_are_not(
+    command: str, words: tuple[str, ...], taken: tuple[str, ...]
+) -> None:
+    assert commands.resolve_command(click.Context(commands), [command, *words])[2] == [*taken]
+
+
+@pytest.mark.parametrize(
+    ("command", "said"), [("validate", "--help)"), ("verify", "verify rek2024)"), ("sessions", "sessions rek2024)")]
+)
+def test_an_example_names_what_a_command_takes(
+    command: str, said: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.argv", ["liquid-study", command, "--nothing"])
+    with pytest.raises(SystemExit):
+        main()
+    assert capsys.readouterr().err.endswith(f"{said}\n")
 
 
 @pytest.mark.parametrize("command", ["run", "resume"])

@@ -14,7 +14,7 @@ from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
-from study_app.protocol.load import parse
+from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.session import preflight_measurements
 from study_app.session.preflight import Measurements, Screen, checks, refused
@@ -108,6 +108,13 @@ def test_both_sides_of_each_limit(pytestconfig: pytest.Config) -> None:
         lines += [f"{check} {check.share} {check.entry}" for check in found if str(check) not in usual]
         lines.append(f"refused: {refused(found)}")
     compare(Path(__file__).parent / "golden" / "preflight.txt", lines, pytestconfig)
+
+
+@pytest.mark.parametrize(("study", "needed"), [("rek2024", 209), ("thickness", 124)])
+def test_a_session_needs_what_its_sealed_recordings_take(study: str, needed: int) -> None:
+    """A trial of 3 s is sealed into the room of 4 s, whatever its page and its questions take."""
+    (room,) = [check for check in checks(small.WELL, load(study)) if check.name == "Free space"]
+    assert room.about == f"a session needs about {needed} MB"
 
 
 def measured(results: Path) -> Measurements:

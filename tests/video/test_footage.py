@@ -133,6 +133,7 @@ def test_an_error_of_ffmpeg_that_is_no_system_error_stops_it_too(clip: Path, mon
         lambda clip: clip[: len(clip) // 2],
         lambda clip: clip.replace(b"avc1", b"zzzz"),  # a codec that there is not
         lambda clip: clip.replace(b"trak", b"zzzz"),
+        lambda clip: clip.replace(b"VideoHandler", b"\xff" * 12),
         lambda _clip: b"ffconcat version 1.0\nfile clip.mp4\n",
         lambda _clip: b"#EXTM3U\n#EXTINF:1,\nclip.mp4\n",
     ],
@@ -144,4 +145,4 @@ def test_a_file_that_is_no_video_is_refused_in_one_line(tmp_path: Path, damage: 
     with pytest.raises(VideoError, match=r"broken\.mp4 cannot be shown: .+; give a video file") as refused:
         Footage(broken)
     assert "\n" not in str(refused.value)
-    assert "NoneType" not in str(refused.value)
+    assert not any(word in str(refused.value) for word in ("NoneType", "codec can't"))

@@ -15,7 +15,7 @@ from typing import Final
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.store import receipt
-from study_app.store.atomic import is_there, read_own, study_root, sweep, write_file
+from study_app.store.atomic import is_there, read_own, study_root, sweep, sweep_old, write_file
 from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol
 from study_app.store.checksums import replace_checksums
 from study_app.store.exclusions import Exclusion, exclude, exclusions, reversals
@@ -66,6 +66,8 @@ def unblind(folder: Path, by: str, reason: str) -> Unblinded:
     with open_alone(folder) if is_there(study.key) else contextlib.nullcontext():
         codes = reveal(folder, by, reason)
         key = read_key(folder)
+        sweep_old(study.path)
+        sweep_old(study.data)
         left: list[str] = []
         for session in study.sessions():
             try:
@@ -179,6 +181,7 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
     if not lines or not start_of(lines).measures_sealed:
         return []
     with open_alone(session.path):
+        sweep(session.path)
         sweep(session.recordings)
         return list(_rewrite(Place(study, session, start_of(lines).study), lines, key))
 

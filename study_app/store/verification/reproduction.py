@@ -143,11 +143,12 @@ class _Compared:
             return
         steps = [one.steps for one in own if isinstance(one, events.Stepped)]
         if isinstance(line, events.Responses):
-            follows = bool(line.items) and line.items[0].value == sum(steps)
+            follows, wrong = bool(line.items) and line.items[0].value == sum(steps), "the answer is not the sum of its"
         else:
             follows = set_to == setting.level(setting.reached(steps))
+            wrong = "the interval ended at another setting than follows from its"
         if not follows:
-            self.differences.append(f"trial {which[0]}, attempt {which[1]}: its steps lead to another setting")
+            self.differences.append(f"trial {which[0]}, attempt {which[1]}: {wrong} steps")
         self._note(block, which[0], follows)
 
     def _note(self, block: Block, trial: int, follows: bool) -> None:

@@ -46,10 +46,11 @@ COMPARE = "compare it with fingerprints stored elsewhere: liquid-study verify --
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing found, and where: a path in the study folder."""
+    """One thing found, and where: a path in the study folder; ``shares`` says that it concerns sharing alone."""
 
     place: str
     message: str
+    shares: bool = False
 
     def __str__(self) -> str:
         return f"{self.place}: {self.message}"
@@ -86,9 +87,9 @@ class Findings:
         """Add an error that stopped us reading ``path``, which is named once."""
         self.error(path, str(error).removeprefix(str(path)).lstrip(" ,:/"))
 
-    def warning(self, path: Path, message: str) -> None:
+    def warning(self, path: Path, message: str, *, shares: bool = False) -> None:
         """Add what should be known of ``path``."""
-        self.warnings += (Finding(self._name(path), message),)
+        self.warnings += (Finding(self._name(path), message, shares),)
 
     @contextlib.contextmanager
     def reading(self, path: Path) -> Iterator[None]:
@@ -292,18 +293,26 @@ def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key
 
 
 def _removed(lines: Sequence[events.Event]) -> Iterator[str]:
-    """Yield a sentence on each trial whose answers were chosen and never confirmed, though the session went on."""
+    """Yield a sentence on each trial or form whose answers were never confirmed, though the session went on."""
     chosen: dict[int, int] = {}
+    form: events.FormShown | None = None
     for line in lines:
         if isinstance(line, events.Choice) and line.trial is not None:
             chosen[line.trial] = line.n
         elif isinstance(line, events.Responses | events.TrialStarted | events.PassedOver) and line.trial is not None:
             chosen.pop(line.trial, None)
+        elif isinstance(line, events.FormAnswered | events.PassedOver | events.SessionResumed):
+            form = None
         completed = isinstance(line, events.SessionEnded) and line.status == "completed"
         for trial, number in list(chosen.items()):
             if completed or (isinstance(line, events.TrialStarted) and line.trial > trial):
                 del chosen[trial]
                 yield f"line {number} is an answer in trial {trial}, which was never confirmed: a line was removed"
+        if completed or isinstance(line, events.PageShown | events.FormShown | events.TrialStarted):
+            shown = line if isinstance(line, events.FormShown) else None
+            if form is not None and (shown is None or (form.form, form.after) != (shown.form, shown.after)):
+                yield f"line {form.n} shows form {form.form}, which was never confirmed: a line was removed"
+            form = shown
 
 
 def wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:

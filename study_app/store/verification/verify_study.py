@@ -250,7 +250,7 @@ def _description(study: StudyFolder, found: Findings) -> None:
     if not heads or held in heads:
         return
     if any(describes_alike(held, head) for head in heads):
-        found.warning(study.description, "describes the columns as an earlier version of the program did")
+        found.warning(study.description, "describes the columns as an earlier version of the program did", shares=True)
     else:
         found.error(study.description, "differs from what this version writes for the study in the receipts")
 

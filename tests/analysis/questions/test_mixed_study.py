@@ -123,3 +123,30 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
     assert "usability__sus1" in table.frame
     report(folder, tmp_path / "report", failed=pytest.fail)
     assert "After Again" in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("order", ["balanced", "random"])
+def test_a_form_after_the_last_of_exchanged_blocks_has_all_its_answers(tmp_path: Path, order: str) -> None:
+    """It comes after either block, though the file writes it after one of them."""
+    felt = {(block, name): (TrialFeatures(1.0, 4.0, 0.1, 0.02, 0.03, 0.0),) for block in ("stir", "again")
+            for name in ("thin", "thick")}  # fmt: skip
+    last = 'conditions = ["thin", "thick"]'
+    sequence = 'sequence = ["start", "stir", "load", "usability", "end"]'
+    protocol = mixed_file(
+        tmp_path,
+        (sequence, 'sequence = ["load", "stir", "again", "load"]'),
+        (last, f"{last}\n[blocks.again]\n{last}"),
+        ('name = "mixed"', f'name = "mixed"\nblock_order = "{order}"'),
+    )
+    folder = rehearse_answers(protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=felt)
+    assert verify(folder).errors == ()
+    study = load_study(folder)
+    rows = study.answered.query("form == 'load' and item == 'effort'")
+    counts = Counter(rows["after_block"].fillna("0"))
+    assert counts["0"] == counts["stir"] + counts["again"] == PEOPLE
+    assert min(counts["stir"], counts["again"]) > 0
+    table, _ = wide(study)
+    assert {code: table.frame[f"load__effort__{code}"].count() for code in counts} == counts
+    found = next(one for one in evaluate(study).questions if (one.where, one.item) == ("load", "effort"))
+    words = {"0": "At the start", "stir": "After Stir", "again": "After Again"}
+    assert {group.name: group.numbers["n"] for group in found.groups} == {words[code]: n for code, n in counts.items()}

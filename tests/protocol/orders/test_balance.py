@@ -6,6 +6,7 @@ from study_app.errors import StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import balance, describe_balance, evenness, numbered
+from tests.protocol.edited_studies import text_of
 from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")
@@ -74,6 +75,14 @@ def test_the_seed_matters_to_random_orders_alone():
 
     assert counted(REK, 1) != counted(REK, 2)
     assert counted(ordered('order = "williams"'), 1) == counted(ordered('order = "williams"'), 2)
+
+
+def test_one_main_block_has_no_order_of_blocks():
+    text = text_of("mixed").replace('name = "mixed"', 'name = "mixed"\nblock_order = "balanced"')
+    for study in (text, text.replace("balanced", "random")):
+        judged = balance(parse(study.encode(), "mixed"), numbered(6), 1)
+        assert [block.id for block in judged.blocks] == ["stir"]
+    assert "The main blocks" not in describe_balance(judged)
 
 
 def test_a_design_needs_participants():

@@ -88,6 +88,10 @@ def other_answer(lines: Lines) -> None:
             line["items"][0]["value"] += 1
 
 
+def no_answer(lines: Lines) -> None:
+    next(line for line in lines if line["event"] == "responses" and line["trial"] == 3)["items"] = []
+
+
 def other_start(lines: Lines) -> None:
     next(line for line in lines if line["event"] == "trial_started" and line["trial"] == 2)["level"] *= 1.001
 
@@ -95,9 +99,10 @@ def other_start(lines: Lines) -> None:
 @pytest.mark.parametrize(
     ("edit", "named"),
     [
-        (other_setting, "trial 2, attempt 1: its steps lead to another setting"),
-        (other_step, "trial 2, attempt 1: its steps lead to another setting"),
-        (other_answer, "trial 2, attempt 1: its steps lead to another setting"),
+        (other_setting, "trial 2, attempt 1: the interval ended at another setting than follows from its steps"),
+        (other_step, "trial 2, attempt 1: the interval ended at another setting than follows from its steps"),
+        (other_answer, "trial 2, attempt 1: the answer is not the sum of its steps"),
+        (no_answer, "trial 3, attempt 1: the answer is not the sum of its steps"),
         (other_start, "trial 2, attempt 1: another level"),
     ],
 )

@@ -14,6 +14,7 @@ from study_app.store.blinded.blinding import read_key, reveal
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.recordings import read_frames, read_samples
 from study_app.store.verification.verify_study import verify
+from study_app.store.withdrawals import withdraw
 from tests.journal_lines import event_of
 from tests.platforms import needs_fork
 from tests.store.conftest import Make, Start, ticking_clock
@@ -81,6 +82,24 @@ def test_an_unblinded_study_holds_the_recordings_of_one_that_was_never_sealed(
     }
     for found in (verify(study, Path(kept)), verify(other)):
         assert (found.errors, found.warnings) == ((), ())
+
+
+def test_what_a_killed_unblinding_left_is_removed_by_the_next(study: Path) -> None:
+    folders = (study, study / "data", study / SESSION, (study / RECORDING).parent)
+    left = [path / f".{path.name}.0123abcd.tmp" for path in folders]
+    for path in left:
+        path.write_bytes(b"sealed no more")
+        os.utime(path, (0, 0))
+    assert unblind(study, "AB", "done").left == ()
+    assert [path for path in left if path.exists()] == []
+
+
+def test_a_sealed_recording_is_withdrawn(study: Path) -> None:
+    held = (study / RECORDING).read_bytes()
+    done = withdraw(study, "P007", by="AB", reason="asked")
+    assert (done.folders, done.left) == ((study,), ())
+    assert not [path for path in study.rglob("*") if path.is_file() and held[100:200] in path.read_bytes()]
+    assert verify(study).errors == ()
 
 
 def in_line(event: str, **changes: Any) -> Any:

@@ -14,16 +14,19 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
+from study_app.protocol.simulated import TrialFeatures
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import opened, sealed
 from study_app.store.checksums import listed
 from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal_events as events
 from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals import Tombstone, add_tombstone, describe_session
-from tests.store.conftest import SOURCE, Attend, Start
+from tests.protocol.forms.mixed import mixed_file
+from tests.store.conftest import SOURCE, Attend, Start, Tables
 from tests.store.forging import Lines, cover_up, forge
 from tests.studies import made_up
 
@@ -295,7 +298,9 @@ def test_an_unfinished_session_with_a_changed_line_does_not_go_on(
         ("clock", {"origin_ns": 1, "origin_at": "2020-01-01T00:00:00+00:00"}),
         ("resumed", [{"at": "2020-01-01T00:00:00+00:00"}]),
         ("resumed", [1]),
+        ("resumed", [{"at": []}]),
         ("protocol", {}),
+        *(("protocol", {"sequence": steps}) for steps in (7, "consent", {"a": 1}, [[]])),
     ],
 )
 def test_a_changed_receipt_of_an_unfinished_session_is_found(
@@ -306,6 +311,47 @@ def test_a_changed_receipt_of_an_unfinished_session_is_found(
     assert verify(tmp_path / "study").errors == ()
     of_receipt(tmp_path / "study", **{field: value})
     assert field in told(tmp_path / "study")
+
+
+def test_a_session_that_was_aborted_before_its_last_page_came_again_is_sound(
+    tmp_path: Path, start: Start, tables_of_study: Tables
+) -> None:
+    tables = tables_of_study()
+    tables["sequence"] = [*tables["sequence"], "consent"]
+    store = start(protocol=Protocol.model_validate(tables))
+    store.append(events.PageShown(page="consent"))
+    store.append(events.PageLeft(page="consent"))
+    store.finish("aborted", "tired")
+    found = verify(tmp_path / "study")
+    assert (found.errors, found.warnings) == ((), ())
+
+
+@pytest.mark.parametrize(
+    ("removed", "number"),
+    [
+        (lambda line: line["event"] == "responses", 2),
+        (lambda line: line["event"] == "form_answered", 2),
+        (lambda line: line["event"] == "form_answered" and line["form"] == "end", 1),
+        (lambda line: line["event"] in ("form_answered", "choice", "item_shown"), 2),
+    ],
+)
+def test_a_removed_confirmation_is_found_where_the_session_went_on(
+    tmp_path: Path, removed: Callable[[dict[str, Any]], bool], number: int
+) -> None:
+    """Also of a session that was completed right after it, and whose last form has no answer."""
+    felt = {("stir", name): (TrialFeatures(1.0, 4.0, 0.1, 0.02, 0.03, 0.0),) for name in ("thin", "thick")}
+    shorter = 'sequence = ["start", "stir", "load", "usability", "end"]', 'sequence = ["start", "stir", "end"]'
+    file = mixed_file(tmp_path, shorter)
+    study = rehearse_answers(file, participants=1, seed=1, results=tmp_path / "mixed", features=felt)
+    assert verify(study).errors == ()
+    journal = study / "data" / "sub-P001" / "ses-01" / "journal.jsonl"
+
+    def edit(lines: Lines) -> None:
+        lines[:] = [line for line in lines if not removed(line)]
+
+    forge(journal, edit)
+    cover_up(study)
+    assert told(study).count("which was never confirmed: a line was removed") == number
 
 
 def test_a_session_that_left_its_last_page_was_not_aborted(tmp_path: Path) -> None:

@@ -234,6 +234,11 @@ def test_a_link_and_a_pipe_are_named_before_anything_is_written(study: Path, tmp
         with pytest.raises(StoreError, match=f"^{pipe} is neither a file nor a folder: remove it$"):
             act()
     pipe.unlink()
+    pipe.symlink_to(tmp_path)
+    for act in (lambda: erase(study), lambda: merge({"A": study}, tmp_path / "pooled")):
+        with pytest.raises(StoreError, match=f"^{pipe} is a link to {tmp_path}: replace the link by what it leads to$"):
+            act()
+    pipe.unlink()
     person.rename(tmp_path / "elsewhere")
     person.symlink_to(tmp_path / "elsewhere")
     with pytest.raises(StoreError, match=f"^{person} is a link to {tmp_path / 'elsewhere'}: replace the link"):
