@@ -3,7 +3,7 @@
 import re
 from typing import Any
 
-PRINTED = re.compile(r"[{}]|\bNone\b(?! (of|in)\b)|<class|<function|<bound|object at 0x")
+PRINTED = re.compile(r"[{}]|\bNone\b(?! (of|in|is)\b)|<class|<function|<bound|object at 0x")
 MEANT = re.compile(r"ATTR\{\w+\}|\{ \w+ = [^{}]*\}?")
 """A rule of Linux that the program tells, and tables within a line of a protocol file."""
 PROPERTIES = ("text", "windowTitle", "toolTip", "accessibleName", "accessibleDescription")

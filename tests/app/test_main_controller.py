@@ -128,6 +128,28 @@ def test_a_device_that_cannot_be_opened_is_tried_again_or_examined(
     assert (tried, examined) == (["falcon", "falcon"], ["falcon"])
 
 
+@pytest.mark.parametrize("asked", ["session", "enter", "device", "fade in"])
+def test_what_opens_a_device_ends_a_diagnosis_that_is_under_way(
+    visit: MainController, monkeypatch: Any, asked: str
+) -> None:
+    monkeypatch.setattr(main_controller, "LiveSession", Held)
+    monkeypatch.setattr(main_controller, "diagnosis", lambda window, *_device: QDialog(window))
+    monkeypatch.setattr("study_app.app.lab_controller.LabController._open", lambda *_device: None)
+    visit.window.place("lab")
+    visit.devices.diagnose("falcon", visit.window)
+    dialog = visit.devices.dialog
+    assert dialog is not None
+    assert dialog.isVisible()
+    if asked == "session":
+        visit.window.place("home").session_asked.emit(CHOSEN)
+    elif asked == "enter":
+        visit.window.go("lab")
+    else:
+        visit.window.place("lab").ask(asked, "mouse")
+    assert not dialog.isVisible()
+    assert visit.devices.dialog is None
+
+
 class Held(QObject):
     """A session that was held and is over as soon as it is opened."""
 

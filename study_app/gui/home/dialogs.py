@@ -7,7 +7,7 @@ from typing import Any
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QDialog, QLineEdit, QSpinBox, QWidget
+from PySide6.QtWidgets import QDialog, QLineEdit, QWidget
 
 from study_app.devices.registry import descriptor_of, list_devices
 from study_app.errors import StoreError, StudyError
@@ -72,9 +72,6 @@ class RehearsalDialog(Work):
         self._facts = facts
         for name, value in (("participants", 5), ("seed", 1)):
             self.editors[name].show_value(value)
-        count = self.editors["participants"].control
-        assert isinstance(count, QSpinBox)  # noqa: S101 - made for a count
-        QTimer.singleShot(0, count, count.selectAll)  # once it has the keyboard
         self.worker: RehearsalClient | None = None
         self._done = 0
         self.begun.connect(self._start)

@@ -230,7 +230,7 @@ class OperatorWindow(QMainWindow):
         try:
             how()
         except Exception as error:  # noqa: BLE001 - told, and passed on to the log and the journal
-            self.tell_of_failure(name, error)
+            self.tell_of_failure(self.panel_of(error) or name, error)  # Qt may paint another panel meanwhile
 
     def panel_of(self, error: BaseException) -> str:
         """Return the name of the panel in which an error was raised; "" where the session depends on what failed."""
@@ -248,11 +248,14 @@ class OperatorWindow(QMainWindow):
         return next((self._panels[panel] for panel in here if isinstance(error, Exception)), "")
 
     def tell_of_failure(self, name: str, error: BaseException) -> None:
+        """Disable a panel that failed, and say so once; one that fails again, as it is painted, is painted no more."""
         clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
-        if name not in self._failed:
+        panel = next(panel for panel, known in self._panels.items() if known == name)
+        if name in self._failed:
+            panel.setUpdatesEnabled(False)
+        else:
             self._failed.add(name)
-            for panel, known in self._panels.items():
-                panel.setEnabled(panel.isEnabled() and known != name)
+            panel.setEnabled(False)
             self.show_message("A part of this window failed", f"{name}: this panel failed. The session continues.")
             self.ask("failed", name, error)
 

@@ -441,9 +441,6 @@ class ComputerWindow(Question):
     asked = Signal()
 
     def __init__(self, parent: QWidget, theme: Theme) -> None:
-        inside, close = QWidget(), ActionButton("", "Close", role="primary")
-        super().__init__(parent, theme, "Check of this computer", ABOUT, close, back="Check again", inside=inside)
-        self.setModal(True)
         self.rows: list[CheckRow] = []
         self.state = label(MEASURING, "body", "text2", wraps=True)
         self.bar = QProgressBar(textVisible=False)
@@ -451,9 +448,11 @@ class ComputerWindow(Question):
         self._rows = vbox(STRETCH, spacing=0, margins=0)
         area = scrolled(self._rows)
         area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        inside, close = QWidget(), ActionButton("", "Close", role="primary")
         vbox(self.state, self.bar, (area, 1), spacing=12, margins=0, parent=inside)
+        super().__init__(parent, theme, "Check of this computer", ABOUT, close, back="Check again", inside=inside)
+        self.setModal(True)
         self._theme = theme
-        apply_theme(self, theme)
         self.back.clicked.disconnect(self.reject)
         self.back.clicked.connect(self.asked)
         self.resize(*SIZE)

@@ -1,5 +1,6 @@
 """The liquid lab with its real page, servo and device: felt, blinded, and never left with a force on."""
 
+import subprocess
 import sys
 import weakref
 from pathlib import Path
@@ -131,10 +132,37 @@ def test_a_lost_device_is_told_and_can_be_opened_again(felt: LabController, qtbo
     live.device.unplug()  # type: ignore[attr-defined]
     qtbot.waitUntil(lambda: "stopped responding" in felt.view().trouble, timeout=SOON_MS)
     assert not felt.view().force_on
+    felt.place.ask("diagnose")
+    assert (felt.live, is_let_go(live)) == (None, True), "the diagnosis needs the device"
+    assert felt.view().device.state == "stopped"
+    assert "stopped responding" in felt.view().trouble
     felt.place.ask("fade in")
     qtbot.waitUntil(lambda: felt.live is not None and felt.live is not live, timeout=OPENS_MS)
-    assert is_let_go(live)
     assert felt.view().trouble == ""
+
+
+NEVER_ANSWERS = """
+import sys, threading
+from pathlib import Path
+from PySide6.QtCore import QCoreApplication
+from study_app.app import lab_controller
+from study_app.lab.ab_comparison import Setting
+from study_app.protocol.load import load_scene
+
+application, writing = QCoreApplication(), threading.Event()
+lab_controller.save = lambda *_written: (writing.set(), threading.Event().wait())
+saving, scene = lab_controller.LabSaving(()), load_scene("rek2024", "water")
+saving.save(Path("never.toml"), Setting("Water", scene, scene))
+assert writing.wait(20)
+saving.wait(0.1)
+print("ends")
+"""
+
+
+def test_a_preset_for_a_drive_that_never_answers_does_not_keep_the_program_from_ending() -> None:
+    program = [sys.executable, "-c", NEVER_ANSWERS]
+    ended = subprocess.run(program, capture_output=True, text=True, timeout=30, check=False)
+    assert (ended.returncode, ended.stdout) == (0, "ends\n"), ended.stderr
 
 
 def test_while_blind_nothing_tells_one_from_the_other(felt: LabController, qtbot: Any, tmp_path: Path) -> None:

@@ -172,6 +172,19 @@ def test_the_strip_covers_no_page_and_stops_the_force_at_the_first_touch(one_scr
     assert (strip.state.word, world.force_is_on) == ("Paused, force is off", False)
 
 
+def test_the_strip_stops_the_force_though_nothing_can_be_recorded(one_screen, world, qtbot, monkeypatch, caplog):
+    def broken(*_line, **_named):
+        raise OSError("the drive is gone")
+
+    begin_trial(one_screen, world)
+    monkeypatch.setattr(world, "append", broken)
+    qtbot.mousePress(one_screen.strip.stop, LEFT)
+    assert not world.force_is_on
+    one_screen.show_tiles()
+    assert "the drive is gone" in one_screen.operator.banner.what.text()
+    caplog.clear()
+
+
 def pushes(world: World, count: int = 400) -> Any:
     """Return samples of the scene now loaded with a force of 3 N, 1.5 N of it along x, limited now and then."""
     samples = records(SAMPLE, count)

@@ -3,6 +3,7 @@
 import pkgutil
 import threading
 import weakref
+from operator import attrgetter
 
 import pytest
 from PySide6.QtCore import QEvent, Qt, QTimer
@@ -43,11 +44,12 @@ class Breaking:
     """Lets a method of a window fail from ``now`` on: in a slot or an event that Qt calls itself."""
 
     def __init__(self, monkeypatch, owner, method):
-        self.on, kind = False, pkgutil.resolve_name(f"study_app.gui.{owner}")
+        self.on, self.failed, kind = False, 0, pkgutil.resolve_name(f"study_app.gui.{owner}")
         whole, breaking = getattr(kind, method), self
 
         def broken(self, *arguments, **named):  # a panel that failed is found by this name
             if breaking.on:
+                breaking.failed += 1
                 raise ValueError(BROKEN)
             return whole(self, *arguments, **named)
 
@@ -65,6 +67,18 @@ def paint_tank(bridge):
 def tap(bridge):
     key = QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Space, Qt.KeyboardModifier.NoModifier)
     QApplication.postEvent(bridge.participant, key)
+
+
+def mark(bridge):
+    bridge.operator.ask("mark")
+
+
+def paint_position(bridge):
+    bridge.operator.position.plot.viewport().update()
+
+
+def paint_now(bridge):
+    bridge.operator.rail.now.update()
 
 
 def write_note(bridge):
@@ -109,31 +123,36 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
 
 @pytest.mark.qt_log_ignore("QBackingStore::endPaint")
 @pytest.mark.parametrize(
-    ("owner", "method", "do", "name"),
+    ("owner", "method", "do", "name", "panel", "width"),
     [
-        ("operator.controls.NotesCard", "show_view", lambda bridge: bridge.operator.ask("mark"), "Notes"),
-        ("operator.controls.NoteField", "toPlainText", write_note, "Notes"),
-        ("operator.plots.PositionCard", "show_health", lambda bridge: bridge.show_traces(), "Position"),
-        ("widgets.live_plots.Plot", "paintEvent", lambda it: it.operator.position.plot.viewport().update(), "Position"),
-        ("operator.session_panels.Rail", "paintEvent", lambda bridge: bridge.operator.rail.update(), "Session"),
-        ("operator.session_panels.Tally", "show_view", lambda bridge: bridge.operator.ask("mark"), "Counts"),
+        ("operator.controls.NotesCard", "show_view", mark, "Notes", "notes", 1600),
+        ("operator.controls.NoteField", "toPlainText", write_note, "Notes", "notes", 1600),
+        ("operator.plots.PositionCard", "show_health", lambda it: it.show_traces(), "Position", "position", 1600),
+        ("widgets.live_plots.TracePlot", "paintEvent", paint_position, "Position", "position", 1600),
+        ("operator.session_panels.Rail", "paintEvent", lambda it: it.operator.rail.update(), "Session", "rail", 1600),
+        ("operator.session_panels.Tally", "show_view", mark, "Counts", "rail.tally", 1600),
+        ("operator.session_panels.Tally", "show_view", mark, "Counts", "rail.tally", 1024),
+        ("operator.session_panels.Now", "paintEvent", paint_now, "Now", "rail.now", 1024),
     ],
 )
-def test_a_panel_that_fails_is_told_once_and_the_session_goes_on(
-    make, world, qtbot, monkeypatch, caplog, owner, method, do, name
+def test_a_panel_that_fails_is_told_once_and_disabled_and_the_session_goes_on(
+    make, world, qtbot, monkeypatch, caplog, owner, method, do, name, panel, width
 ):
     breaking = Breaking(monkeypatch, owner, method)
     bridge = make()
+    bridge.operator.resize(width, 900)
     begin_trial(bridge, world)
     QApplication.processEvents()
     breaking.now(bridge, do)
     qtbot.waitUntil(lambda: bool(bridge.operator.findChildren(Question)))
-    for _ in range(3):
+    for _ in range(9):
         do(bridge)
         bridge.show_tiles()
         QApplication.processEvents()
     said = [one.text() for notice in bridge.operator.findChildren(Question) for one in notice.findChildren(QLabel)]
     assert said.count(f"{name}: this panel failed. The session continues.") == 1
+    assert not attrgetter(panel)(bridge.operator).isEnabled()
+    assert breaking.failed < 6 or method == "toPlainText", "it is drawn no more"
     assert (world.force_is_on, bridge.trouble) == (True, "")
     assert isinstance(bridge.participant.page, TaskPage)
     assert "broke" not in world.events()

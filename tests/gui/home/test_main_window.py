@@ -120,7 +120,7 @@ def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("size", "width"), [((1024, 640), 72), ((1366, 768), 72), ((1920, 1080), 216)])
+@pytest.mark.parametrize(("size", "width"), [((1024, 640), 72), ((1440, 900), 72), ((1920, 1080), 216)])
 def test_the_sidebar_has_one_width_per_size_of_window(qtbot, size, width):
     window = MainWindow({"home": Place, "results": lambda: ResultsPlace(handed_to=Path()), "lab": LabPlace})
     qtbot.addWidget(window)

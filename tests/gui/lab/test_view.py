@@ -92,9 +92,10 @@ def test_a_device_that_failed_is_tried_again_or_examined(place: Any, still: LabV
     for button in (place.note.fade_in, place.note.diagnose):
         QTest.mouseClick(button, Qt.MouseButton.LeftButton)
     assert (place.note.fade_in.text(), asked) == ("Try again", ["fade in", "diagnose"])
-    lost = dataclasses.replace(lost, diagnosable=False)
-    place.show_view(dataclasses.replace(still, device=lost, trouble="the mouse is gone", force_on=False))
-    assert not place.note.diagnose.isVisible()
+    for changed, trouble in (({"diagnosable": False}, "the mouse is gone"), ({"state": "ready"}, "no such file")):
+        device = dataclasses.replace(lost, **changed)
+        place.show_view(dataclasses.replace(still, device=device, trouble=trouble, force_on=False))
+        assert (place.note.fade_in.isVisible(), place.note.diagnose.isVisible()) == (True, False), trouble
 
 
 def test_escape_and_leaving_give_the_pointer_back(place: Any, still: LabView) -> None:

@@ -6,6 +6,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -24,6 +25,7 @@ from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.observers import RATE_HZ, SensedTrial, exploration
 from study_app.session.simulated.rehearsal import RehearsedSession, condition_features
+from study_app.session.simulated.rehearsal_worker import RehearsalOrder, carry_out
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
 from study_app.store.folders import StudyFolder
@@ -116,6 +118,23 @@ def test_the_folder_of_another_study_is_named_before_an_id_that_is_used_in_it(tm
 
 @pytest.mark.slow
 @needs_servo
+def test_a_rehearsals_worker_tells_how_much_is_compiled_and_nothing_of_what_compiles_later(monkeypatch: Any) -> None:
+    said: list[float | str | Path] = []
+
+    def rehearse(_study: str, **_order: Any) -> Path:
+        compiled(2)
+        return Path("results")
+
+    compiled, later = numba.njit(lambda x: x + 1), numba.njit(lambda x: x + 2)
+    monkeypatch.setattr(rehearsal, "rehearse", rehearse)
+    assert carry_out(RehearsalOrder("demo", 1, 1, Path("results")), said.append, lambda: False) == Path("results")
+    shares = tuple(said)
+    later(2)
+    assert shares
+    assert all(isinstance(share, float) and 0 < share < 1 for share in shares)
+    assert tuple(said) == shares
+
+
 def test_a_disk_that_fails_ends_the_rehearsal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(self: SessionStore, event: Any, **about: Any) -> None:
         if event.event == "choice":
