@@ -13,7 +13,7 @@ from tests.compiled import needs_servo
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parent.parent
-LONGEST = 150
+LONGEST = 90
 """Lines of README.md."""
 
 

@@ -10,19 +10,10 @@ from study_app.documentation import INDEX, sections, with_generated_parts
 
 API = "<!-- sphinx: api -->"
 MODULES = (
-    "study_app.protocol.load",
-    "study_app.protocol.orders.schedule",
+    "study_app.api",
     "study_app.haptics.model.scene",
-    "study_app.haptics.runtime.offline",
     "study_app.devices.base",
     "study_app.devices.descriptor",
-    "study_app.store.folders",
-    "study_app.store.verification.verify_study",
-    "study_app.analysis.data.study_tables",
-    "study_app.analysis.statistics.rank_tests",
-    "study_app.analysis.statistics.trend",
-    "study_app.psychophysics.families",
-    "study_app.psychophysics.adaptive",
 )
 
 

@@ -48,6 +48,7 @@ from study_app.analysis.statistics.thresholds import (
     group_mean,
     p_of_fit,
 )
+from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
 from study_app.psychophysics.grid import Posterior, fit
@@ -150,6 +151,20 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
         if own:
             yield _with_compared(stimulus, _group(stimulus, standard, own), own)
         yield from own
+
+
+def thresholds_of(trials: pd.DataFrame, stimulus: Stimulus, design: Design) -> Iterator[ThresholdEstimate]:
+    """Yield thresholds as `thresholds` does, from trials (n rows) of one's own in their order.
+
+    Columns are ``level`` and ``success``; perhaps ``participant``, ``session`` and ``standard``.
+    """
+    block = LevelBlock("trials", "", "main", design, stimulus, ())
+    assumed: dict[str, Any] = {"participant": "P001", "session": 1, "standard": math.nan}
+    about = {name: value for name, value in assumed.items() if name not in trials}
+    numbers = np.arange(len(trials))
+    return thresholds(
+        block, trials.assign(block="trials", trial=numbers, analysed=True, level_delivered=trials["level"], **about)
+    )
 
 
 def _fitted(

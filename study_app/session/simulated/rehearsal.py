@@ -12,7 +12,8 @@ too.
 """
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import partial
@@ -30,6 +31,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
+from study_app.protocol.questions import Value, shown
 from study_app.protocol.simulated import NO_FEATURES, OBSERVER, Comparison, Observer, TrialFeatures
 from study_app.protocol.streams import Key as LevelKey
 from study_app.protocol.trials.presentation import delays_force, next_level
@@ -46,7 +48,7 @@ from study_app.session.pages import (
 from study_app.session.ports import KeptSession, Ports
 from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at, source_to_resume
 from study_app.session.runner import Runner
-from study_app.session.simulated.observers import Draw, SensedTrial, hand_for, reading_s, rest
+from study_app.session.simulated.observers import Choice, Draw, SensedTrial, choices, hand_for, reading_s, rest
 from study_app.session.simulated.participant import LOOK_AT_SETTING_S, AdjustingObserver, SimulatedParticipant
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeRequested, Stepped, Submitted
 from study_app.session.trial import TankView
@@ -73,6 +75,18 @@ ConditionFeatures: TypeAlias = Mapping[Where, tuple[TrialFeatures, ...]]
 """What was felt in each trial of a condition in a block."""
 REHEARSED_PEOPLE: Final = 4
 """So many simulated participants feel all conditions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A page of questions, and what was felt in each interval of its trial: nothing on a form of its own."""
+
+    page: QuestionnairePage | DesignPage
+    felt: tuple[TrialFeatures, ...]
+
+
+Answer: TypeAlias = Callable[[Question], Value | Mapping[str, Value] | None]
+"""An observer: returns the answer, those by item id, or None for those of the simulated participant."""
 
 
 class DiscardingStore:
@@ -135,8 +149,10 @@ class RehearsedSession(SimulatedParticipant):
         features: Callable[[int, tuple[TrialFeatures, ...]], object] | None = None,
         known: Mapping[int, tuple[TrialFeatures, ...]] | None = None,
         observer: Observer = OBSERVER,
+        answer: Answer | None = None,
     ) -> None:
         super().__init__(study, schedule, observer)
+        self._answer = answer
         self._known = known or {}
         self._tell_features = features
         self.rig = rig
@@ -170,10 +186,19 @@ class RehearsedSession(SimulatedParticipant):
 
     def run(self) -> None:
         """Go from the first page to the last."""
+        for _ in self.pages():
+            pass
+
+    def pages(self) -> Iterator[Page]:
+        """Yield each page when it is shown, and do what it asks for when the next one is wanted."""
         self._post(Begin(self._now_s()))
         if isinstance(self.page, PausePage):  # before the trial that a resumed session goes on with
             self._post(ResumeRequested(self._now_s(), "participant"))
+        told: Page | None = None
         while not self._runner.finished:
+            if self.page is not None and self.page is not told:
+                told = self.page
+                yield told
             match self.page:
                 case TextPage() as page:
                     self._pass(reading_s(page))
@@ -264,6 +289,15 @@ class RehearsedSession(SimulatedParticipant):
                 senses.see(painted_ns, view)
             self._next_frame_ns += round(1e9 * FRAME_S)
         return view
+
+    def _answers_to(self, page: QuestionnairePage | DesignPage) -> list[Choice]:
+        felt = () if page.trial is None else {**self._known, **self._features_of}[page.trial]
+        given = None if self._answer is None else self._answer(Question(page, felt))
+        if given is None:
+            return super()._answers_to(page)
+        answers = given if isinstance(given, Mapping) else {page.items[0].id: given}
+        visible = [item for item in page.items if item.id in shown(page.items, answers) and item.id in answers]
+        return choices(visible, answers, self._stream(page.stream), changes_mind=False)
 
     def _felt(self, trial: int | None) -> TrialFeatures:
         return NO_FEATURES if trial is None else {**self._features_of, **self._known}[trial][-1]
@@ -376,30 +410,83 @@ def rehearse(
         used_ids(StudyFolder(folder)).check_unused(person, 1)
     for person in people:
         began = time.perf_counter()
-        with rehearsal_rig(study, person, seed, device) as rig:
-            start = SessionStart(
-                person,
-                seed=seed,
-                operator="",
-                language=study.study.languages[0],
-                device=rig.described,
-                screens=REHEARSED_SCREENS,
-                simulated=True,
-                recordings=recordings,
-            )
-            store = begin(folder, study, source, start, clock=SessionClock(rig.servo.now_ns))
-            own = session_protocol(StudyFolder(folder), store.as_recorded(study), person, 1)
-            lasted_s, answers = _run(own, build_schedule(own, person, seed), rig, store, FIRST, observer)
-            proof = store.fingerprint
+        with open_session(
+            study, source, person, seed=seed, device=device, results=folder, recordings=recordings, observer=observer
+        ) as (rehearsal, store):
+            rehearsal.run()
         if progress is not None:
             took_s = time.perf_counter() - began
-            held = f"{lasted_s / 60:.1f} min of session in {took_s:.1f} s (simulated)"
-            progress(f"{person}: {answers} responses, {held}, fingerprint {proof}")
+            held = f"{store.clock.seconds() / 60:.1f} min of session in {took_s:.1f} s (simulated)"
+            progress(f"{person}: {rehearsal.answers} responses, {held}, fingerprint {store.fingerprint}")
     return folder
 
 
+@contextmanager
+def open_session(
+    study: Protocol,
+    source: bytes,
+    participant: str,
+    *,
+    results: Path,
+    seed: int,
+    session: int = 1,
+    device: str = "scripted",
+    recordings: bool = True,
+    observer: Observer = OBSERVER,
+    answer: Answer | None = None,
+) -> Iterator[tuple[RehearsedSession, SessionStore]]:
+    """Begin a session with a simulated hand; yield it and its store. Left before its end, it stays unfinished.
+
+    Parameters
+    ----------
+    study : Protocol
+        What is run.
+    source : bytes
+        Its source.
+    participant : str
+        Whose session it is.
+    results : Path
+        The study folder.
+    seed, session, device, recordings, observer
+        As in `rehearse`, and the session's number.
+    answer : callable, optional
+        Answers the pages of questions in place of the simulated participant.
+
+    Raises
+    ------
+    StudyError
+        As in `rehearse`.
+    """
+    with rehearsal_rig(study, participant, seed, device) as rig:
+        start = SessionStart(
+            participant,
+            session=session,
+            seed=seed,
+            operator="",
+            language=study.study.languages[0],
+            device=rig.described,
+            screens=REHEARSED_SCREENS,
+            simulated=True,
+            recordings=recordings,
+        )
+        store = begin(results, study, source, start, clock=SessionClock(rig.servo.now_ns))
+        own = session_protocol(StudyFolder(results), store.as_recorded(study), participant, session)
+        with store:
+            schedule = build_schedule(own, participant, seed)
+            yield RehearsedSession(own, schedule, rig, store, observer=observer, answer=answer), store
+
+
 def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
-    """Go on with a rehearsed session whose program was ended, to its last page.
+    """Go on with a rehearsed session whose program was ended, to its last page; as `reopen_session`."""
+    with reopen_session(session_folder, protocol=protocol) as (rehearsal, _):
+        rehearsal.run()
+
+
+@contextmanager
+def reopen_session(
+    session_folder: Path, *, protocol: str | Path | None = None, answer: Answer | None = None
+) -> Iterator[tuple[RehearsedSession, SessionStore]]:
+    """Go on with a rehearsed session whose program was ended; yield it and its store.
 
     Parameters
     ----------
@@ -407,6 +494,8 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
         The session's ``ses-NN`` folder.
     protocol : str or Path, optional
         File or name of its protocol; by default it is looked for.
+    answer : callable, optional
+        Answers the pages of questions in place of the simulated participant.
 
     Raises
     ------
@@ -435,22 +524,10 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
         )
         own = session_protocol(locate(session_folder)[0], store.as_recorded(study), person, begun.session)
         schedule = build_schedule(own, person, seed)
-        _run(own, schedule, rig, store, resume_at(own, schedule, lines, store.key), OBSERVER)
-
-
-def _run(
-    study: Protocol, schedule: Schedule, rig: Rig, store: SessionStore, start: Start, observer: Observer
-) -> tuple[float, int]:
-    """Run an open session to its end; return how long it lasted in its own time [s], and its answers."""
-    with store:
-        known = (
-            {}
-            if start is FIRST
-            else _features_of_whole_session(study, schedule, rig.device.name, store.key.codes, store.key.nonce)
-        )
-        rehearsal = RehearsedSession(study, schedule, rig, store, start, known=known, observer=observer)
-        rehearsal.run()
-    return store.clock.seconds(), rehearsal.answers
+        with store:
+            start = resume_at(own, schedule, lines, store.key)
+            known = _features_of_whole_session(own, schedule, rig.device.name, store.key.codes, store.key.nonce)
+            yield RehearsedSession(own, schedule, rig, store, start, known=known, answer=answer), store
 
 
 def _features_of_whole_session(

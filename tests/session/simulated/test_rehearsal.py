@@ -18,7 +18,6 @@ from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol import formats
 from study_app.protocol.load import load
-from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.simulated import OBSERVER, Comparison
 from study_app.protocol.source.files import source_bytes
@@ -212,12 +211,12 @@ def test_a_resumed_session_goes_on_with_the_model_that_it_began_with(
             raise KeyboardInterrupt
         kept(self, event, **about)
 
-    def noting(protocol: Protocol, *rest: Any) -> Any:
-        used.append(protocol)
-        return run(protocol, *rest)
+    def noting(self: Any) -> Any:
+        used.append(self._study)
+        return pages(self)
 
-    run = rehearsal._run
-    monkeypatch.setattr(rehearsal, "_run", noting)
+    pages = rehearsal.RehearsedSession.pages
+    monkeypatch.setattr(rehearsal.RehearsedSession, "pages", noting)
     with monkeypatch.context() as patched:
         patched.setattr(SessionStore, "append", interrupted)
         with pytest.raises(KeyboardInterrupt):
@@ -226,7 +225,7 @@ def test_a_resumed_session_goes_on_with_the_model_that_it_began_with(
     monkeypatch.setattr(formats, "ESTIMATOR", "ewma")
     assert load(str(file)).scene.velocity == Ewma()
     rehearsal.resume(results.session("P001", 1).path, protocol=str(file))
-    first, second = used
+    first, *_, second = used
     assert first.scene.velocity == second.scene.velocity == Kalman()
     assert first.liquids == second.liquids
     assert not {liquid.effects for liquid in first.liquids.values()} & {"auto", ("drag",)}

@@ -1,0 +1,383 @@
+"""The stable Python interface: load studies, compute forces, simulate, fit, read results, run sessions, drive a device.
+
+Only this module is covered by semantic versioning; docs/api.md has examples. Importing it is quick: what a function
+needs is imported when it is called. Every error is a `study_app.errors.StudyError` with one line that says what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from numpy.typing import ArrayLike
+
+    from study_app.devices.rig import Rig
+    from study_app.haptics.model.scene import Scene
+    from study_app.protocol.model import Protocol
+    from study_app.session.pages import Page
+    from study_app.session.simulated.rehearsal import Answer, RehearsedSession
+    from study_app.store.sessions.open_session import SessionStore
+
+__all__ = [
+    "ForceLoop",
+    "Session",
+    "fit",
+    "load",
+    "open_force",
+    "open_session",
+    "read",
+    "rehearse",
+    "report",
+    "simulate_force",
+    "simulate_study",
+]
+
+
+def load(study: str | Path) -> Protocol:
+    """Return a study, checked.
+
+    Parameters
+    ----------
+    study : str or Path
+        Its file, or the name of one that ships or lies in the workspace.
+
+    Raises
+    ------
+    ProtocolError
+        Lists every problem of the file with its line.
+    """
+    from study_app.protocol import load as loading
+
+    return loading.load(study)
+
+
+def simulate_force(
+    scene: str | Path, liquid: str, motion: str | Path | tuple[ArrayLike, ArrayLike], **parameters: object
+) -> np.recarray[Any, Any]:
+    """Compute the force along a motion with the servo's own tick, without a device.
+
+    Parameters
+    ----------
+    scene : str or Path
+        File or name of a study, or of a file of liquids.
+    liquid : str
+        The liquid's id there.
+    motion : str, Path or tuple
+        A programmed path (``"circle"``, ``"line"``, ``"stop"`` …), a CSV file, or times (n,) [s] and positions (n, 3)
+        [m, scene], one row per tick.
+    **parameters
+        Values that differ from the file's, such as ``viscosity_pa_s=2.0``.
+
+    Returns
+    -------
+    recarray (n,)
+        Columns ``t_s``, ``x_m`` …, ``vx_mps`` …, ``fx_n`` … (sum of the effects), ``device_fx_n`` … (after the safety
+        layer), ``limiters``.
+    """
+    import numpy as np
+
+    from study_app.haptics.model import motion as motions
+    from study_app.haptics.runtime import offline
+
+    chosen = _scene(scene, liquid, parameters)
+    if isinstance(motion, tuple):
+        t_s, position_m = (np.asarray(values, np.float64) for values in motion)
+        return offline.simulate(chosen, motions.Motion(t_s, position_m))
+    if str(motion) in motions.NAMES:
+        return offline.simulate(chosen, motions.path(str(motion), rate_hz=chosen.rate_hz))
+    return offline.simulate(chosen, motions.read(Path(motion)))
+
+
+def simulate_study(study: str | Path, people: int, *, seed: int) -> dict[str, pd.DataFrame]:
+    """Answer a study as simulated participants do, without a servo; return its tables, unblinded, as `read` does."""
+    from study_app.session.simulated.answers_only import rehearse_answers
+    from study_app.store.blinded.unblinding import unblind_folder
+
+    with TemporaryDirectory(prefix="liquid-study-") as folder:
+        results = rehearse_answers(study, participants=people, seed=seed, results=Path(folder) / "results")
+        unblind_folder(results, by="simulate_study", reason="simulated")
+        return read(results)
+
+
+def fit(
+    trials: pd.DataFrame,
+    *,
+    levels: tuple[float, float],
+    design: str = "2ifc",
+    spacing: Literal["log", "linear"] = "log",
+    distances: bool = True,
+) -> pd.DataFrame:
+    """Fit thresholds as the report does: posterior medians with 95 % intervals.
+
+    Parameters
+    ----------
+    trials : DataFrame
+        Columns ``level`` and ``success`` (bool) in the order of the trials; perhaps ``participant``, ``session`` and
+        ``standard``.
+    levels : tuple of float
+        The smallest and the largest level that could be presented.
+    design : str
+        Kind of the design, such as ``"2ifc"``, ``"yesno"``: it gives the guess rate.
+    spacing : str
+        Whether levels are evenly spaced in their logarithm or in themselves.
+    distances : bool
+        Whether a level is the distance from a standard, so that 0 is chance.
+
+    Returns
+    -------
+    DataFrame
+        One row of the group (``participant`` is None) and one of each participant, per standard: ``threshold``,
+        ``low``, ``high``, ``n``, ``width``, ``lapse``, ``fit_p``, ``change`` …
+    """
+    from dataclasses import asdict
+
+    import pandas as pd
+
+    from study_app.analysis.levels.thresholds import thresholds_of
+    from study_app.errors import AnalysisError
+    from study_app.protocol.trials.designs import default_design
+    from study_app.protocol.trials.stimuli import Stimulus
+
+    if missing := {"level", "success"} - set(trials.columns):
+        raise AnalysisError(f"trials have no column {', '.join(sorted(missing))}: each row needs level and success")
+    kind = "difference" if distances else "value"
+    stimulus = Stimulus(vary="level", level=kind, levels=levels, spacing=spacing)
+    return pd.DataFrame([asdict(one) for one in thresholds_of(trials, stimulus, default_design(design))])
+
+
+def read(results: str | Path) -> dict[str, pd.DataFrame]:
+    """Return the tables of a study folder by name, as ``export`` writes them: responses, trials and others.
+
+    Sealed columns are left out until the study is unblinded. docs/data-dictionary.md declares every column.
+    """
+    from study_app.analysis.data.study_tables import load_study
+    from study_app.analysis.export.tables import deliver
+
+    return {table.name: table.frame for table in deliver(load_study(Path(results)))}
+
+
+def report(results: str | Path, to: str | Path) -> Path:
+    """Write the report of a study folder into the folder ``to``; return the path of ``report.html``."""
+    from study_app.analysis.report.write_report import report as write
+
+    return write(Path(results), Path(to))[0]
+
+
+def rehearse(
+    study: str | Path, people: int, *, seed: int, results: str | Path | None = None, recordings: bool = True
+) -> Path:
+    """Run whole sessions with simulated participants on a simulated device; return the study folder.
+
+    ``results`` is a new or existing study folder; by default a new one of the workspace.
+    """
+    from study_app.session.simulated import rehearsal
+
+    folder = None if results is None else Path(results)
+    return rehearsal.rehearse(study, participants=people, seed=seed, results=folder, recordings=recordings)
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """A session that runs while it is iterated over: each page is yielded before it is answered.
+
+    Attributes
+    ----------
+    folder : Path
+        Where it is stored.
+    """
+
+    folder: Path
+    _rehearsed: RehearsedSession
+    _store: SessionStore
+
+    def __iter__(self) -> Iterator[Page]:
+        return self._rehearsed.pages()
+
+    def run(self) -> None:
+        """Go on to the last page."""
+        self._rehearsed.run()
+
+    @property
+    def fingerprint(self) -> str:
+        """The session's fingerprint once it has ended; empty before."""
+        return self._store.fingerprint
+
+
+@contextmanager
+def open_session(
+    study: str | Path,
+    participant: str,
+    *,
+    results: str | Path,
+    seed: int,
+    session: int = 1,
+    device: str = "scripted",
+    answer: Answer | None = None,
+    recordings: bool = True,
+) -> Iterator[Session]:
+    """Open a session without windows, on simulated time; one that was left before its end is resumed.
+
+    It is stored as a session with windows is, marked as simulated. Whatever ends the block, the force ends at zero, and
+    every answer given is on the disk.
+
+    Parameters
+    ----------
+    study : str or Path
+        File or name of the study.
+    participant : str
+        The participant's id.
+    results : str or Path
+        The study folder.
+    seed : int
+        All randomness of a new session comes from it.
+    session : int
+        The number of the participant's session.
+    device : str
+        A device that moves by itself.
+    answer : callable, optional
+        An observer: called with a `Question` (``page``; ``felt``, one ``TrialFeatures`` per interval), it returns the
+        answer, answers by item id, or None for those of the built-in simulated participant.
+    recordings : bool
+        Whether every tick of the servo is stored.
+
+    Raises
+    ------
+    StudyError
+        The study, the id or the folder cannot be used; the session was completed; or an answer is not permitted.
+    """
+    from study_app.protocol.load import parse, source_bytes
+    from study_app.session.simulated import rehearsal
+    from study_app.store.folders import StudyFolder
+
+    folder = StudyFolder(Path(results)).session(participant, session)
+    if folder.journal.exists():
+        opening = rehearsal.reopen_session(folder.path, protocol=study, answer=answer)
+    else:
+        source = source_bytes(study)
+        opening = rehearsal.open_session(
+            parse(source, str(study)),
+            source,
+            participant,
+            results=Path(results),
+            seed=seed,
+            session=session,
+            device=device,
+            recordings=recordings,
+            answer=answer,
+        )
+    with opening as (rehearsed, store):
+        yield Session(folder.path, rehearsed, store)
+
+
+class ForceLoop:
+    """A device whose force a liquid computes at 1 kHz in a thread of its own, for another program's loop."""
+
+    def __init__(self, rig: Rig, scenes: Mapping[str, Scene]) -> None:
+        self._rig = rig
+        self._scenes = scenes
+        self._reader = rig.servo.telemetry.reader()
+
+    def set_liquid(self, liquid: str, **parameters: object) -> None:
+        """Change the liquid, or only numbers of it; the force changes within the slew limit, or fades in.
+
+        Raises
+        ------
+        StudyError
+            The liquid or a parameter is unknown, a value is out of range, or the servo has stopped.
+        """
+        scene = _changed(self._scenes, liquid, parameters)
+        servo = self._rig.servo
+        if servo.may_adjust(scene):
+            servo.adjust(scene)
+        else:
+            servo.load(scene)
+
+    def read(self) -> np.recarray[Any, Any]:
+        """Return the samples since the last call, oldest first: ``position_m`` [m], ``device_force_n`` [N] and more.
+
+        Raises
+        ------
+        ServoFault, DeviceLost
+            The servo has stopped itself; the force is zero.
+        """
+        self._rig.servo.check()
+        samples: np.recarray[Any, Any] = self._reader.read()
+        return samples
+
+    def stop(self) -> None:
+        """Send zero force from the next tick on, without a fade, until `fade_in`."""
+        self._rig.servo.stop_force()
+
+    def fade_in(self) -> None:
+        """Fade the force in after `stop`."""
+        self._rig.servo.fade_in()
+
+
+@contextmanager
+def open_force(
+    scene: str | Path,
+    *,
+    device: str = "scripted",
+    force_limit_n: float | None = None,
+    options: Mapping[str, str | Path] | None = None,
+) -> Iterator[ForceLoop]:
+    """Open a device with the servo and its safety layer, at zero force until `ForceLoop.set_liquid`.
+
+    Whatever ends the block, the last force is zero.
+
+    Parameters
+    ----------
+    scene : str or Path
+        File or name of a study, or of a file of liquids.
+    device : str
+        Such as ``"falcon"``; by default a simulated hand.
+    force_limit_n : float, optional
+        The greatest force [N]; it can only lower that of the file.
+    options : mapping, optional
+        The device's options, by name.
+
+    Raises
+    ------
+    StudyError
+        The file or the device cannot be opened; then nothing is left open.
+    """
+    from study_app.devices.rig import RigSettings, open_rig
+    from study_app.haptics.runtime.pack import elements_needed
+    from study_app.lab.live import WORKSPACE_M
+    from study_app.protocol.load import load_scenes
+    from study_app.protocol.streams import stream
+
+    scenes = load_scenes(scene)
+    first = next(iter(scenes.values()))
+    settings = RigSettings(
+        workspace_m=WORKSPACE_M,
+        force_limit_n=first.force_limit_n if force_limit_n is None else min(force_limit_n, first.force_limit_n),
+        rate_hz=first.rate_hz,
+        elements=max(elements_needed(one) for one in scenes.values()),
+        random=stream(1, "force/tremor"),
+        options=options or {},
+    )
+    with open_rig(device, settings) as rig:
+        yield ForceLoop(rig, scenes)
+
+
+def _scene(file: str | Path, liquid: str, parameters: Mapping[str, object]) -> Scene:
+    from study_app.protocol.load import load_scenes
+
+    return _changed(load_scenes(file), liquid, parameters)
+
+
+def _changed(scenes: Mapping[str, Scene], liquid: str, parameters: Mapping[str, object]) -> Scene:
+    from study_app.errors import StudyError
+    from study_app.haptics.model.overrides import override_all
+
+    if liquid not in scenes:
+        raise StudyError(f"{liquid!r} is not a liquid of the file: it has {', '.join(scenes)}")
+    return override_all(scenes[liquid], parameters) if parameters else scenes[liquid]

@@ -1,0 +1,196 @@
+"""The stable interface: its signatures, what importing it loads, and that each function is what the program does."""
+
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app import api
+from study_app.errors import SessionError, StudyError
+from study_app.haptics.runtime import offline
+from study_app.protocol.load import load_scene
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+from tests.documented import ROOT, blocks
+from tests.golden import compare
+from tests.protocol.trials import level_studies
+
+HERE = Path(__file__).parent
+
+
+def signatures() -> list[str]:
+    """Return every public name with its signature; a change is a new version of the interface."""
+    lines: list[str] = []
+    for name in api.__all__:
+        thing = getattr(api, name)
+        if inspect.isclass(thing):
+            methods = {key: one for key, one in vars(thing).items() if not key.startswith("_")}
+            shown = {key: one.fget if isinstance(one, property) else one for key, one in methods.items()}
+            lines += [f"{name}.{key}{inspect.signature(one)}" for key, one in shown.items() if callable(one)]
+        else:
+            lines.append(f"{name}{inspect.signature(thing)}")
+    return lines
+
+
+def test_signatures_change_with_the_version_alone(request: pytest.FixtureRequest) -> None:
+    compare(HERE / "golden" / "signatures.txt", signatures(), request.config)
+
+
+def test_importing_loads_neither_windows_nor_numbers() -> None:
+    code = (
+        "import sys, study_app.api; "
+        "print([one for one in ('PySide6', 'numpy', 'pandas', 'numba', 'pydantic') if one in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"
+
+
+@needs_servo
+def test_forces_are_those_of_the_servo() -> None:
+    t_s = np.arange(400) / 1000
+    position_m = np.column_stack([0.05 * np.sin(6 * t_s), 0 * t_s, 0 * t_s])
+    found = api.simulate_force("rek2024", "honey", (t_s, position_m))
+    own = offline.simulate(load_scene("rek2024", "honey"), offline.Motion(t_s, position_m))
+    assert found.tobytes() == own.tobytes()
+    lighter = api.simulate_force("rek2024", "honey", (t_s, position_m), density_kg_m3=700.0)
+    assert lighter.fx_n == pytest.approx(found.fx_n / 2, rel=1e-9)
+    assert len(api.simulate_force("rek2024", "water", "circle")) > 1000
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (
+            lambda: api.simulate_force("rek2024", "oil", "circle"),
+            "'oil' is not a liquid of the file: it has water, honey",
+        ),
+        (lambda: api.load("nothing"), "nothing"),
+        (lambda: api.read("nowhere"), "nowhere"),
+    ],
+)
+def test_what_cannot_be_used_is_one_line(call: Any, words: str) -> None:
+    with pytest.raises(StudyError, match=words) as raised:
+        call()
+    assert "Traceback" not in str(raised.value)
+
+
+@pytest.mark.slow
+@needs_servo
+def test_examples_of_the_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    for block in blocks(ROOT / "docs" / "api.md"):
+        exec(block.text, names)  # noqa: S102 - a page of this documentation
+    assert names["page"].is_file()
+    assert len(names["tables"]["trials"]) > 0
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a study of one short block of 2IFC."""
+    path = tmp_path_factory.mktemp("api") / "levels.toml"
+    path.write_text(level_studies.text_of(*level_studies.SHORT), encoding="utf-8")
+    return path
+
+
+def by_resistance(question: Any) -> str | None:
+    """Answer which interval resisted more, without noise; leave forms to the simulated participant."""
+    if len(question.felt) < 2:
+        return None
+    resisted = [one.force_mean_n / one.speed_rms_mps for one in question.felt]
+    return "first" if resisted[0] > resisted[1] else "second"
+
+
+@pytest.mark.slow
+@needs_servo
+def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_path: Path) -> None:
+    asked: list[Any] = []
+
+    def observer(question: Any) -> str | None:
+        asked.append(question)
+        return by_resistance(question)
+
+    whole, parted = tmp_path / "whole", tmp_path / "parted"
+    with api.open_session(short, "P001", results=whole, seed=5, answer=observer, recordings=False) as session:
+        trials = [page.trial for page in session if getattr(page, "trial", None) is not None]
+    assert session.fingerprint
+    assert trials == sorted(trials)
+    assert asked
+    with api.open_session(short, "P001", results=parted, seed=5, answer=observer, recordings=False) as session:
+        for page in session:
+            if getattr(page, "trial", None) == trials[-1] // 2:
+                break
+    assert not session.fingerprint
+    with api.open_session(short, "P001", results=parted, seed=99, answer=observer, recordings=False) as session:
+        session.run()
+    tables = [api.read(folder)["responses"] for folder in (whole, parted)]
+    columns = ["trial", "item", "response"]
+    assert tables[0][columns].equals(tables[1][columns])
+    assert verify(parted).errors == ()
+    with pytest.raises(StudyError, match="completed"), api.open_session(short, "P001", results=whole, seed=5):
+        pass
+
+
+@pytest.mark.slow
+@needs_servo
+def test_an_answer_that_is_not_permitted_ends_the_block_and_loses_nothing(short: Path, tmp_path: Path) -> None:
+    with (
+        pytest.raises(SessionError, match="third"),
+        api.open_session(short, "P001", results=tmp_path / "r", seed=1, answer=lambda _: "third") as session,
+    ):
+        session.run()
+    with api.open_session(short, "P001", results=tmp_path / "r", seed=1, answer=by_resistance) as session:
+        session.run()
+    assert verify(tmp_path / "r").errors == ()
+
+
+@pytest.mark.slow
+@needs_servo
+@pytest.mark.parametrize("device", ["inverse3-emulated", "scripted"])
+def test_every_way_out_of_a_force_loop_ends_at_zero_force(device: str) -> None:
+    def used_by_a_program_that_fails(hands: list[Any]) -> None:
+        with api.open_force("rek2024", device=device, force_limit_n=1.0) as loop:
+            loop.set_liquid("water")
+            hands.append(getattr(loop._rig.device, "hand", loop._rig.device))
+            hands[0].reach_to(0.04, 0.0, 0.0, duration_s=0.4)
+            felt_n = samples(loop, 700)
+            assert 0.0 < np.linalg.norm(felt_n, axis=1).max() <= 1.0
+            loop.set_liquid("water", density_kg_m3=1200.0)
+            with pytest.raises(StudyError, match="densty"):
+                loop.set_liquid("water", densty_kg_m3=1200.0)
+            loop.stop()
+            assert not np.any(samples(loop, 50)[-20:])
+            loop.fade_in()
+            hands[0].reach_to(0.0, 0.0, 0.0, duration_s=10.0)
+            assert np.any(samples(loop, 100)[-1])
+            raise ZeroDivisionError
+
+    def samples(loop: api.ForceLoop, count: int) -> Any:
+        found = np.zeros((0, 3))
+        while len(found) < count:
+            found = np.vstack([found, loop.read().device_force_n])
+        return found
+
+    hands: list[Any] = []
+    with pytest.raises(ZeroDivisionError):
+        used_by_a_program_that_fails(hands)
+    assert not np.any(hands[0].force_n)
+
+
+@pytest.mark.slow
+@needs_servo
+def test_a_fit_of_own_trials_is_that_of_the_report(short: Path) -> None:
+    tables = api.simulate_study(short, 2, seed=3)
+    tracks, reported = tables["tracks"], tables["thresholds"]
+    levels = api.load(short).stimuli["viscosity"].levels
+    trials = tracks.rename(columns={"level_asked": "level", "right": "success"})
+    fitted = api.fit(trials, levels=levels)
+    columns = ["standard", "threshold", "low", "high", "n", "fit_p"]
+    own = fitted.loc[fitted["participant"].notna(), columns].to_numpy(dtype=float)
+    assert own == pytest.approx(reported[columns].to_numpy(dtype=float), rel=1e-9)
+    with pytest.raises(StudyError, match="no column success"):
+        api.fit(tracks[["participant"]].assign(level=1.0), levels=levels)
