@@ -9,12 +9,7 @@ from sphinx.application import Sphinx
 from study_app.documentation import INDEX, sections, with_generated_parts
 
 API = "<!-- sphinx: api -->"
-MODULES = (
-    "study_app.api",
-    "study_app.haptics.model.scene",
-    "study_app.devices.base",
-    "study_app.devices.descriptor",
-)
+MODULES = ("study_app.api", "study_app.haptics.model.scene", "study_app.devices.base", "study_app.devices.descriptor")
 
 
 def complete(_app: Sphinx, name: str, text: list[str]) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from study_app.cli.study import check
+from study_app.cli import commands
 from study_app.errors import VideoError
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
@@ -165,7 +165,7 @@ def test_check_notes_what_keeps_this_machine_from_showing_the_camera(
     workstation.save(MachineSettings(camera="tcp://127.0.0.1:9"))
     if not installed:
         monkeypatch.setattr(sources, "installed", lambda: False)
-    checked = CliRunner().invoke(check, [str(camera_study)])
+    checked = CliRunner().invoke(commands, ["check", str(camera_study)])
     assert checked.exit_code == 0, checked.output
     assert "Statements" in checked.output
     assert words in checked.output.splitlines()[-1]

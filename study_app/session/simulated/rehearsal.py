@@ -447,15 +447,23 @@ def open_session(
         Whose session it is.
     results : Path
         The study folder.
-    seed, session, device, recordings, observer
-        As in `rehearse`, and the session's number.
+    seed : int
+        All its randomness comes from it.
+    session : int
+        The number of the participant's session.
+    device : str
+        A simulated device.
+    recordings : bool
+        Whether every tick and frame of a trial is kept.
+    observer : Observer, optional
+        Discriminates the intervals of a trial.
     answer : callable, optional
         Answers the pages of questions in place of the simulated participant.
 
     Raises
     ------
     StudyError
-        As in `rehearse`.
+        The id or the folder cannot be used, the device cannot be opened, or the session broke.
     """
     with rehearsal_rig(study, participant, seed, device) as rig:
         start = SessionStart(
