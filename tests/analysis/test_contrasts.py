@@ -12,13 +12,18 @@ from scipy.stats import ttest_ind, ttest_rel
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.levels.thresholds import Thresholds
-from study_app.analysis.planning.threshold_studies import detectable
+from study_app.analysis.planning.power_curves import Powers, detectable, power_markdown
+from study_app.analysis.planning.simulated_studies import plan
+from study_app.analysis.planning.threshold_studies import PrecisionResult, Precisions, threshold_markdown
 from study_app.analysis.report import write_report
 from study_app.analysis.report.write_report import report
-from study_app.protocol.model import Contrast
+from study_app.protocol.load import parse
+from study_app.protocol.model import Contrast, Protocol
+from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from tests.analysis.made_up import ITEMS, everybody, liquids, study
+from tests.analysis.power.test_power import felt_in
 from tests.studies import quick_pdfs
 
 pytestmark = pytest.mark.slow
@@ -126,7 +131,35 @@ def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> 
     assert pd.isna(second.statistic) or second.statistic is None
 
 
+def grouped(text: str, measure: str, block: str, sequence: str) -> Protocol:
+    """Return a study that compares two groups in a measure; the first group is twice as large."""
+    contrast = f'contrasts = [{{ measure = "{measure}", blocks = ["{block}"], groups = ["a", "b"] }}]'
+    groups = f"\n[groups.a]\nshare = 2\nsequence = {sequence}\n[groups.b]\nsequence = {sequence}\n"
+    return parse((text.replace("[analysis]\n", f"[analysis]\n{contrast}\n") + groups).encode(), "grouped.toml")
+
+
+def test_power_tells_the_smallest_difference_between_groups() -> None:
+    text = "\n".join(line for line in DELAYED.splitlines() if not line.startswith("contrasts"))
+    protocol = grouped(text, "threshold", "late", '["late", "prompt"]')
+    found = {("late", 20): PrecisionResult([np.log([[1.3], [1 / 1.3]])], [np.full(2, 0.2)])}
+    told = threshold_markdown(Precisions(protocol, (3, 18), 10, 10, 1, found))
+    spread = math.hypot(math.log(1.2), math.log(1.3))
+    assert f"| 20 | 3 | {spread:.0%} | – | – |" in told
+    half, smallest = (math.exp(spread * end) for end in detectable(12, 6, tail=0.025))
+    assert f"| 20 | 18 | {spread:.0%} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
+    text, _, rest = source_bytes("rek2024").decode().replace("format = 1", "format = 2").partition("sequence = ")
+    sequence, _, rest = rest.partition("]")
+    protocol = grouped(text + rest, "different", "delays", f"{sequence}]")
+    planned = plan(protocol, felt_in(protocol))
+    told = power_markdown(Powers(planned, (18,), 1, 1, 1, ()))
+    _, _, _, spread, _, smallest, _ = (cell.strip(" ±") for cell in told.splitlines()[-1].split("|"))
+    draw = np.random.default_rng(1).normal(size=(4000, 18)) * float(spread)
+    shown = ttest_ind(draw[:, :12] + float(smallest), draw[:, 12:], axis=1).pvalue <= 0.05
+    assert shown.mean() == pytest.approx(0.8, abs=0.03)
+
+
 def test_the_smallest_difference_is_that_of_published_tables() -> None:
-    """Cohen 1988, table 2.4.1: d = 0.5, two-sided α = .05, power .8: 34 pairs."""
-    assert detectable(34, 0.025) == pytest.approx(0.495, abs=0.001)
-    assert detectable(27, 0.05) == pytest.approx(0.4912, abs=0.002)
+    """Cohen 1988, tables 2.4.1: d = 0.5, two-sided α = .05, power .8: 34 pairs, or two groups of 64."""
+    assert detectable(34, tail=0.025)[1] == pytest.approx(0.495, abs=0.001)
+    assert detectable(27, tail=0.05)[1] == pytest.approx(0.4912, abs=0.002)
+    assert detectable(64, 64, tail=0.025)[1] == pytest.approx(0.4992, abs=0.001)

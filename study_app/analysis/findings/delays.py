@@ -146,7 +146,6 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
     place = 7
     row_place = 10
     what = "test of equivalence"
-    part = "comparisons with the shortest delay"
     kinds = ("delays",)
     waits = ("delays",)
     empty = ()
@@ -274,7 +273,6 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
     place = 6
     row_place = 9
     what = "lowest delay that shows"
-    part = "lowest delay"
     kinds = ("delays",)
     waits = ("delays",)
     empty = ()
@@ -336,7 +334,6 @@ class DetectionThreshold(Finding[Threshold | None]):
     place = 8
     row_place = 11
     what = "detection threshold"
-    part = "detection threshold"
     kinds = ("delays",)
     waits = ("delays",)
     figure_name = "threshold"
@@ -500,7 +497,6 @@ class Movement(Finding[None]):
 
     key = "movement"
     place = 11
-    part = "figure of movement"
     figure_name = "movement"
     figure_title = "Reaching over added delay"
 

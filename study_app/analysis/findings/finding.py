@@ -356,8 +356,6 @@ class Finding(Generic[R]):
         Its place in tests.csv.
     what : str
         What names it where it fails or is missing; empty where nothing is tested, so that there is no value.
-    part : str
-        What its part of the report's section of a block is called where it fails.
     kinds, sealed, waits : tuple of str
         The kinds of blocks in which it is tested once the key is open, in which it is tested while the key is sealed,
         and in which it is named as waiting for the key.
@@ -375,7 +373,6 @@ class Finding(Generic[R]):
     place: ClassVar[float]
     row_place: ClassVar[float] = 100
     what: ClassVar[str] = ""
-    part: ClassVar[str] = ""
     kinds: ClassVar[tuple[Kind, ...]] = KINDS
     sealed: ClassVar[tuple[Kind, ...]] = ()
     waits: ClassVar[tuple[Kind, ...]] = ()

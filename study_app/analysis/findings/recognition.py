@@ -59,7 +59,6 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
     place = 4
     row_place = 8
     what = "test of recognition"
-    part = "recognition"
     kinds = ("liquids",)
     waits = ("liquids",)
     figure_name = "recognition"

@@ -162,7 +162,6 @@ class SettingsDiffer(StatementTests):
     place = 2
     row_place = 2
     what = "test of settings"
-    part = "tests of settings"
     kinds = ("liquids", "views")
     sealed = KINDS
     statements = True
@@ -196,7 +195,6 @@ class DelayTrend(StatementTests):
     place = 5
     row_place = 3
     what = "test of a trend"
-    part = "trends"
     kinds = ("delays",)
     waits = ("delays",)
     statements = True
@@ -239,7 +237,6 @@ class SessionsDiffer(StatementTests):
     place = 12
     row_place = 4
     what = "comparison of sessions"
-    part = "sessions"
     sealed = KINDS
     asks = "sessions differ"
     title = "Do sessions differ?"
@@ -293,7 +290,6 @@ class OverAll(Finding[Outcome | None]):
     place = 1
     row_place = 1
     what = "test over all statements"
-    part = "test over all statements"
     waits = ("liquids", "views")
 
     @classmethod
@@ -349,7 +345,6 @@ class Effects(Finding[tuple[Effect, ...]]):
     key = "effects"
     place = 0.5
     what = "figure of effects"
-    part = "figure of effects"
     empty = ()
     figure_name = "effects"
     figure_title = "Differences from the first setting"
@@ -451,7 +446,6 @@ class Pairs(Finding[tuple[Pair, ...]]):
     place = 3
     row_place = 7
     what = "comparison of two settings"
-    part = "pairs"
     kinds = ("liquids", "views")
     waits = ("liquids", "views")
     empty = ()
@@ -523,7 +517,6 @@ class MixedModel(StatementTests):
     place = 13
     row_place = 5
     what = "mixed model"
-    part = "mixed model"
     asks = "settings differ, mixed model"
     title = "Mixed model"
 

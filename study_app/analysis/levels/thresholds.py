@@ -149,7 +149,7 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
             if one["analysed"].any()
         ]
         if own:
-            yield _with_compared(stimulus, _group(stimulus, standard, own), own)
+            yield _group(stimulus, standard, own)
         yield from own
 
 
@@ -236,26 +236,18 @@ def _reversal_mean(block: LevelBlock, stimulus: Stimulus, heard: pd.DataFrame) -
 
 
 def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate]) -> ThresholdEstimate:
-    mean, low, high = _mean(stimulus, [one.threshold for one in own], own)
-    return ThresholdEstimate(None, number_or_none(standard), len(own), mean, low, high)
+    """Return the random-effects mean of participants, at the published percentage too where all have theirs."""
 
+    def mean(levels: Sequence[float]) -> list[Any]:
+        found = group_mean([stimulus.coordinate(level) for level in levels], [one.variance or 0.0 for one in own])
+        return [None if end is None else stimulus.level_of(end) for end in (found.mean, found.low, found.high)]
 
-def _with_compared(stimulus: Stimulus, group: ThresholdEstimate, own: Sequence[ThresholdEstimate]) -> ThresholdEstimate:
-    """Return the group with its level at the published percentage, where all participants have theirs."""
+    group = ThresholdEstimate(None, number_or_none(standard), len(own), *mean([one.threshold for one in own]))
     compared = [one.compared for one in own if one.compared is not None]
     if len(compared) < len(own):
         return group
-    mean, low, high = _mean(stimulus, compared, own)
-    return replace(group, compared=mean, compared_low=low, compared_high=high)
-
-
-def _mean(
-    stimulus: Stimulus, levels: Sequence[float], own: Sequence[ThresholdEstimate]
-) -> tuple[float, float | None, float | None]:
-    """Return the random-effects mean of participants' levels with its interval, by the variances of thresholds."""
-    mean = group_mean([stimulus.coordinate(level) for level in levels], [one.variance or 0.0 for one in own])
-    low, high = (None if end is None else stimulus.level_of(end) for end in (mean.low, mean.high))
-    return stimulus.level_of(mean.mean), low, high
+    middle, low, high = mean(compared)
+    return replace(group, compared=middle, compared_low=low, compared_high=high)
 
 
 PLACES: Final = 40

@@ -15,6 +15,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
+from scipy.optimize import brentq
+from scipy.stats import nct
+from scipy.stats import t as student
 
 from study_app import __version__
 from study_app import figure_style as style
@@ -30,13 +33,18 @@ from study_app.analysis.planning.simulated_studies import (
     Counts,
     Plan,
     Planned,
+    people,
 )
 from study_app.analysis.results import enough
+from study_app.protocol.model import Contrast
 from study_app.psychophysics.grid import Z_95
 from study_app.store.output_files import write_files
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
 Question: TypeAlias = Literal["settings differ", "trend", "lowest delay", "equivalence", "contrast"]
+
+MANY: Final = 200
+"""So many simulated participants tell how far people differ."""
 
 WANTED: Final = 0.8
 """The power that "smallest detectable effect" and "participants needed" are about."""
@@ -189,16 +197,24 @@ def _equivalence_curves(block: Planned, counts: Counts, studies: int) -> Iterato
             yield Curve(block.id, "equivalence", item.id, "", block.names[delay], full, none, away, None)
 
 
-COLUMNS: Final = (
+OF_BLOCK: Final = (
     Column("study", "text", "Short name of the study, from its protocol."),
     Column("simulated", "flag", "true: all of these answers come from a model, none from people."),
     Column("block", "text", "Id of the block of trials."),
+)
+OF_STUDIES: Final = (
+    Column("participants", "integer", "Participants of each study.", minimum=2),
+    Column("studies", "integer", "Simulated studies.", minimum=1),
+)
+"""Columns of all tables of power."""
+
+COLUMNS: Final = (
+    *OF_BLOCK,
     Column("question", "text", "What is tested."),
     optional("item", "text", "Id of the statement; n/a where the test is over several."),
     optional("over", "text", "Over what, where not over one statement."),
     optional("setting", "text", "The delay that the test is about; n/a where it is about all."),
-    Column("participants", "integer", "Participants of each study.", minimum=2),
-    Column("studies", "integer", "Simulated studies.", minimum=1),
+    *OF_STUDIES,
     Column("power", "number", "Share of the studies that show it, under the answer model.", minimum=0, maximum=1),
     Column("power_low", "number", "Lower end of the 95 % interval of that share (Wilson).", minimum=0, maximum=1),
     Column("power_high", "number", "Upper end of it.", minimum=0, maximum=1),
@@ -274,7 +290,7 @@ def power_markdown(found: Powers) -> str:
                     first,
                     lambda curve, at: "beyond" if (points := curve.points(at)) is None else f"{points:.2f}",
                 )
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_between(found)]) + "\n"
 
 
 def _preface(found: Powers) -> list[str]:
@@ -308,6 +324,65 @@ def _preface(found: Powers) -> list[str]:
         )
     ]
     return lines
+
+
+def _between(found: Powers) -> Iterator[str]:
+    """Yield a table for each contrast of a statement between groups; the model knows no difference between groups."""
+    plan = found.plan
+    given = people(plan, MANY, found.seed, 0) if plan.between else ()
+    for one, shares in plan.between:
+        place = [block.id for block in plan.blocks].index(one.blocks[0])
+        item = [it.id for it in plan.blocks[place].items].index(one.measure)
+        spread = float(given[place].answers(1.0)[:, :, item].mean(axis=1).std(ddof=1))
+        said = f"SD: of the mean answers of simulated participants, {spread:.2f} points."
+        rows = [(one.measure, f"{spread:.2f}", spread)]
+        alpha = plan.decided.alphas[-1]
+        yield from smallest_differences(one, found.sizes, alpha, rows, "statement", said, "±{:.2f}".format, shares)
+
+
+def smallest_differences(
+    one: Contrast,
+    sizes: Sequence[int],
+    alpha: float,
+    rows: Sequence[tuple[str, str, float]],
+    first: str,
+    said: str,
+    written: Callable[[float], str],
+    shares: tuple[float, float] | None = None,
+) -> Iterator[str]:
+    """Yield a table of the smallest difference in a contrast that 80 % of studies show, as Markdown.
+
+    ``rows`` are its first cell, below the heading ``first``, and the standard deviation in words and as a number;
+    ``said`` says what that is. ``shares`` are those that two groups have of all participants; None: within people.
+    """
+    heads = (first, "participants", "SD", "half the 95 % interval", "smallest difference")
+    sides = "two-sided" if one.expected is None else "one-sided"
+    both = "" if shares is None else f" Of the participants {shares[0]:.0%} and {shares[1]:.0%} are in the two groups."
+    yield from ("", f"## Contrast: {one.described()}", "")
+    yield f"{said}{both} Smallest difference: what {WANTED:.0%} of studies show at α = {alpha:.2g}, {sides}."
+    yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
+    for name, words, spread in rows:
+        for n in sizes:
+            groups = [n] if shares is None else [int(n * share + 1e-9) for share in shares]
+            ends = ["–", "–"]
+            if min(groups) > 1:
+                reached = detectable(*groups, tail=alpha / (2 if one.expected is None else 1))
+                ends = [written(end * spread) for end in reached]
+            yield f"| {name} | {n} | {words} | {' | '.join(ends)} |"
+
+
+def detectable(n: int, second: int | None = None, *, tail: float) -> tuple[float, float]:
+    """Return half the 95 % interval and the smallest mean difference that 80 % of t tests show [standard deviations].
+
+    The tests are of ``n`` pairs, or of two groups of ``n`` and ``second`` people; ``tail`` is the probability of each
+    tail that counts as significant.
+    """
+    root, freedom = math.sqrt(n), n - 1
+    if second is not None:
+        root, freedom = math.sqrt(n * second / (n + second)), n + second - 2
+    critical = float(student.isf(tail, freedom))
+    least = float(brentq(lambda size: nct.sf(critical, freedom, size * root) - WANTED, 0.0, 30.0))
+    return float(student.ppf(0.975, freedom)) / root, least
 
 
 def _truly_equal(curves: list[Curve]) -> list[Curve]:

@@ -12,6 +12,7 @@ from pydantic import TypeAdapter
 from study_app import __version__
 from study_app.analysis.data.blocks import SPENDINGS, TRENDS, decisions, spoken
 from study_app.analysis.data.study_tables import Study
+from study_app.analysis.levels.thresholds import FAMILIES
 from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.report.html_page import bullets, heading, paragraph
 from study_app.analysis.results import counted, least, listed
@@ -25,7 +26,6 @@ from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
 from study_app.protocol.trials.stimuli import assumed_for
 from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
-from study_app.psychophysics.families import Family
 from study_app.psychophysics.precision import BETWEEN_PEOPLE
 from study_app.store.exclusions import named
 from study_app.store.sites.merged import DASH, folders_of
@@ -83,9 +83,6 @@ def read_commitment(folder: Path) -> Commitment | None:
             f"{path} does not end with what `liquid-study preregister` writes there ({type(error).__name__}): restore "
             "it from a copy, or remove it"
         ) from error
-
-
-FAMILIES: Final[dict[Family, str]] = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 
 
 def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:

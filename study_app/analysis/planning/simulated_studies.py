@@ -64,7 +64,10 @@ class Planned(StatementBlock):
 
 @dataclass(frozen=True)
 class Plan:
-    """A study that is planned; of its contrasts those of statements within people, and how many others there are."""
+    """A study that is planned; of its contrasts those of statements within people, and how many others there are.
+
+    Those of statements ``between`` groups come with the share of all participants that each of the two groups has.
+    """
 
     name: str
     title: str
@@ -73,6 +76,7 @@ class Plan:
     decided: Decided
     contrasts: tuple[Contrast, ...] = ()
     untested: int = 0
+    between: tuple[tuple[Contrast, tuple[float, float]], ...] = ()
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -92,9 +96,8 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     table = None if protocol.analysis is None else protocol.analysis.model_dump(mode="json")
     every = () if protocol.analysis is None else protocol.analysis.contrasts
     items = {block.id: {item.id for item in _statements(protocol, block)} for block in asked}
-    within = tuple(
-        one for one in every if one.groups is None and all(one.measure in items.get(it, ()) for it in one.blocks)
-    )
+    stated = [one for one in every if all(one.measure in items.get(it, ()) for it in one.blocks)]
+    within = tuple(one for one in stated if one.groups is None)
     return Plan(
         protocol.study.name,
         text_in(protocol.study.title, language),
@@ -103,7 +106,17 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
         read_decided([table]),
         within,
         len(every) - len(within),
+        tuple((one, shares) for one in stated if (shares := group_shares(protocol, one)) is not None),
     )
+
+
+def group_shares(protocol: Protocol, one: Contrast) -> tuple[float, float] | None:
+    """Return the share of all participants that each of two compared groups has; None where none are compared."""
+    if one.groups is None:
+        return None
+    whole = sum(group.share for group in protocol.groups.values())
+    first, second = (protocol.groups[name].share / whole for name in one.groups)
+    return first, second
 
 
 def compares_statements(protocol: Protocol) -> bool:

@@ -12,14 +12,12 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.stats import nct
-from scipy.stats import t as student
 
 from study_app import __version__
 from study_app.analysis.data.blocks import decisions, spoken
 from study_app.analysis.data.measures import Array
-from study_app.analysis.planning.power_curves import WANTED, interval
+from study_app.analysis.planning.power_curves import OF_BLOCK, OF_STUDIES, interval, smallest_differences
+from study_app.analysis.planning.simulated_studies import group_shares
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.errors import AnalysisError
@@ -31,7 +29,7 @@ from study_app.protocol.checks.expected_precision import (
     ThresholdPlan,
     precision_plan,
 )
-from study_app.protocol.model import Protocol
+from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.table import text_in
 from study_app.protocol.trials.tracks import standards_of
 from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
@@ -196,17 +194,14 @@ def sweep(
 
 
 COLUMNS: Final = (
-    Column("study", "text", "Short name of the study, from its protocol."),
-    Column("simulated", "flag", "true: all of these answers come from a model, none from people."),
-    Column("block", "text", "Id of the block of trials."),
+    *OF_BLOCK,
     Column(
         "trials",
         "integer",
         "Trials of each standard, comparison or rated level; of magnitude estimation, all.",
         minimum=1,
     ),
-    Column("participants", "integer", "Participants of each study.", minimum=2),
-    Column("studies", "integer", "Simulated studies.", minimum=1),
+    *OF_STUDIES,
     optional(
         "spread",
         "number",
@@ -311,47 +306,32 @@ def threshold_markdown(precisions: Precisions) -> str:
 
 
 def _contrasts(precisions: Precisions) -> Iterator[str]:
-    """Yield for each contrast of two thresholds a table of the smallest difference that 80 % of studies show."""
+    """Yield for each contrast of thresholds a table of the smallest difference that 80 % of studies show."""
     if (decided := precisions.protocol.analysis) is None:
         return
     for one in decided.contrasts:
-        rows = [] if one.measure != "threshold" or len(one.blocks) < 2 else [*_spreads(precisions, *one.blocks)]
+        rows = [*_spreads(precisions, one)] if one.measure == "threshold" else []
         if not rows:
             continue
-        alpha = decisions(precisions.protocol).alphas[-1]
-        tail = alpha / (2 if one.expected is None else 1)
-        yield from ("", f"## Contrast: {one.described()}", "")
-        yield (
-            "SD: of the difference of one participant, that of both estimates and of people, whose differences vary by "
-            f"a factor of {BETWEEN_PEOPLE:g}. Smallest difference: what {WANTED:.0%} of studies show at α = "
-            f"{alpha:.2g}, {'two-sided' if one.expected is None else 'one-sided'}."
-        )
-        heads = ("trials per standard", "participants", "SD", "half the 95 % interval", "smallest difference")
-        yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
-        for trials, spread in rows:
-            for n in precisions.sizes:
-                half = float(student.ppf(0.975, n - 1)) * spread / math.sqrt(n)
-                ends = (f"×/÷ {math.exp(end):.2f}" for end in (half, detectable(n, tail) * spread))
-                yield f"| {trials} | {n} | {spread:.0%} | {' | '.join(ends)} |"
+        whose = "one participant's threshold: the estimate's, and that of people, who differ"
+        if one.groups is None:
+            whose = "the difference of one participant: that of both estimates, and of people, whose differences vary"
+        yield from smallest_differences(
+            one, precisions.sizes, decisions(precisions.protocol).alphas[-1], rows, "trials per standard",
+            f"SD: of {whose} by a factor of {BETWEEN_PEOPLE:g}.", lambda end: f"×/÷ {math.exp(end):.2f}",
+            group_shares(precisions.protocol, one),
+        )  # fmt: skip
 
 
-def _spreads(precisions: Precisions, first: str, second: str) -> Iterator[tuple[int, float]]:
-    """Yield numbers of trials of two blocks, and the standard deviation of a participant's difference with them."""
-    standards = [len(standards_of(precisions.protocol, precisions.protocol.blocks[block])) for block in (first, second)]
-    for trials in (trials for block, trials in precisions.found if block == first):
-        both = [found for block in (first, second) if (found := precisions.found.get((block, trials))) is not None]
-        spreads = [found.spread / math.sqrt(count) for found, count in zip(both, standards, strict=False)]
-        if len(both) == 2 and all(map(math.isfinite, spreads)):
-            yield trials, math.hypot(math.log(BETWEEN_PEOPLE), *spreads)
-
-
-def detectable(n: int, tail: float) -> float:
-    """Return the smallest mean difference, in standard deviations, that 80 % of t tests of ``n`` pairs show.
-
-    ``tail`` is the probability of each tail that counts as significant.
-    """
-    critical = float(student.isf(tail, n - 1))
-    return float(brentq(lambda size: nct.sf(critical, n - 1, size * math.sqrt(n)) - WANTED, 0.0, 30.0))
+def _spreads(precisions: Precisions, one: Contrast) -> Iterator[tuple[str, str, float]]:
+    """Yield numbers of trials, and the standard deviation of what is compared of a participant with them."""
+    standards = [len(standards_of(precisions.protocol, precisions.protocol.blocks[block])) for block in one.blocks]
+    for trials in (trials for block, trials in precisions.found if block == one.blocks[0]):
+        held = [found for block in one.blocks if (found := precisions.found.get((block, trials))) is not None]
+        spreads = [found.spread / math.sqrt(count) for found, count in zip(held, standards, strict=False)]
+        if len(held) == len(one.blocks) and all(map(math.isfinite, spreads)):
+            spread = math.hypot(math.log(BETWEEN_PEOPLE), *spreads)
+            yield str(trials), f"{spread:.0%}", spread
 
 
 def _assumed(plans_of_block: Mapping[int, Plan]) -> str:

@@ -330,10 +330,10 @@ def _parts(
     if said := said_of_presentations(found):
         yield "presentations", lambda: [paragraph(" ".join(said))]
     effects, *others = all_findings()
-    yield effects.part, effects(found, results, pictures).section
+    yield effects.what, effects(found, results, pictures).section
     yield "figure of answers", lambda: drawn(pictures, found.kind)
     for finding in others:
-        yield finding.part, finding(found, results, pictures).section
+        yield finding.what or finding.figure_title, finding(found, results, pictures).section
     if found.absent:
         lines = [f"{line[:1].upper()}{line[1:]}" for line in missing(found)]
         yield "what is not here", lambda: (heading(3, "What is not here, and why"), bullets(lines))
