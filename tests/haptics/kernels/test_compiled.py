@@ -28,34 +28,22 @@ def test_code_of_the_servo_that_would_allocate_does_not_compile(decorator):
         make(3)
 
 
-@about_compiled_code
-@pytest.mark.parametrize("decorator", [kernel, part])
-def test_python_calls_a_function_that_compiled_code_called_first(decorator):
-    @decorator
-    def half(value):
-        return value / 2
-
-    @kernel
-    def whole(value):
-        return 2 * half(value)
-
-    assert whole(3.0) == 3.0
-    assert half(3.0) == 1.5
-    assert whole(5.0) == 5.0
+TWICE = """
+from study_app.haptics.kernels import compiled
+@compiled.kernel
+def twice(x): return 2 * x
+assert twice(21) == 42
+print(compiled.CACHE)
+"""
 
 
-def said_at_start(folder: Path, environment: dict[str, str]) -> tuple[str, str]:
-    """Start an interpreter that compiles a file in ``folder``; return where it keeps that, and what it said."""
+def said_at_start(folder: Path, environment: dict[str, str], text: str = TWICE, *arguments: str) -> tuple[str, str]:
+    """Run a program whose file is in ``folder``; return what it printed, and what it logged."""
     program = folder / "program.py"
-    program.write_text(
-        "from study_app.haptics.kernels import compiled\n"
-        "@compiled.kernel\n"
-        "def twice(x): return 2 * x\n"
-        "assert twice(21) == 42\n"
-        "print(compiled.CACHE)"
-    )
+    if not program.exists():  # its cache is that of its time of change
+        program.write_text(text)
     done = subprocess.run(
-        [sys.executable, str(program)],
+        [sys.executable, str(program), *arguments],
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])} | environment,
         capture_output=True,
         text=True,
@@ -63,6 +51,39 @@ def said_at_start(folder: Path, environment: dict[str, str]) -> tuple[str, str]:
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip(), done.stderr
+
+
+STEP = """
+import sys
+from study_app.haptics.kernels.compiled import kernel, part
+@DECORATOR
+def half(value): return value / 2
+@kernel
+def once(value): return 2 * half(value)
+@kernel
+def twice(value): return 4 * half(value)
+def say():
+    (code,) = half.overloads.values()
+    print(type(code.library).__name__, sum(half.stats.cache_hits.values()), end=";")
+caller, factor = {"once": (once, 1), "twice": (twice, 2)}[sys.argv[1]]
+assert caller(3.0) == 3.0 * factor
+say()
+assert half(3.0) == 1.5
+assert caller(5.0) == 5.0 * factor
+say()
+"""
+
+
+@pytest.mark.slow
+@about_compiled_code
+@pytest.mark.parametrize("decorator", ["kernel", "part"])
+def test_a_step_is_code_for_its_callers_until_python_calls_it_also_from_the_cache(
+    decorator: str, tmp_path: Path
+) -> None:
+    program, cache = STEP.replace("DECORATOR", decorator), {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    for caller, hits in (("once", "00"), ("twice", "12")):
+        said, _ = said_at_start(tmp_path, cache, program, caller)
+        assert said == f"_StepCode {hits[0]};JITCodeLibrary {hits[1]};"
 
 
 @pytest.fixture
