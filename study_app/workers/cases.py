@@ -10,6 +10,7 @@ import platform
 import re
 import socket
 import threading
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures import wait as wait_for
@@ -28,6 +29,7 @@ from study_app.workers.server import CONTEXT, compute_in_one_thread, ignore_inte
 LIBRARIES: Final = ("numpy", "scipy", "numba", "pandas", "ngsolve")
 ADDRESS: Final = re.compile(r"(?:tcp|tls)://(?:\[(?P<ipv6>[0-9a-fA-F:]+)\]|(?P<host>[^\s:/\[\]]+)):(?P<port>\d{1,5})")
 CONNECT_S: Final = 10.0
+LONGEST_GREETING: Final = 1 << 16
 CLOSE_S: Final = 2.0
 WATCH_S: Final = 0.5
 P = ParamSpec("P")
@@ -105,7 +107,7 @@ class ClusterExecutor(Executor):
                 "or compute here with --workers"
             ) from error
         for name in _LOGGERS:
-            logging.getLogger(name).setLevel(logging.CRITICAL)
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         try:
             self._client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError, MemoryError) as error:
@@ -210,10 +212,25 @@ def _check_that_something_answers(address: str) -> None:
     try:
         place = (parts["ipv6"] or parts["host"], int(parts["port"]))
         with socket.create_connection(place, timeout=CONNECT_S) as connection:
-            if address.startswith("tcp:") and not connection.recv(1):  # a scheduler speaks first
-                raise ConnectionError("another program answers there")
+            if address.startswith("tcp:"):
+                _receive_greeting(connection)
     except (OSError, OverflowError) as error:
         raise _no_scheduler(address, getattr(error, "strerror", None) or str(error)) from error
+
+
+def _receive_greeting(connection: socket.socket) -> None:
+    """Receive what a scheduler sends first: a length as eight bytes, and so many more."""
+    until_s = time.monotonic() + CONNECT_S
+    came, wanted = b"", 8
+    while len(came) < wanted:
+        if (left_s := until_s - time.monotonic()) <= 0.0:
+            raise TimeoutError("timed out")
+        connection.settimeout(left_s)
+        more = connection.recv(wanted - len(came))
+        came += more
+        wanted += int.from_bytes(came, "little") if len(came) == wanted == 8 else 0
+        if not more or wanted > LONGEST_GREETING:
+            raise ConnectionError("another program answers there")
 
 
 def _no_scheduler(address: str, why: str) -> WorkerError:

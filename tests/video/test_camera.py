@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
+from typing import Final
 
 import pytest
 
@@ -16,7 +17,9 @@ from study_app.errors import VideoError
 
 pytest.importorskip("av", reason="the optional extra video is not installed")
 
+from study_app.video import sources
 from study_app.video.sources import Camera, _Numbers
+from tests.strangers import Answer, dripped, flooded, sent, serving
 from tests.video.clips import number_in
 from tests.video.test_footage import pixels_of
 
@@ -110,6 +113,35 @@ def test_a_camera_that_sends_nothing_without_closing_is_said_in_words() -> None:
 def test_no_camera_is_refused_in_one_line(source: str, why: str) -> None:
     with pytest.raises(VideoError, match=why):
         Camera(source, time.monotonic_ns, 0.0)
+
+
+HTTP: Final = b"HTTP/1.1 200 OK\r\nContent-Type: "
+IMAGES: Final = (
+    HTTP + b"multipart/x-mixed-replace; boundary=a\r\n\r\n--a\r\nContent-Type: image/jpeg\r\nContent-Length: "
+)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        sent(),
+        lambda *_: dripped(HTTP + b"video/mp2t\r\n"),
+        lambda *_: dripped(HTTP + b"video/mp2t\r\n\r\nx"),
+        lambda *_: flooded(HTTP + b"video/mp2t\r\n\r\n", b"x"),
+        lambda *_: flooded(IMAGES + b"%d\r\n\r\n" % (1 << 62), b"x"),
+    ],
+    ids=["silent", "head dripped", "body dripped", "flooded", "huge image"],
+)
+def test_another_program_in_place_of_a_camera_is_one_line_in_time(
+    answer: Answer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sources, "OPENS_S", 1.0)
+    with serving(answer) as port:
+        began_s = time.monotonic()
+        words = "cannot be used: (no picture in 1 s|no data came in time|Invalid data found when processing input)$"
+        with pytest.raises(VideoError, match=words):
+            Camera(f"http://127.0.0.1:{port}/", time.monotonic_ns, 0.0)
+        assert time.monotonic() - began_s < 3.0
 
 
 def test_numbers_follow_time_stamps() -> None:

@@ -1,11 +1,11 @@
 """A Dask cluster of two worker processes: the same results, killed workers, and one line where there is none."""
 
-import socket
 import sys
-import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Final
 
 import psutil
 import pytest
@@ -15,6 +15,7 @@ from study_app.errors import StudyError, WorkerError
 from study_app.workers import cases
 from study_app.workers.cases import environment
 from study_app.workers.executors import Workers, open_executor
+from tests.strangers import CLOSE, Answer, dripped, flooded, sent, serving
 from tests.workers.local_cluster import INSTALLED, MISSING, local_cluster
 from tests.workers.worker_cases import draw, killed_once, refuse
 
@@ -96,31 +97,33 @@ def test_the_digest_of_a_program_is_of_names_and_contents_of_its_files(
     assert found[3] == found[4]  # what is no part of the program
 
 
-@pytest.fixture
-def other_program() -> Iterator[str]:
-    """Serve a program that closes every connection without a word."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-
-        def serve() -> None:
-            try:
-                while True:
-                    server.accept()[0].close()
-            except OSError:
-                return
-
-        serving = threading.Thread(target=serve)
-        serving.start()
-        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        server.shutdown(socket.SHUT_RDWR)
-        serving.join()
+OTHER_PROGRAMS: Final[Mapping[str, Answer]] = {
+    "ends at once": sent(CLOSE),
+    "silent": sent(),
+    "one byte": sent(b"x"),
+    "dripped": lambda *_: dripped(b"\x40" + bytes(8)),
+    "greeting dripped": lambda *_: dripped((60_000).to_bytes(8, "little")),
+    "text": lambda *_: flooded(b"", b"HTTP/1.1 200 OK\r\n"),
+    "huge": lambda *_: flooded((1 << 62).to_bytes(8, "little"), b"x"),
+    "8 GiB": lambda *_: flooded((1 << 33).to_bytes(8, "little"), b"x"),
+}
 
 
 @pytest.fixture
-def silent_program(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """Serve a program that waits for its client to speak, as a web server does."""
-    monkeypatch.setattr(cases, "CONNECT_S", 0.2)
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+def other_program(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    monkeypatch.setattr(cases, "CONNECT_S", 0.5)
+    with serving(OTHER_PROGRAMS[request.param], at_once=True) as port:
+        yield f"tcp://127.0.0.1:{port}"
+
+
+@pytest.mark.parametrize("other_program", OTHER_PROGRAMS, indirect=True)
+def test_another_program_at_the_address_of_a_cluster_is_one_line_in_time(other_program: str) -> None:
+    began_s = time.monotonic()
+    with pytest.raises(
+        WorkerError, match=r"no Dask scheduler answers at .* \((timed out|another program answers there)\)"
+    ):
+        open_executor(Workers(cluster=other_program))
+    assert time.monotonic() - began_s < 3.0
 
 
 @pytest.mark.parametrize(
@@ -132,18 +135,11 @@ def silent_program(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
         ("tcp://127.0.0.1:99999", "no Dask scheduler answers at tcp://127.0.0.1:99999"),
         ("tcp://127.0.0.1:1", "(Connection refused)"),
         ("tcp://no-such-host.invalid:8786", "no Dask scheduler answers at tcp://no-such-host.invalid:8786"),
-        ("other_program", "(another program answers there)"),
-        ("silent_program", "(timed out)"),
     ],
 )
 def test_a_cluster_that_is_not_there_is_one_line_and_exit_code_2(
-    address: str,
-    said: str,
-    request: pytest.FixtureRequest,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    address: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    address = request.getfixturevalue(address) if address.endswith("_program") else address
     monkeypatch.setattr("sys.argv", ["liquid-study", "power", "rek2024", "--cluster", address])
     with pytest.raises(SystemExit) as ended:
         main()

@@ -13,15 +13,13 @@ import numpy as np
 from study_app.devices.descriptor import OpenRequest
 from study_app.devices.emulators.inverse3_service import Service, service_calls
 from study_app.devices.inverse3.device import FORCE_LIMIT_N, WORKSPACE_M, Inverse3Device
-from study_app.devices.inverse3.service import FAILURES, Link, TransferCalls
+from study_app.devices.inverse3.service import FAILURES, LONGEST, Link, TransferCalls
 
 FAULT_AFTER = 1000  # commands
 
 
 class EmulatedLink:
     """The byte stream to an emulated service: nothing waits, since each command is carried out at once."""
-
-    emulated = True
 
     def __init__(self, service: Service) -> None:
         self._service = service
@@ -33,12 +31,10 @@ class EmulatedLink:
     def send(self, data: bytes) -> None:
         self._service.take_bytes(data)
 
-    def receive(self, timeout_s: float) -> bytes:
+    def receive(self, most: int = LONGEST) -> bytes:
         data = self._service.give_bytes()
-        if not data and self._service.state.ended:
-            raise FAILURES.failure("closed", "while it was opened")
-        if not data:
-            raise FAILURES.failure("no-reply", f"nothing within {timeout_s:g} s")
+        if not data and not self._service.state.ended:
+            raise FAILURES.failure("no-reply")
         return data
 
     def now_s(self) -> float:

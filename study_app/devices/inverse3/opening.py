@@ -7,7 +7,6 @@ pipeline), "Mount & Workspace Transforms" (presets), "WebSocket Protocol" step 1
 import base64
 import hashlib
 import json
-import re
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices.inverse3.service import FAILURES, Link
+from study_app.devices.inverse3.service import FAILURES, ID, LONGEST, Link, shortened
 from study_app.devices.inverse3.wire import CLOSE, INCOMPLETE, TEXT, VIOLATION, build_frame, parse_header
 from study_app.errors import DeviceError
 
@@ -94,15 +93,11 @@ def _differing(place: str, value: Any, required: Any) -> list[str]:
             inner = value.get(key) if isinstance(value, Mapping) else None
             found += _differing(name, inner, wanted)
         return found
-    return [] if value == required else [f"{place} is {value!r}, and {required!r} is required"]
+    return [] if value == required else [f"{place} is {shortened(value)}, and {required!r} is required"]
 
 
-REPLY_S: Final = 2.0
 ROUND_TRIPS: Final = 50
 _MAGIC: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # RFC 6455 §1.3
-_LONGEST_HEAD: Final = 8192
-_ID: Final = re.compile(r"[!#-\[\]-~]{1,64}")
-"""An id goes into each command as it is: printable ASCII but spaces, quotes and backslashes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,9 +125,7 @@ class Messages:
             b"Sec-WebSocket-Key: %b\r\nSec-WebSocket-Version: 13\r\n\r\n" % (host.encode(), key)
         )
         while b"\r\n\r\n" not in self._came:
-            if len(self._came) > _LONGEST_HEAD:
-                raise FAILURES.failure("not-websocket", "no end of the answer's head")
-            self._came += self._link.receive(REPLY_S)
+            self._receive_more("not-websocket")
         head, _, self._came = self._came.partition(b"\r\n\r\n")
         status, *lines = head.split(b"\r\n")
         fields = dict(line.lower().partition(b":")[::2] for line in lines)
@@ -143,7 +136,16 @@ class Messages:
             or fields.get(b"upgrade", b"").strip() != b"websocket"
             or [value.strip() for value in accept.values()] != [wanted]
         ):
-            raise FAILURES.failure("not-websocket", status.decode("latin-1"))
+            raise FAILURES.failure("not-websocket", shortened(status.decode("latin-1")))
+
+    def _receive_more(self, mode: str) -> None:
+        """Receive more of a message; one longer than `LONGEST` is the failure of a ``mode``."""
+        if len(self._came) >= LONGEST:
+            raise FAILURES.failure(mode, f"more than {LONGEST:,} bytes at once")
+        more = self._link.receive(LONGEST - len(self._came))
+        if not more:
+            raise FAILURES.failure("closed", "while it was opened")
+        self._came += more
 
     def send(self, message: Mapping[str, Any]) -> None:
         text = np.frombuffer(json.dumps(message, separators=(",", ":")).encode(), np.uint8)
@@ -158,6 +160,8 @@ class Messages:
             if size == VIOLATION:
                 raise FAILURES.failure("protocol")
             opcode, length = (int(value) for value in self._header)
+            if length > LONGEST:
+                raise FAILURES.failure("protocol", f"a message of {length:,} bytes, and {LONGEST:,} are permitted")
             if size != INCOMPLETE and len(self._came) >= size + length:
                 text, self._came = self._came[size : size + length], self._came[size + length :]
                 if opcode == CLOSE:
@@ -165,7 +169,7 @@ class Messages:
                 if opcode == TEXT:
                     return _object(text)
                 continue
-            self._came += self._link.receive(REPLY_S)
+            self._receive_more("protocol")
 
     def ask(self, message: Mapping[str, Any]) -> dict[str, Any]:
         self.send(message)
@@ -179,16 +183,13 @@ class Messages:
 
 def _object(text: bytes) -> dict[str, Any]:
     try:
-        found = json.loads(text, parse_constant=_refuse)
+        found = json.loads(text)
+        json.dumps(found, ensure_ascii=False, allow_nan=False).encode()  # as a receipt holds it
     except (ValueError, RecursionError) as error:
-        raise FAILURES.failure("not-json", str(error)) from None
+        raise FAILURES.failure("not-json", shortened(str(error))) from None
     if not isinstance(found, dict):
         raise FAILURES.failure("not-json", "it is not an object")
     return found
-
-
-def _refuse(word: str) -> None:
-    raise ValueError(f"{word} is not a number in JSON")
 
 
 def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session:
@@ -229,15 +230,18 @@ def find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: b
     entries = {str(entry["device_id"]): entry for entry in listed if isinstance(entry, dict) and "device_id" in entry}
     for name, entry in entries.items():
         if not wanted_id or name == wanted_id:
-            if not _ID.fullmatch(name):
+            if not ID.fullmatch(name):
                 raise DeviceError(
                     f"the Inverse Service lists a device whose id {name[:16]!r} has {len(name)} characters; 1 to 64 "
                     "printable ASCII characters are permitted, no spaces, quotes or backslashes: update this program"
                 )
-            if inventory and "filters" not in (entry.get("config") or {}):
+            config, status = entry.get("config"), entry.get("status", {})
+            if inventory and not (isinstance(config, dict) and "filters" in config):
                 raise FAILURES.failure("version", "format 3.1")
+            if not isinstance(status, dict):
+                raise FAILURES.failure("version", f"status is {shortened(status)}")
             return entry
-    raise FAILURES.failure("no-device", f"listed: {', '.join(entries) or 'none'}")
+    raise FAILURES.failure("no-device", f"listed: {shortened(list(entries)) if entries else 'none'}")
 
 
 def check_status(status: Mapping[str, Any], *, at_opening: bool) -> None:

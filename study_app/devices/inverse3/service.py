@@ -1,28 +1,35 @@
 """The Inverse Service: the byte stream to it, and which devices it lists. Loads no compiler."""
 
-import contextlib
 import ctypes
+import io
 import json
+import re
 import reprlib
 import socket
 import sys
 import time
-import urllib.request
-from contextlib import suppress
-from http.client import HTTPException
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
+from http import HTTPStatus
+from http.client import HTTPException, HTTPResponse
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Protocol
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
-from study_app.devices.doctor import read_failures
+from study_app.devices.doctor import DeviceFailure, read_failures
 
 FAILURES: Final = read_failures(Path(__file__).with_name("failures.toml"))
 
 HOST: Final = "127.0.0.1"
 PORT: Final = 10001
 """Of the simulation channel: docs.haply.co 3.5.x, "WebSocket Protocol" and "Settings Reference"."""
-CONNECT_S: Final = 2.0
+OPENS_S: Final = 2.0
+"""Time for all that opens a session, from the connection to the last reply. [choice]"""
+ANSWER_S: Final = 0.5
+"""Time for an answer over HTTP, from the connection to its last byte. [choice]"""
 CLOSE_S: Final = 0.2
+LONGEST: Final = 1 << 16
+"""Most bytes of a message, of an answer, and of what is not read yet."""
 
 
 class TransferCalls(NamedTuple):
@@ -34,20 +41,18 @@ class TransferCalls(NamedTuple):
 
 
 class Link(Protocol):
-    """A byte stream; ``emulated``: it is not a socket, and its time is the emulator's."""
-
-    emulated: bool
+    """A byte stream."""
 
     def calls(self) -> TransferCalls:
         """Return it as compiled code sees it; from then on nothing waits."""
         ...
 
     def send(self, data: bytes) -> None:
-        """Send all of it; raise an ``DeviceFailure`` where it does not go."""
+        """Send all of it; raise a ``DeviceFailure`` where it does not go in time."""
         ...
 
-    def receive(self, timeout_s: float) -> bytes:
-        """Return what came, at least a byte; raise an ``DeviceFailure`` where nothing comes in time."""
+    def receive(self, most: int = LONGEST) -> bytes:
+        """Return what came, nothing at its end; raise a ``DeviceFailure`` where nothing comes in time."""
         ...
 
     def now_s(self) -> float: ...
@@ -57,14 +62,13 @@ class Link(Protocol):
         ...
 
 
-class SocketLink:
-    """A TCP connection to ``host:port``, without Nagle's algorithm."""
+class SocketLink(io.RawIOBase):
+    """A TCP connection to ``host:port``, without Nagle's algorithm: for ``within_s``, and then by `calls` alone."""
 
-    emulated = False
-
-    def __init__(self, host: str = HOST, port: int = PORT) -> None:
+    def __init__(self, host: str = HOST, port: int = PORT, within_s: float = OPENS_S) -> None:
+        self._within_s, self._until_s = within_s, time.monotonic() + within_s
         try:
-            self._socket = socket.create_connection((host, port), CONNECT_S)
+            self._socket = socket.create_connection((host, port), within_s)
         except OSError as error:
             raise FAILURES.failure("no-service", f"{host}:{port}: {error.strerror or error}") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -73,23 +77,40 @@ class SocketLink:
         self._socket.setblocking(False)
         return TransferCalls(self._socket.fileno(), *_addresses())
 
-    def send(self, data: bytes) -> None:
+    @contextmanager
+    def _in_time(self) -> Iterator[None]:
+        """Give a call the time that is left, and name its failure."""
+        left_s = self._until_s - time.monotonic()
+        late = FAILURES.failure("no-reply", f"not all within {self._within_s:g} s")
+        if left_s <= 0.0:
+            raise late
         try:
-            self._socket.sendall(data)
+            self._socket.settimeout(left_s)
+            yield
+        except TimeoutError as error:
+            raise late from error
         except OSError as error:
             raise FAILURES.failure("closed", str(error.strerror or error)) from error
 
-    def receive(self, timeout_s: float) -> bytes:
-        self._socket.settimeout(timeout_s)
-        try:
-            data = self._socket.recv(1 << 16)
-        except TimeoutError as error:
-            raise FAILURES.failure("no-reply", f"nothing within {timeout_s:g} s") from error
-        except OSError as error:
-            raise FAILURES.failure("closed", str(error.strerror or error)) from error
-        if not data:
-            raise FAILURES.failure("closed", "while it was opened")
-        return data
+    def send(self, data: bytes) -> None:
+        with self._in_time():
+            self._socket.sendall(data)
+
+    def receive(self, most: int = LONGEST) -> bytes:
+        with self._in_time():
+            return self._socket.recv(most)
+
+    def makefile(self, _mode: str) -> io.BufferedReader:
+        """Return what comes as a file, as a socket does for the parser of HTTP."""
+        return io.BufferedReader(self)
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        data = self.receive(len(buffer))
+        buffer[: len(data)] = data
+        return len(data)
 
     def now_s(self) -> float:
         return time.monotonic()
@@ -112,10 +133,8 @@ def _addresses() -> tuple[int, int]:
 
 PORTS: Final = (10001, 10000)
 """Of HTTP: docs.haply.co 3.5.x, "Device Configuration" uses the first, "Settings Reference" names the second."""
-ANSWER_S: Final = 0.5
-LONGEST: Final = 80
-_DIRECT: Final = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-"""Opens without a proxy of the system: the service is in the local network."""
+ID: Final = re.compile(r"[!#-\[\]-~]{1,64}")
+"""An id goes into each command as it is: printable ASCII but spaces, quotes and backslashes."""
 CAN: Final = "force as commanded by the Inverse Service 3.5 or later (Haply Hub); not proved on hardware"
 
 
@@ -125,11 +144,16 @@ def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:
     by = "Inverse Service"
     if not isinstance(found, dict):
         return Backend("inverse3", by, NOT_AVAILABLE, CAN, FAILURES.sentence("no-service"))
-    listed = found.get("inverse3", [])
-    names = [str(entry.get("device_id")) for entry in listed if isinstance(entry, dict)]
-    if not names:
-        return Backend("inverse3", by, NONE, CAN, FAILURES.sentence("no-device"))
-    return Backend("inverse3", by, "connected: " + ", ".join(names), CAN)
+    listed = found.get("inverse3")
+    ids = [entry.get("device_id") for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
+    if names := [name for name in ids if isinstance(name, str) and ID.fullmatch(name)]:
+        return Backend("inverse3", by, f"connected: {', '.join(names)}", CAN)
+    return Backend("inverse3", by, NONE, CAN, FAILURES.sentence("no-device"))
+
+
+def shortened(value: Any) -> str:
+    """Return what a service sent, for a message: in one line, and not long."""
+    return reprlib.repr(value)[:80]
 
 
 def force_scale(host: str, ports: tuple[int, ...] = PORTS) -> Any:
@@ -148,18 +172,27 @@ def check_force_scale(answer: Any) -> float:
     """
     scale = answer.get("value", answer.get("devices/force_scale")) if isinstance(answer, dict) else answer
     if type(scale) not in {int, float}:  # a bool is none
-        where = f"within {ANSWER_S:g} s" if answer is None else f"in {reprlib.repr(answer)[:LONGEST]}"
+        where = f"within {ANSWER_S:g} s" if answer is None else f"in {shortened(answer)}"
         raise FAILURES.failure("unknown-scale", f"no number {where}")
     if scale != 1:
-        raise FAILURES.failure("settings", f"devices/force_scale is {reprlib.repr(scale)}, and 1 is required")
+        raise FAILURES.failure("settings", f"devices/force_scale is {shortened(scale)}, and 1 is required")
     return 1.0
 
 
 def ask(host: str, path: str, ports: tuple[int, ...] = PORTS) -> Any:
-    """Return what the service answers to a GET as JSON; None where nothing at these ports does."""
+    """Return what the service answers to a GET as JSON; None where nothing at these ports does in `ANSWER_S`.
+
+    The connection uses no proxy of the system: the service is in the local network.
+    """
+    until_s = time.monotonic() + ANSWER_S
     for port in ports:
-        with contextlib.suppress(OSError, HTTPException, ValueError, RecursionError):
-            request = f"http://{host}:{port}{path}"
-            with _DIRECT.open(request, timeout=ANSWER_S) as answer:
-                return json.loads(answer.read(1 << 20))
+        with (
+            suppress(DeviceFailure, HTTPException, ValueError, RecursionError),
+            closing(SocketLink(host, port, max(until_s - time.monotonic(), 0.01))) as link,
+        ):
+            link.send(f"GET {path} HTTP/1.1\r\nHost: {host}:{port}\r\nConnection: close\r\n\r\n".encode())
+            answer = HTTPResponse(link)  # type: ignore[arg-type] # it needs no more of a socket than its file
+            answer.begin()
+            if answer.status == HTTPStatus.OK:
+                return json.loads(answer.read(LONGEST))
     return None

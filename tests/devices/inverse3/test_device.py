@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from study_app.devices.emulators import inverse3_service
 from study_app.devices.emulators.inverse3 import EmulatedInverse3, EmulatedLink
 from study_app.devices.emulators.inverse3_service import Service
 from study_app.devices.inverse3 import opening
@@ -15,9 +16,9 @@ from study_app.devices.inverse3.device import Inverse3Device, address
 from study_app.devices.inverse3.exchange import MOST_UNANSWERED, MOST_WEAKER
 from study_app.devices.inverse3.opening import find_device
 from study_app.devices.registry import open_device
-from study_app.errors import DeviceError, DeviceNotFound
+from study_app.errors import DeviceError, DeviceNotFound, ServoFault
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
-from study_app.haptics.model.layout import MEASURED_VELOCITY, STATUS_OK
+from study_app.haptics.model.layout import LIMITER_GLITCH, MEASURED_VELOCITY, STATUS_OK
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
@@ -268,3 +269,23 @@ def test_states_that_come_slowly_or_in_pieces_are_used_and_their_delay_is_measur
         assert samples["delay_ticks"][-1] == delay_ticks
         assert np.linalg.norm(service.force_n) > 1.0
         servo.stop()
+
+
+def test_a_position_far_away_is_rejected_while_the_force_fades_and_the_servo_ends(
+    service: Service, device: EmulatedInverse3, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    far_away = inverse3_service.faulty_bytes("infinite", service._message()).replace(b"1e999", b"1e300")
+    monkeypatch.setattr(inverse3_service, "faulty_bytes", lambda *_: far_away)
+    servo = stroke(device, service)
+    reader = servo.telemetry.reader()
+    before_n = np.linalg.norm(service.force_n)
+    service.take("infinite")
+    assert 40 < servo.advance(100) < 60
+    samples = reader.read()
+    sizes_n = np.linalg.norm(samples["device_force_n"], axis=1)
+    assert (samples["position_m"][-40:, 0] == 1e300).all()
+    assert (samples["limiters"][-40:] & LIMITER_GLITCH).all()
+    assert (sizes_n <= 1.05 * before_n).all()  # nor NaN
+    assert sizes_n[-1] == np.linalg.norm(service.force_n) == 0.0
+    with pytest.raises(ServoFault, match="sent nothing usable for 50 ms"):
+        servo.check()

@@ -1,0 +1,186 @@
+"""Services that hang or answer something else: opening, probe and doctor end in a line within three seconds."""
+
+import base64
+import hashlib
+import itertools
+import json
+import re
+import socket
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final, NamedTuple
+
+import pytest
+
+from study_app.devices.driver import examine
+from study_app.devices.emulators.inverse3_service import config
+from study_app.devices.inverse3.opening import DEVICE_GLOBAL, SESSION_SCOPED
+from study_app.devices.inverse3.service import force_scale, probe
+from tests.compiled import needs_servo
+from tests.strangers import CLOSE, Parts, dripped, flooded, sent, serving
+
+pytestmark = [needs_servo, pytest.mark.slow]
+MOST_S: Final = 3.0
+HTTP_OK: Final = b"HTTP/1.1 200 OK\r\nConnection: close\r\n"
+CONFIG: Final = config() | DEVICE_GLOBAL | SESSION_SCOPED
+STATUS: Final = {"power_supply": True, "ready": True, "calibrated": True, "in_use": False}
+
+
+def message_of(**changed: Any) -> dict[str, Any]:
+    """Return a full state, with other values of its device."""
+    position = dict.fromkeys("xyz", 0.0)
+    return {"inverse3": [{"device_id": "A1", "config": CONFIG, "status": STATUS,
+                          "state": {"cursor_position": position}} | changed]}  # fmt: skip
+
+
+def frame(message: Any, first: int = 0x81) -> bytes:
+    text = message if isinstance(message, bytes) else json.dumps(message).encode()
+    size = bytes([len(text)]) if len(text) < 126 else b"\x7e" + len(text).to_bytes(2, "big")
+    if len(text) >= 1 << 16:
+        size = b"\x7f" + len(text).to_bytes(8, "big")
+    return bytes([first]) + size + text
+
+
+def upgraded(head: bytes) -> bytes:
+    (key,) = re.findall(rb"(?i)sec-websocket-key: (\S+)", head)
+    accept = base64.b64encode(hashlib.sha1(key + b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11").digest())  # noqa: S324 - RFC 6455
+    answer = b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    return answer + b"Sec-WebSocket-Accept: %b\r\n\r\n" % accept
+
+
+class Kind(NamedTuple):
+    """A kind of service: what it sends at each of its stages, and the mode of failure of opening it.
+
+    A stage that is not given is that of a service in order. ``asked``: the answer to the number of a message.
+    """
+
+    mode: str
+    handshake: Callable[[], Parts] | None = None
+    first: Callable[[], Parts] | None = None
+    asked: Callable[[int], Parts] | None = None
+    http: Callable[[], Parts] | None = None
+
+
+def first(mode: str, message: Any) -> Kind:
+    return Kind(mode, first=sent(frame(message)))
+
+
+def http(body: bytes, mode: str = "unknown-scale") -> Kind:
+    return Kind(mode, http=sent(HTTP_OK + b"Content-Length: %d\r\n\r\n" % len(body) + body))
+
+
+HUGE: Final = b"\x81\x7f" + (1 << 62).to_bytes(8, "big")
+CHUNKED: Final = HTTP_OK + b"Transfer-Encoding: chunked\r\n\r\n"
+ANSWERS: Final[Mapping[str, Kind]] = {
+    "ends at once": Kind("closed", sent(CLOSE)),
+    "another program": Kind("not-websocket", sent(HTTP_OK + b"Content-Length: 2\r\n\r\n{}")),
+    "status with a bell": Kind("not-websocket", sent(b"HTTP/1.1 200 \x07\x1b[2J\nmore\r\n\r\n")),
+    "long status": Kind("not-websocket", sent(b"HTTP/1.1 200 " + b"x" * 60_000 + b"\r\n\r\n")),
+    "another key": Kind("not-websocket", lambda: iter([upgraded(b"Sec-WebSocket-Key: other")])),
+    "head without end": Kind("not-websocket", lambda: flooded(b"HTTP/1.1 101 Switching\r\n", b"x")),
+    "lines without end": Kind("not-websocket", lambda: flooded(b"HTTP/1.1 101 Switching\r\n", b"name: value\r\n")),
+    "huge frame flooded": Kind("protocol", first=lambda: flooded(HUGE, b"x")),
+    "long frame flooded": Kind("protocol", first=lambda: flooded(b"\x81\x7f" + (1 << 20).to_bytes(8, "big"), b"x")),
+    "masked": Kind("protocol", first=sent(b"\x81\x84\0\0\0\0null")),
+    "fragment": Kind("protocol", first=sent(frame({}, 0x01))),
+    "long ping": Kind("protocol", first=sent(frame(b"x" * 126, 0x89))),
+    "close frame": Kind("closed", first=sent(frame(b"\x03\xe9", 0x88))),
+    "ends in a frame": Kind("closed", first=sent(b"\x81\x7e\x10", CLOSE)),
+    "not UTF-8": first("not-json", b'{"inverse3": "\xff"}'),
+    "nested": first("not-json", b"[" * 60_000),
+    "5000 digits": first("not-json", b"9" * 5000),
+    "a list": first("not-json", []),
+    "not a number of JSON": first("not-json", message_of(config=CONFIG | {"device_info": float("nan")})),
+    "beyond a number": first("not-json", json.dumps(message_of()).replace("0.0", "1e999").encode()),
+    "half a character": first("not-json", message_of(config=CONFIG | {"device_info": "\ud800"})),
+    "inverse3 a number": first("version", {"inverse3": 5}),
+    "devices are numbers": first("no-device", {"inverse3": [5, None]}),
+    "ids with lines": first("no-device", {"inverse3": []} | {"inverse3": [{"id": "a\nb"}]}),
+    "config a number": first("version", message_of(config=5)),
+    "config a list": first("version", message_of(config=["filters"])),
+    "config a text": first("version", message_of(config="filters")),
+    "status a list": first("version", message_of(status=[])),
+    "status null": first("version", message_of(status=None)),
+    "400 digits": Kind("settings", asked=sent(frame(message_of(config=CONFIG | {"torque_scaling": 10**400})))),
+    "scale a list": http(b"[1]"),
+    "scale of 400 digits": http(b"1" + b"0" * 400, "settings"),
+    "redirected for ever": Kind("unknown-scale", http=sent(b"HTTP/1.1 302 Found\r\nLocation: /\r\n\r\n")),
+}  # fmt: skip
+HANGS: Final[Mapping[str, Kind]] = {
+    "silent": Kind("no-reply", sent()),
+    "head dripped": Kind("no-reply", lambda: dripped(b"HTTP/1.1 101 x")),
+    "no first message": Kind("no-reply", first=sent()),
+    "pings flooded": Kind("no-reply", first=lambda: flooded(b"", frame(b"x", 0x89))),
+    "pings dripped": Kind("no-reply", first=lambda: (part for part in dripped(frame(b"", 0x89) * 10_000))),
+    "pongs flooded": Kind("no-reply", first=lambda: flooded(b"", frame(b"x" * 125, 0x8A))),
+    "frame dripped": Kind("no-reply", first=lambda: dripped(b"\x81\x7e\xff\xffx")),
+    "header cut": Kind("no-reply", first=sent(b"\x81\x7e\x10")),
+    "no answer": Kind("no-reply", asked=sent()),
+    "answers slowly": Kind("no-reply", asked=lambda _: slowly(0.2)),
+    "pings for an answer": Kind("no-reply", asked=lambda _: flooded(b"", frame(b"", 0x89))),
+    "HTTP silent": Kind("unknown-scale", http=sent()),
+    "HTTP dripped": Kind("unknown-scale", http=lambda: dripped(HTTP_OK)),
+    "HTTP lines flooded": Kind("unknown-scale", http=lambda: flooded(HTTP_OK, b"name: value\r\n")),
+    "HTTP continues": Kind("unknown-scale", http=lambda: flooded(b"", b"HTTP/1.1 100 Continue\r\n\r\n")),
+    "body dripped": Kind("unknown-scale", http=lambda: dripped(HTTP_OK + b"Content-Length: 9999\r\n\r\n[1")),
+    "body flooded": Kind("unknown-scale", http=lambda: flooded(HTTP_OK + b"\r\n", b"1")),
+    "huge body": Kind("unknown-scale", http=lambda: flooded(HTTP_OK + b"Content-Length: %d\r\n\r\n" % (1 << 62), b"1")),
+    "chunks dripped": Kind("unknown-scale", http=lambda: dripped(CHUNKED + b"1\r\n1\r\n" * 1000)),
+}  # fmt: skip
+
+
+def slowly(pause_s: float) -> Parts:
+    time.sleep(pause_s)
+    yield frame(message_of())
+
+
+def answers(kind: Kind, head: bytes, connection: socket.socket) -> Parts:
+    """Yield what a service sends over a connection."""
+    if b"upgrade: websocket" not in head.lower():
+        yield from kind.http() if kind.http else http(b'{"value": 1, "inverse3": []}').http()
+        return
+    if kind.handshake:
+        yield from kind.handshake()
+        return
+    yield upgraded(head)
+    yield from kind.first() if kind.first else [frame(message_of())]
+    for number in itertools.count():
+        if not connection.recv(1 << 16):
+            return
+        yield from kind.asked(number) if kind.asked else [frame(message_of())]
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        *(pytest.param(kind, id=name) for name, kind in ANSWERS.items()),
+        *(pytest.param(kind, id=name, marks=pytest.mark.nightly) for name, kind in HANGS.items()),
+    ],
+)
+def test_every_kind_of_service_ends_in_its_failure_within_three_seconds(kind: Kind) -> None:
+    with serving(partial(answers, kind)) as port:
+        began_s = time.monotonic()
+        report = examine(f"inverse3:127.0.0.1:{port}", progress=str)
+        assert time.monotonic() - began_s < MOST_S
+        assert [one.id for one in report.found] == [kind.mode]
+        assert report.failure is not None
+        assert report.failure.isprintable()
+        assert len(report.failure) < 450
+
+
+@pytest.mark.parametrize("kind", [pytest.param(kind, id=name) for name, kind in HANGS.items() if kind.http])
+def test_a_probe_of_a_service_that_hangs_ends_soon(kind: Kind) -> None:
+    with serving(partial(answers, kind)) as port:
+        began_s = time.monotonic()
+        assert force_scale("127.0.0.1", (port, port, port)) is None
+        assert "start Haply Hub" in probe(ports=(port,)).why
+        assert time.monotonic() - began_s < MOST_S
+
+
+@pytest.mark.parametrize(
+    "listed", ["5", "null", '{"a": 5}', "[5, null]", '[{"device_id": {"a": 1}}]', '[{"device_id": "a\\nb"}]']
+)
+def test_a_probe_of_a_list_that_is_none_finds_no_device(listed: str) -> None:
+    with serving(partial(answers, http(b'{"inverse3": %b}' % listed.encode()))) as port:
+        assert "lists no such Inverse3" in probe(ports=(port,)).why
