@@ -440,6 +440,9 @@ class MainController(QObject):
         QShortcut(QKeySequence(QKeySequence.StandardKey.HelpContents), self.window, self.show_help)
         for controller in (self.machine, self.devices):
             controller.troubled.connect(self.window.show_message)
+        self._opened = QTimer(self, singleShot=True, interval=LOOK_AFTER_MS)
+        self._opened.timeout.connect(self.devices.look)
+        self._opened.timeout.connect(self.lab_and_designer.preload)
 
     def open(self) -> None:
         """Show the window, no larger than the screen, and look at the machine once it stands."""
@@ -449,8 +452,7 @@ class MainController(QObject):
             self.window.show_message("The default settings are used", f"{self.machine.trouble}.")
         elif self._follows_machine and chosen_workspace() is None:
             self._ask_for_workspace()
-        QTimer.singleShot(LOOK_AFTER_MS, self.devices, self.devices.look)
-        QTimer.singleShot(LOOK_AFTER_MS, self.lab_and_designer, self.lab_and_designer.preload)
+        self._opened.start()
 
     def show_bug(self, error: BaseException) -> bool:
         """Show an exception that no slot caught, once, unless a session shows it; return that it is printed, too."""
@@ -571,6 +573,7 @@ class MainController(QObject):
         After a signal the program waits for 2 s at most; a device that is still being opened then gets no force.
         """
         patience = Patience(BY_SIGNAL_S if self.code else OPENING_PATIENCE_S)
+        self._opened.stop()  # what it begins would outlive Python
         if self._home_place is not None:
             self._home_place.end()
         self.lab_and_designer.end(patience)

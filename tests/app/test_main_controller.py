@@ -104,6 +104,18 @@ def test_a_signal_waits_two_seconds_at_most_for_a_device_that_is_being_opened(
     assert visit.code == 128 + 15
 
 
+def test_a_window_that_is_closed_at_once_loads_nothing_more(
+    visit: MainController, monkeypatch: Any, qtbot: Any
+) -> None:
+    loaded: list[str] = []
+    monkeypatch.setattr(main_controller, "load_modules", lambda: loaded.append("modules"))
+    visit.open()
+    visit.window.close()
+    visit.end()
+    qtbot.wait(main_controller.LOOK_AFTER_MS + 200)
+    assert not loaded
+
+
 def test_a_device_that_cannot_be_opened_is_tried_again_or_examined(
     visit: MainController, monkeypatch: Any, qtbot: Any
 ) -> None:

@@ -1,0 +1,90 @@
+"""Whether the program ends as it should, however often it is started: run me, I print a table.
+
+Starts the program with its windows and ends it: home, closed; every page visited, then closed; a session of the demo
+in its two windows, ended by a signal. Counts what ended in another way than asked for, or printed an exception. It runs
+on what display there is, without one on Qt's offscreen platform. Run by itself:
+
+    python tests/benchmarks/windows/starts.py [--starts 300]
+"""
+
+import argparse
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Final
+
+# Runs inside the started program: visits what it is asked to, then ends it.
+PROBE: Final = """
+import os, signal, sys
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication
+from study_app.app import main_controller
+from study_app.app.session.bridge import SessionBridge
+from study_app.cli import main
+
+kind, results = sys.argv[1:]
+
+def visit(controller):
+    names = list(controller.window.rail.buttons) if kind == "places" else []
+    def step():
+        if names:
+            controller.window.go(names.pop(0))
+        else:
+            timer.stop()
+            controller.window.close()
+    timer = QTimer(controller.window, interval=50)
+    timer.timeout.connect(step)
+    timer.start()
+
+def end(bridge, begin=SessionBridge.start):
+    begin(bridge)
+    QTimer.singleShot(200, lambda: os.kill(os.getpid(), signal.SIGTERM))
+
+SessionBridge.start = end
+if kind == "run":
+    sys.argv[1:] = ["run", "demo", "--participant", "P001", "--windowed", "--results", results]
+    main()
+from pathlib import Path
+sys.exit(main_controller.home(Path(results), then=visit))
+"""
+KINDS: Final = {"home": 0, "places": 0, "run": 128 + signal.SIGTERM}  # the exit code that each ends with
+PATIENCE_S: Final = 120
+
+
+def main() -> None:
+    """Print how often each kind ended, and how."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--starts", type=int, default=300)
+    starts = parser.parse_args().starts
+    surroundings = dict(os.environ)
+    if not surroundings.get("DISPLAY") and not surroundings.get("WAYLAND_DISPLAY"):
+        surroundings["QT_QPA_PLATFORM"] = "offscreen"
+    ends: Counter[tuple[str, str]] = Counter()
+    began = time.monotonic()
+    for at in range(starts):
+        kind = list(KINDS)[at % len(KINDS)]
+        with tempfile.TemporaryDirectory() as folder:
+            command = [sys.executable, "-X", "faulthandler", "-c", PROBE, kind, str(Path(folder) / "results" / "demo")]
+            try:
+                done = subprocess.run(
+                    command, capture_output=True, text=True, env=surroundings, timeout=PATIENCE_S, check=False
+                )
+            except subprocess.TimeoutExpired:
+                ends[kind, f"no end within {PATIENCE_S} s"] += 1
+                continue
+        failed = done.returncode != KINDS[kind] or "Traceback" in done.stderr
+        ends[kind, f"exit code {done.returncode}: {done.stderr[-2000:]}" if failed else "as it should"] += 1
+    print(f"{starts} starts in {(time.monotonic() - began) / 60:.0f} min\n\n| started | ended | times |")
+    print("| --- | --- | --: |")
+    for (kind, how), times in sorted(ends.items()):
+        print(f"| {kind} | {how} | {times} |")
+    sys.exit(any(how != "as it should" for _, how in ends))
+
+
+if __name__ == "__main__":
+    main()
