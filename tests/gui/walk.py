@@ -2,7 +2,7 @@
 
 from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtGui import QAccessible
-from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QApplication, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QApplication, QLabel, QPushButton, QScrollBar, QWidget
 
 from study_app.gui.widgets.labels import Elided
 from study_app.gui.widgets.live_plots import Plot
@@ -64,14 +64,14 @@ def cut(window: QWidget) -> list[str]:
 
 
 def unnamed(window: QWidget) -> list[str]:
-    """Return what takes the keyboard, or shows a curve, and has no name for those who cannot see it."""
+    """Return what takes the keyboard, scrolls, or shows a curve, and has no name for those who cannot see it."""
     found = [str(window)] if not QAccessible.queryAccessibleInterface(window) else []
     for part in window.findChildren(QWidget):
         if not part.isVisible() or part.focusProxy() is not None:
             continue
         told = QAccessible.queryAccessibleInterface(part)
         name = told.text(QAccessible.Text.Name)
-        if part.focusPolicy() & Qt.FocusPolicy.TabFocus and not isinstance(part, QAbstractScrollArea) and not name:
+        if (part.focusPolicy() & Qt.FocusPolicy.TabFocus or isinstance(part, QScrollBar)) and not name:
             found.append(repr(part))
         if isinstance(part, Plot):
             sentence = told.text(QAccessible.Text.Description)

@@ -129,6 +129,7 @@ class LivePage(Themed, QGraphicsView):
         """Show a page; one that is the same but for its answers stays, with what was typed into it."""
         before, self._view = self._view, view
         self.setAccessibleName(view.name)
+        self.viewport().setAccessibleName(view.name)
         self._colour_ground()
         if view.page is None:
             self._frames.stop()

@@ -448,6 +448,7 @@ class ComputerWindow(Question):
         self._rows = vbox(STRETCH, spacing=0, margins=0)
         area = scrolled(self._rows)
         area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        area.setAccessibleName("Checks")
         inside, close = QWidget(), ActionButton("", "Close", role="primary")
         vbox(self.state, self.bar, (area, 1), spacing=12, margins=0, parent=inside)
         super().__init__(parent, theme, "Check of this computer", ABOUT, close, back="Check again", inside=inside)

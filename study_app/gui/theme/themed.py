@@ -1,7 +1,7 @@
 """How a change of theme reaches what the style sheet does not: parts that paint themselves, marks, selections."""
 
 from PySide6.QtGui import QColor, QPalette
-from PySide6.QtWidgets import QScrollArea, QWidget
+from PySide6.QtWidgets import QScrollArea, QScrollBar, QWidget
 
 from study_app.gui.theme.theme import LIGHT, Theme, stylesheet
 
@@ -48,10 +48,12 @@ def _palette(theme: Theme) -> QPalette:
 
 
 def apply_theme_within(whole: QWidget, theme: Theme) -> None:
-    """Pass ``theme`` to a part and its parts, for what comes into a window later."""
+    """Pass ``theme`` to a part and its parts, for what comes into a window later; name what Qt leaves without one."""
     for part in (whole, *whole.findChildren(QWidget)):
         if isinstance(part, Themed):
             part.apply_theme(theme)
+        elif isinstance(part, QScrollBar):
+            part.setAccessibleName("Scroll bar")
 
 
 def remove_widget(part: QWidget) -> None:
