@@ -253,106 +253,6 @@ class DevicesController(QObject):
             self.place.show_options(self._workstation.settings.device_options)
 
 
-class LabAndDesigner(QObject):
-    """Makes both places for the main window, and does there what is asked for elsewhere.
-
-    ``go_asked`` carries the name of a place to go to, which makes it; ``saved`` comes when a study or pilot was saved.
-
-    Parameters
-    ----------
-    results : folder that holds the studies' folders; it need not exist
-    """
-
-    go_asked = Signal(str)
-    saved = Signal()
-
-    def __init__(self, machine: WorkstationController, results: Path) -> None:
-        super().__init__()
-        self._machine, self._results = machine, results
-        self.designer: DesignerController | None = None
-        self.playing: Playing | None = None
-        self.lab: LabController | None = None
-        self._loading = Background(self)
-
-    def preload(self) -> None:
-        """Load the modules of both places in the background, so that the first visit seldom waits for them."""
-        self._loading.run(load_modules)
-
-    def make_lab(self) -> LabPlace:
-        self._loading.wait()  # two threads that load modules of one cycle may see them half loaded
-        from study_app.app.lab_controller import LabController  # noqa: PLC0415 - pyqtgraph: only once it is needed
-        from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
-
-        made = LabPlace()
-        settings = self._machine.settings
-        self.lab = LabController(made, device=settings.device, options=settings.device_options)
-        made.put_back_asked.connect(self._put_back)
-        return made
-
-    def make_designer(self) -> DesignerPlace:
-        self._loading.wait()
-        from study_app.app.session.playing import Playing  # noqa: PLC0415 - only once they are needed
-        from study_app.designer.place.controller import DesignerController  # noqa: PLC0415
-
-        self.designer = DesignerController(self._results)
-        self.playing = Playing(self.designer)
-        self.designer.saving.saved.connect(self.saved)
-        self.playing.kept.connect(self.saved)
-        self.designer.feeling.asked.connect(self._feel)
-        self.designer.editing.opened_other.connect(self._forget_study)
-        self.designer.feeling.returned.connect(lambda: self.go_asked.emit("designer"))
-        return self.designer.place
-
-    def open_designer(self, source: str) -> None:
-        self._go_to_designer(lambda designer: designer.open(source))
-
-    def show_version(self, session: SessionFacts) -> None:
-        """Go to the study designer, to what changed in a session's study since it was run."""
-        self._go_to_designer(
-            lambda designer: designer.open(session.study),
-            lambda designer: designer.changes.compare_with_session(session.study, session.folder),
-        )
-
-    def begin_study(self, source: str = "", name: str = "") -> None:
-        """Go to the study designer with what a new study can begin from; with a name begin it at once."""
-        self._go_to_designer(lambda it: it.ask_for_new(source), lambda it: it.begin(source, name) if name else None)
-
-    def _go_to_designer(self, *actions: Callable[[DesignerController], None]) -> None:
-        self.go_asked.emit("designer")
-        if self.designer is not None:  # else the window says why it could not be made
-            for act in actions:
-                act(self.designer)
-
-    def _feel(self, liquids: LabLiquids) -> None:
-        self.go_asked.emit("lab")
-        if self.lab is not None:
-            self.lab.feel_of_study(liquids.a, liquids.b, liquids.study)
-
-    def _forget_study(self) -> None:
-        """Let the lab offer no more to put its liquids back: another study is open in the designer."""
-        if self.lab is not None:
-            self.lab.study = ""
-
-    def _put_back(self, side: Side, setting: Setting) -> None:
-        if self.designer is not None:
-            self.designer.feeling.put_back(side, setting)
-
-    def show_results(self, results: Path) -> None:
-        self._results = results
-        if self.designer is not None:
-            self.designer.editing.results = results
-
-    def end(self, patience: Patience) -> None:
-        if self.playing is not None:
-            self.playing.end(patience)
-        if self.lab is not None:
-            self.lab.end(patience)
-
-    def end_by_signal(self, number: int) -> None:
-        if self.playing is not None:
-            self.playing.end_by_signal(number)
-
-
 def load_modules() -> None:
     """Load the modules of lab and designer, the compiler, and what the first page is computed from."""
     import study_app.app.lab_controller  # noqa: PLC0415
@@ -409,13 +309,12 @@ class MainController(QObject):
         self._home_place: HomePlace | None = None
         self._follows_machine = results is None
         self.results = results if results is not None else workspace().results
-        self.lab_and_designer = LabAndDesigner(self.machine, self.results)
         self.question: WorkspaceDialog | None = None
         self.check: ComputerCheck | None = None
         self.window = MainWindow(
             {
                 "home": self._home,
-                "designer": self.lab_and_designer.make_designer,
+                "designer": self._designer,
                 "results": self._results,
                 "lab": self._lab,
                 "devices": self.devices.make_place,
@@ -427,12 +326,14 @@ class MainController(QObject):
         self.loop = QEventLoop()
         self.code = 0
         self.live: LiveSession | None = None
+        self.designer: DesignerController | None = None
+        self.playing: Playing | None = None
+        self.lab: LabController | None = None
+        self._loading = Background(self)
         self.help: HelpPlace | None = None
         self._called_off: list[LiveSession] = []
         self._bugs: set[str] = set()
         self.results_controller: ResultsController | None = None
-        self.lab_and_designer.go_asked.connect(self.window.go)
-        self.lab_and_designer.saved.connect(self._show_saved)
         self.window.closed.connect(self._leave)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
@@ -442,7 +343,7 @@ class MainController(QObject):
             controller.troubled.connect(self.window.show_message)
         self._opened = QTimer(self, singleShot=True, interval=LOOK_AFTER_MS)
         self._opened.timeout.connect(self.devices.look)
-        self._opened.timeout.connect(self.lab_and_designer.preload)
+        self._opened.timeout.connect(self.preload)
 
     def open(self) -> None:
         """Show the window, no larger than the screen, and look at the machine once it stands."""
@@ -492,24 +393,83 @@ class MainController(QObject):
         made.check_asked.connect(self.check_computer)
         return made
 
+    def preload(self) -> None:
+        """Load the modules of lab and designer in the background, so that the first visit seldom waits for them."""
+        self._loading.run(load_modules)
+
     def _lab(self) -> LabPlace:
-        made = self.lab_and_designer.make_lab()
+        self._loading.wait()  # two threads that load modules of one cycle may see them half loaded
+        from study_app.app.lab_controller import LabController  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
+
+        made = LabPlace()
+        settings = self.machine.settings
+        self.lab = LabController(made, device=settings.device, options=settings.device_options)
+        made.put_back_asked.connect(self._put_back)
         made.asked.connect(self._lab_asked)
         return made
 
     def _lab_asked(self, what: str, _details: object) -> None:
         if what in {"enter", "device", "fade in"}:
             self.devices.end_diagnosis()  # it would hold the device
-        elif what == "diagnose" and self.lab_and_designer.lab is not None:
-            self.devices.diagnose(self.lab_and_designer.lab.device, self.window)
+        elif what == "diagnose" and self.lab is not None:
+            self.devices.diagnose(self.lab.device, self.window)
+
+    def _put_back(self, side: Side, setting: Setting) -> None:
+        if self.designer is not None:
+            self.designer.feeling.put_back(side, setting)
+
+    def _designer(self) -> DesignerPlace:
+        self._loading.wait()
+        from study_app.app.session.playing import Playing  # noqa: PLC0415 - only once they are needed
+        from study_app.designer.place.controller import DesignerController  # noqa: PLC0415
+
+        self.designer = DesignerController(self.results)
+        self.playing = Playing(self.designer)
+        for saved in (self.designer.saving.saved, self.playing.kept):
+            saved.connect(self._show_saved)
+        self.designer.feeling.asked.connect(self._feel)
+        self.designer.editing.opened_other.connect(self._forget_study)
+        self.designer.feeling.returned.connect(lambda: self.window.go("designer"))
+        return self.designer.place
+
+    def open_designer(self, source: str) -> None:
+        self._go_to_designer(lambda designer: designer.open(source))
+
+    def show_version(self, session: SessionFacts) -> None:
+        """Go to the study designer, to what changed in a session's study since it was run."""
+        self._go_to_designer(
+            lambda designer: designer.open(session.study),
+            lambda designer: designer.changes.compare_with_session(session.study, session.folder),
+        )
+
+    def begin_study(self, source: str = "", name: str = "") -> None:
+        """Go to the study designer with what a new study can begin from; with a name begin it at once."""
+        self._go_to_designer(lambda it: it.ask_for_new(source), lambda it: it.begin(source, name) if name else None)
+
+    def _go_to_designer(self, *actions: Callable[[DesignerController], object]) -> None:
+        self.window.go("designer")
+        assert self.designer is not None  # noqa: S101 - else the window has said why, and raised that
+        for act in actions:
+            act(self.designer)
+
+    def _feel(self, liquids: LabLiquids) -> None:
+        self.window.go("lab")
+        assert self.lab is not None  # noqa: S101 - as above
+        self.lab.feel_of_study(liquids.a, liquids.b, liquids.study)
+
+    def _forget_study(self) -> None:
+        """Let the lab offer no more to put its liquids back: another study is open in the designer."""
+        if self.lab is not None:
+            self.lab.study = ""
 
     def _home(self) -> HomePlace:
         made = HomePlace(self.results, _draft_words)
         made.session_asked.connect(self._start)
         made.results_asked.connect(self._show_study)
         made.protocol_opened.connect(self.machine.remember_protocol)
-        made.edit_asked.connect(self.lab_and_designer.open_designer)
-        made.new_asked.connect(self.lab_and_designer.begin_study)
+        made.edit_asked.connect(self.open_designer)
+        made.new_asked.connect(self.begin_study)
         made.device.display.clicked.connect(self._test_display)
         made.show_machine(self.machine.settings, self.devices.preferred)
         self._home_place = made
@@ -529,7 +489,8 @@ class MainController(QObject):
             self._home_place.show_results(self.results)
             if self.results_controller is not None:
                 self.results_controller.show_results(self.results)
-            self.lab_and_designer.show_results(self.results)
+            if self.designer is not None:
+                self.designer.editing.results = self.results
         self._show_machine()
 
     def _test_display(self) -> None:
@@ -547,7 +508,7 @@ class MainController(QObject):
         from study_app.app.results_controller import ResultsController  # noqa: PLC0415 - only once it is needed
 
         self.results_controller = ResultsController(self.results)
-        self.results_controller.place.version_asked.connect(self.lab_and_designer.show_version)
+        self.results_controller.place.version_asked.connect(self.show_version)
         return self.results_controller.place
 
     def _help(self) -> HelpPlace:
@@ -576,7 +537,9 @@ class MainController(QObject):
         self._opened.stop()  # what it begins would outlive Python
         if self._home_place is not None:
             self._home_place.end()
-        self.lab_and_designer.end(patience)
+        for part in (self.playing, self.lab):
+            if part is not None:
+                part.end(patience)
         self.devices.end(patience.left_s)
         for live in self._called_off:
             live.wait(patience.left_s)
@@ -586,7 +549,8 @@ class MainController(QObject):
         self.code = 128 + number
         if self.live is not None:
             self.live.end_by_signal(number)
-        self.lab_and_designer.end_by_signal(number)
+        if self.playing is not None:
+            self.playing.end_by_signal(number)
         self.window.close()
         self.loop.quit()
 

@@ -95,7 +95,7 @@ def new(name: str, template: str, *, no_window: bool) -> None:
         from study_app import app
 
         new_study.check_free(name)
-        code = app.home(then=lambda visit: visit.lab_and_designer.begin_study(f"template:{template}", name))
+        code = app.home(then=lambda visit: visit.begin_study(f"template:{template}", name))
         click.get_current_context().exit(code)
     file = new_study.write_new(study, name)
     click.echo(f"{file}: edit it, then run liquid-study check {name}")
@@ -110,7 +110,7 @@ def edit(protocol: str) -> None:
 
     file = find(protocol)
     named = protocol if file.name != Path(protocol).name else str(file)
-    click.get_current_context().exit(app.home(then=lambda visit: visit.lab_and_designer.open_designer(named)))
+    click.get_current_context().exit(app.home(then=lambda visit: visit.open_designer(named)))
 
 
 @click.command()

@@ -12,13 +12,12 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("asked", ["edit", "new"])
 def test_a_study_that_was_asked_for_opens_at_the_first_visit(visit: MainController, qtbot: Any, asked: str) -> None:
-    both = visit.lab_and_designer
-    both.preload()
+    visit.preload()
     if asked == "new":
-        both.begin_study()
+        visit.begin_study()
     else:
-        both.open_designer("demo")
-    designer = both.designer
+        visit.open_designer("demo")
+    designer = visit.designer
     assert designer is not None
     assert (visit.window.here, designer.place.isVisible()) == ("designer", True)
     opened, new_page = designer.editing.opened, designer.place.new_page

@@ -1,10 +1,8 @@
 """What the controllers of the main window's places show and do at each signal and answer."""
 
-import re
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -292,80 +290,3 @@ def test_the_stay(visit: MainController, monkeypatch: Any, pytestconfig: pytest.
         lines += [f"== {name}", *Live.done, *told, f"{state} {visit.live is not None} {len(visit._called_off)}"]
         lines += [f"operator {visit.machine.settings.operator} {visit.results.name}"]
     compare(GOLDEN / "stay.txt", lines, pytestconfig)
-
-
-class Calls:
-    """Signals of any name, and each other call in ``done``."""
-
-    def __init__(self, name: str, done: list[str]) -> None:
-        self._name, self._done = name, done
-
-    def __getattr__(self, name: str) -> Any:
-        if name in SIGNALS:
-            made: Any = Heard()
-        elif name in PARTS:
-            made = Calls(f"{self._name}.{name}", self._done)
-        else:
-
-            def made(*values: Any) -> Any:
-                self._done.append(f"{self._name}.{name} {values}")
-
-        setattr(self, name, made)
-        return made
-
-
-class Heard:
-    """A signal that can be sent."""
-
-    def __init__(self) -> None:
-        self.slots: list[Any] = []
-
-    def connect(self, slot: Any) -> None:
-        self.slots.append(slot)
-
-    def emit(self, *values: Any) -> None:
-        for slot in self.slots:
-            slot.emit(*values) if hasattr(slot, "emit") else slot(*values)
-
-
-SIGNALS = ("saved", "kept", "asked", "opened_other", "returned", "put_back_asked")
-PARTS = ("saving", "playing", "feeling", "editing", "changes", "place")
-LIQUIDS = SimpleNamespace(a="a", b="b", study="study")
-
-
-def test_lab_and_designer(qapp: Any, monkeypatch: Any, pytestconfig: pytest.Config) -> None:
-    done: list[str] = []
-    lab, designer = Calls("lab", done), Calls("designer", done)
-    lab_place = Calls("lab place", done)
-    monkeypatch.setattr("study_app.gui.lab.view.LabPlace", lambda: lab_place)
-    monkeypatch.setattr("study_app.designer.place.controller.DesignerController", lambda _results: designer)
-    monkeypatch.setattr("study_app.app.session.playing.Playing", lambda it: it.playing)
-
-    def compose(_place: Any, *, device: str, options: Any) -> Any:
-        done.append(f"lab with {device} {dict(options)}")
-        return lab
-
-    monkeypatch.setattr("study_app.app.lab_controller.LabController", compose)
-    of_window: Any = main_controller
-    both = of_window.LabAndDesigner(WorkstationController(), Path("results"))
-    for name in ("go_asked", "saved"):
-        getattr(both, name).connect(lambda *values, name=name: done.append(f"{name} {values}"))
-    steps: dict[str, Any] = {
-        "open without designer": lambda: both.open_designer("demo"), "make": both.make_designer,
-        "open again": lambda: both.open_designer("other"),
-        "new": lambda: both.begin_study("template:x", "mine"), "new without name": lambda: both.begin_study("blank"),
-        "feel before the lab": lambda: designer.feeling.asked.emit(LIQUIDS), "lab": both.make_lab,
-        "feel": lambda: designer.feeling.asked.emit(LIQUIDS),
-        "put back": lambda: lab_place.put_back_asked.emit("A", "s"),
-        "returned": designer.feeling.returned.emit, "saved": designer.saving.saved.emit,
-        "kept": designer.playing.kept.emit, "other study": designer.editing.opened_other.emit,
-        "results": lambda: both.show_results(Path("new")), "signal": lambda: both.end_by_signal(2),
-        "end": lambda: both.end("patience"),
-    }  # fmt: skip
-    lines = list[str]()
-    for name, step in steps.items():
-        done.clear()
-        step()
-        lines += [f"== {name}", *(re.sub(r" at 0x\w+", "", one) for one in done)]
-    lines += [f"study {lab.study!r}, results {designer.editing.results}"]
-    compare(GOLDEN / "lab_and_designer.txt", lines, pytestconfig)

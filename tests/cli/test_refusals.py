@@ -37,7 +37,7 @@ def visit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Visit:
     made = Visit()
 
     def home(*, then: Any) -> int:
-        then(SimpleNamespace(lab_and_designer=made))
+        then(made)
         return 0
 
     monkeypatch.setattr(app, "home", home)

@@ -26,42 +26,39 @@ def visit(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
     file.parent.mkdir()
     file.write_bytes(shipped_file("demo").read_bytes().replace(b'name = "demo"', b'name = "kitchen"'))
     made = MainController(tmp_path / "results")
-    both = made.lab_and_designer
     made.window.resize(1600, 1000)
     made.window.show()
-    both.open_designer("kitchen")
-    qtbot.waitUntil(lambda: both.designer is not None and both.designer.editing.opened is not None, timeout=OPENS_MS)
+    made.open_designer("kitchen")
+    qtbot.waitUntil(lambda: made.designer is not None and made.designer.editing.opened is not None, timeout=OPENS_MS)
     yield made
     made.window.close()
     made.end()
-    assert both.designer is not None
-    both.designer.deleteLater()
+    assert made.designer is not None
+    made.designer.deleteLater()
     made.window.deleteLater()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 def feel(qtbot: Any, visit: MainController, *path: str) -> Any:
     """Select an element, press its button, and return the lab once it is felt."""
-    both = visit.lab_and_designer
-    assert both.designer is not None
-    both.designer.editing.select(path)
-    head = both.designer.place.form.head
+    assert visit.designer is not None
+    visit.designer.editing.select(path)
+    head = visit.designer.place.form.head
     qtbot.mouseClick(head.feel, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: both.lab is not None and both.lab.live is not None, timeout=OPENS_MS)
+    qtbot.waitUntil(lambda: visit.lab is not None and visit.lab.live is not None, timeout=OPENS_MS)
     assert visit.window.here == "lab"
-    return both.lab
+    return visit.lab
 
 
 def test_a_liquid_is_felt_with_unsaved_values_and_put_back_as_one_step(qtbot: Any, visit: MainController) -> None:
-    both = visit.lab_and_designer
-    assert both.designer is not None
-    editing = both.designer.editing
+    assert visit.designer is not None
+    editing = visit.designer.editing
     assert editing.opened is not None
     saved = editing.opened.file.read_bytes()
     editing.make("Denser", Set(("liquids", "thick", "density_kg_m3"), 1500))
-    assert both.designer.place.form.head.feel.isHidden()  # the first step is a page
+    assert visit.designer.place.form.head.feel.isHidden()  # the first step is a page
     lab = feel(qtbot, visit, "liquids", "thick")
-    assert both.designer.place.form.head.feel.accessibleName() == "Feel Thick"
+    assert visit.designer.place.form.head.feel.accessibleName() == "Feel Thick"
     assert (lab.bench.a.name, lab.bench.a.value("liquid.density_kg_m3")) == ("Thick", 1500)
     lab.place.ask("change", "liquid.density_kg_m3", 1234.5, False)
     lab.place.ask("change", "effects.added_mass", "on", False)
@@ -84,21 +81,20 @@ def test_a_liquid_is_felt_with_unsaved_values_and_put_back_as_one_step(qtbot: An
 
 
 def test_a_block_is_felt_as_two_liquids_and_each_goes_back_to_its_own(qtbot: Any, visit: MainController) -> None:
-    both = visit.lab_and_designer
     lab = feel(qtbot, visit, "blocks", "liquids")
-    assert both.designer is not None
+    assert visit.designer is not None
     assert (lab.bench.a.name, lab.bench.b.name) == ("Thin", "Thick")
     lab.place.ask("switch")
     lab.place.ask("change", "liquid.density_kg_m3", 1700.0, False)
     qtbot.waitUntil(lambda: lab.place.view.workbench.presented == "B" and lab.place.view.workbench.b.is_edited)
     qtbot.mouseClick(lab.place.form.back, Qt.MouseButton.LeftButton)
-    assert both.designer.editing.opened is not None
-    liquids = both.designer.editing.opened.study.document["liquids"]
+    assert visit.designer.editing.opened is not None
+    liquids = visit.designer.editing.opened.study.document["liquids"]
     assert (liquids["thin"]["density_kg_m3"], liquids["thick"]["density_kg_m3"]) == (1000, 1700)
 
 
 def test_a_study_that_ships_is_felt_and_takes_nothing_back(qtbot: Any, visit: MainController) -> None:
-    visit.lab_and_designer.open_designer("rek2024")
+    visit.open_designer("rek2024")
     lab = feel(qtbot, visit, "conditions", "honey")
     assert lab.bench.a.name == "Honey"
     qtbot.waitUntil(lambda: lab.place.view is not None and lab.place.view.workbench == lab.bench)
@@ -108,6 +104,18 @@ def test_a_study_that_ships_is_felt_and_takes_nothing_back(qtbot: Any, visit: Ma
 def test_the_lab_puts_nothing_back_once_another_study_is_open(qtbot: Any, visit: MainController) -> None:
     lab = feel(qtbot, visit, "liquids", "thick")
     qtbot.waitUntil(lab.place.form.back.isVisible)
-    visit.lab_and_designer.open_designer("demo")
+    visit.open_designer("demo")
     visit.window.go("lab")
     qtbot.waitUntil(lambda: not lab.place.form.back.isVisible(), timeout=OPENS_MS)
+
+
+def test_home_shows_what_is_saved_and_kept_and_a_signal_ends_what_is_played(visit: MainController) -> None:
+    done: list[object] = []
+    visit.window.place("home").show_studies = lambda: done.append("shown")  # type: ignore[attr-defined]
+    assert visit.designer is not None
+    assert visit.playing is not None
+    visit.playing.end_by_signal = done.append  # type: ignore[method-assign]
+    visit.designer.saving.saved.emit(visit.results)
+    visit.playing.kept.emit(visit.results)
+    visit.end_by_signal(15)
+    assert done == ["shown", "shown", 15]

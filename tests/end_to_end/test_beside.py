@@ -117,10 +117,9 @@ def test_a_draft_that_release_0_2_left_is_shown_at_home_and_opened_in_the_design
     assert first.facts.source == "mine"
     assert "22" in first.facts.draft.words
     qtbot.mouseClick(first.pen, Qt.MouseButton.LeftButton)
-    both = visit.lab_and_designer
-    qtbot.waitUntil(lambda: both.designer is not None and both.designer.editing.opened is not None, timeout=20_000)
-    assert both.designer is not None
-    opened = both.designer.editing.opened
+    qtbot.waitUntil(lambda: visit.designer is not None and visit.designer.editing.opened is not None, timeout=20_000)
+    assert visit.designer is not None
+    opened = visit.designer.editing.opened
     assert opened is not None
     assert opened.study.document["study"]["title"] == "A second look"
     assert file.read_bytes() == saved

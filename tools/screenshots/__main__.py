@@ -9,6 +9,7 @@ parser.add_argument("--to", type=Path, required=True, metavar="DIR", help="Folde
 parser.add_argument(
     "--only", choices=("places", "designer", "session", "single-blind"), help="Only these; default: all."
 )
+parser.add_argument("--sizes", nargs="+", default=(), metavar="WxH", help="Also take each window in these, in pixels.")
 given = parser.parse_args()
 os.environ["QT_QPA_PLATFORM"] = "offscreen"  # the same pictures on every machine
 
@@ -16,4 +17,5 @@ from study_app.store.output_files import make_folder  # noqa: E402 - Qt reads th
 from tools.screenshots import screenshots  # noqa: E402
 
 make_folder(given.to)
-screenshots(given.to, only=given.only)
+sizes = tuple((int(width), int(height)) for width, _, height in (size.partition("x") for size in given.sizes))
+screenshots(given.to, only=given.only, sizes=sizes)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from PySide6.QtCore import QBuffer, QEventLoop, QIODevice, QSize
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
 from study_app.errors import StudyError
 from study_app.store.atomic import write_file
@@ -19,10 +19,13 @@ T = TypeVar("T")
 
 
 class Camera:
-    """Takes pictures into a folder, which must exist; ``progress`` is given a line for every picture."""
+    """Takes pictures into a folder, which must exist; ``progress`` is given a line for every picture.
 
-    def __init__(self, to: Path, progress: Callable[[str], object]) -> None:
-        self._to, self._progress = to, progress
+    Every window that is no dialog is taken in each of ``sizes`` (width and height in logical px), too.
+    """
+
+    def __init__(self, to: Path, progress: Callable[[str], object], sizes: tuple[tuple[int, int], ...] = ()) -> None:
+        self._to, self._progress, self._sizes = to, progress, sizes
         self.taken: list[Path] = []
 
     def until(self, found: Callable[[], T | None], what: str) -> T:
@@ -58,6 +61,15 @@ class Camera:
             window.resize(QSize(*size))
         if not at_once:
             self.wait(SETTLED_MS)
+        self._keep(window, name)
+        for width, height in () if isinstance(window, QDialog) or at_once else self._sizes:
+            before = window.size()
+            window.resize(width, height)
+            self.wait(SETTLED_MS)
+            self._keep(window, f"{name}-{width}x{height}")
+            window.resize(before)
+
+    def _keep(self, window: QWidget, name: str) -> None:
         held = QBuffer()
         held.open(QIODevice.OpenModeFlag.WriteOnly)
         window.grab().save(held, "PNG")

@@ -51,10 +51,10 @@ def take_designer(camera: Camera, results: Path, theme: Theme) -> None:
     main.open()
     try:
         window.go("designer")
-        designer = camera.until(lambda: main.lab_and_designer.designer, "the designer")
+        designer = camera.until(lambda: main.designer, "the designer")
         place: Any = designer.place
         for scene, study, element, view in SCENES:
-            main.lab_and_designer.open_designer(study)
+            main.open_designer(study)
             designer.editing.select(element)
             place.pane.show_tab(view)
             place.problems.setVisible(scene == "problems")
@@ -67,7 +67,7 @@ def take_designer(camera: Camera, results: Path, theme: Theme) -> None:
 
 
 def _take_sizes(camera: Camera, main: MainController, name: str) -> None:
-    designer = main.lab_and_designer.designer
+    designer = main.designer
     assert designer is not None  # noqa: S101 - it was waited for
     for width, height in SIZES:
         main.window.resize(width, height)

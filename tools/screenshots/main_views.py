@@ -68,7 +68,7 @@ def _take_results(camera: Camera, controller: MainController, theme: Theme) -> N
 def _take_lab(camera: Camera, controller: MainController, theme: Theme) -> None:
     controller.window.resize(*WIDE)
     controller.window.go("lab")
-    lab: Any = camera.until(lambda: controller.lab_and_designer.lab, "the lab")
+    lab: Any = camera.until(lambda: controller.lab, "the lab")
     camera.until(lambda: lab.live, "the lab's device")
     lab.place.ask("path", PATH)
     camera.until(lambda: not lab.view().measuring, "the lab's costs")

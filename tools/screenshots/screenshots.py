@@ -24,13 +24,20 @@ from tools.screenshots.session_pictures import take_session, take_single_blind
 GROUPS: Final = ("places", "designer", "session", "single-blind")
 
 
-def screenshots(to: Path, *, only: str | None = None, progress: Callable[[str], object] = print) -> tuple[Path, ...]:
+def screenshots(
+    to: Path,
+    *,
+    only: str | None = None,
+    sizes: tuple[tuple[int, int], ...] = (),
+    progress: Callable[[str], object] = print,
+) -> tuple[Path, ...]:
     """Take pictures of every window in both themes into the folder ``to``; return the files.
 
     Parameters
     ----------
     to : must exist
     only : one of `GROUPS`, by default all
+    sizes : width and height [px] in which every window that is no dialog is taken, too
     progress : is given a line for every picture
 
     Raises
@@ -42,7 +49,7 @@ def screenshots(to: Path, *, only: str | None = None, progress: Callable[[str], 
     """
     qInstallMessageHandler(_pass_on)
     application_here()
-    camera = Camera(to.resolve(), progress)
+    camera = Camera(to.resolve(), progress, sizes)
     with tempfile.TemporaryDirectory(prefix="liquid-study-") as held, _at_home_in(Path(held)), collecting_here():
         if only in (None, "places"):
             results = rehearsed(Path(FOLDER_NAME))

@@ -319,7 +319,6 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     designer.file.write_bytes(source.replace(b"repetitions = 1", b"repetitions = 3", 1))
     designer.window.close()
     visit = MainController(designer.results)
-    both = visit.lab_and_designer
     visit.window.show()
     visit.window.place("results")
     assert visit.results_controller is not None
@@ -337,12 +336,12 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     assert card.version.isEnabled()
     table.clicked.emit(table.model().index(0, 3))
     assert visit.window.here == "designer"
-    qtbot.waitUntil(lambda: both.designer is not None and both.designer.place.isVisible(), timeout=20_000)
-    assert both.designer is not None
-    changes = both.designer.changes
+    qtbot.waitUntil(lambda: visit.designer is not None and visit.designer.place.isVisible(), timeout=20_000)
+    assert visit.designer is not None
+    changes = visit.designer.changes
     assert changes.chosen == protocol_hash(source)
     assert changes.version.currentText().startswith("1.0: 1 session")
-    assert both.designer.place.pane.tab == "changes"
+    assert visit.designer.place.pane.tab == "changes"
     visit.window.close()
     visit.end()
     visit.window.deleteLater()
