@@ -6,7 +6,9 @@ from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractScrollArea,
     QApplication,
+    QComboBox,
     QLabel,
+    QLineEdit,
     QPushButton,
     QScrollBar,
     QWidget,
@@ -42,9 +44,9 @@ def cut(window: QWidget) -> list[str]:
     """Return what cannot be read whole: words without room, or beyond the window or their parent."""
     found = []
     for widget in window.findChildren(QWidget):
-        if not widget.isVisible() or not isinstance(widget, QLabel | QPushButton):
+        if not widget.isVisible() or not isinstance(widget, QLabel | QPushButton | QLineEdit | QComboBox):
             continue
-        words = widget.accessibleName() or widget.text()
+        words = widget.accessibleName() or ("" if isinstance(widget, QComboBox) else widget.text())
         place = place_of(widget, window)
         inside = window.rect().contains(place)
         across = place.left() >= 0 and place.right() <= window.width()

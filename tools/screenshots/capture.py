@@ -9,6 +9,7 @@ from PySide6.QtCore import QBuffer, QEventLoop, QIODevice, QSize
 from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
 from study_app.errors import StudyError
+from study_app.gui.widgets.background import wait_for_jobs
 from study_app.store.atomic import write_file
 
 PATIENCE_S: Final = 180.0  # the first session after an installation compiles
@@ -65,6 +66,8 @@ class Camera:
         for width, height in () if isinstance(window, QDialog) or at_once else self._sizes:
             before = window.size()
             window.resize(width, height)
+            self.wait(SETTLED_MS)
+            wait_for_jobs(PATIENCE_S)  # a tank's glass is painted for each size
             self.wait(SETTLED_MS)
             self._keep(window, f"{name}-{width}x{height}")
             window.resize(before)

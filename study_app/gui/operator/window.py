@@ -92,7 +92,9 @@ class Arrangement(QWidget):
         self._fill_middle(across=across)
 
     def _set_width(self, width: Width) -> None:
-        rail, slim = self._parts.rail, width == "slim"
+        header, rail, slim = self._parts.header, self._parts.rail, width == "slim"
+        for part in (header.bar, header.trials):  # "Now" says them, too
+            part.setHidden(slim)
         if slim:
             rail.give_away()
             self.now.column.addWidget(rail.now)

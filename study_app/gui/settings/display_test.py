@@ -257,7 +257,7 @@ class DisplayTest(QWidget):
         titles = vbox(label("Display test", "title"), label(screen_words, "body", "text2"), spacing=2)
         head = hbox(titles, STRETCH, (self.leave, 0, Qt.AlignmentFlag.AlignTop))
         ramp, fields = (GreyRamp(), 2), (self._fields(), 3)
-        vbox(head, self._figures(), ramp, fields, self._foot(), spacing=18, margins=(40, 32, 40, 32), parent=self)
+        vbox(head, self._figures(), ramp, fields, self._foot(), spacing=14, margins=(40, 20, 40, 20), parent=self)
 
     def _figures(self) -> QGridLayout:
         cells = grid(40, 2)
@@ -274,9 +274,10 @@ class DisplayTest(QWidget):
             "Every line is 1 or 2 pixels wide. If a field looks uniformly grey, shimmers or shows broad bands, the "
             "system scales the picture: set the screen to its native resolution. All seventeen greys above should "
             "differ.",
-            "body",
+            "label",
             "text2",
             wraps=True,
+            weight=400,
         )
         words.setMinimumWidth(LEAST_WORDS)
         return hbox(*fields, (words, 3), spacing=16)

@@ -63,6 +63,7 @@ def pushes() -> Any:
 def window(request: pytest.FixtureRequest, qtbot: Any) -> Iterator[OperatorWindow]:
     made = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=False, force_limit_n=request.param)
     qtbot.addWidget(made)
+    made.header.page.show()  # as on one screen, where the header has least room
     made.show()
     qtbot.waitExposed(made)
     yield made
@@ -115,6 +116,7 @@ def test_nothing_is_clipped(window: OperatorWindow, told: Any, health: Any, stat
         assert (window.width(), window.height()) == size
         problems[size] = cut(window) + beyond_the_plot(window)
         assert window.arrangement.side_area.verticalScrollBar().maximum() == 0, size
+        assert window.header.study.text() == "demo", size
         stop = window.stop.stop
         assert stop.width() >= LEAST_WIDTH
         assert stop.height() >= LEAST_HEIGHT
