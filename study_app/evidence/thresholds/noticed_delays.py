@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
 
 from study_app import figure_style as style
-from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
 from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.evidence.table import Evidence, Table
 from study_app.evidence.thresholds.known_values import KnownThreshold, known_value
@@ -121,110 +121,46 @@ def _rating(person: Person, delay_s: float, draw: Draw) -> int:
     return rate([STATEMENT], replace(NO_FEATURES, delay_s=perceived_s), person.rater, draw)[STATEMENT]
 
 
-HEIGHT_PT: Final = 236.0
-TOP_PT: Final = 60.0
-FOOT_PT: Final = 34.0
-LEFT_PT: Final = 34.0
-GAP_PT: Final = 52.0
 THESIS_MS: Final = 125.0
 GUESS, LAPSE = 0.5, 0.02
-LABEL_SHARE: Final = 0.065
-"""Height of a label."""
 TITLE: Final = "Which delay is noticed? Two questions to the same people"
 
 
-@style.own_settings()
-def draw(found: Compared, fonts: Sequence[str]) -> Sheet:
+@style.own_settings(style.PLOT_SETTINGS)
+def draw(found: Compared) -> Figure:
     """Draw both panels."""
-    sheet = Sheet(style.PAGE_WIDTH_PT, HEIGHT_PT, fonts)
-    mark = Mark("SIMULATED participants", style.WARN, style.WARN_GROUND)
-    sheet.heading(TITLE, [mark], [f"n = {found.people}"])
-    width = (sheet.width_pt - 2 * MARGIN_PT - 2 * LEFT_PT - GAP_PT) / 2
-    left, right = MARGIN_PT + LEFT_PT, MARGIN_PT + 2 * LEFT_PT + width + GAP_PT - LEFT_PT
-    height = sheet.height_pt - TOP_PT - FOOT_PT
-    plain = [one for one in found.rated if not one.adapted_s]
-    _shares(sheet, sheet.axes(left, TOP_PT, width, height), found, plain)
-    _thresholds(sheet, sheet.axes(right, TOP_PT, width, height), found)
-    _heads(sheet, left, right)
-    return sheet
-
-
-def _heads(sheet: Sheet, left: float, right: float) -> None:
-    for x, above, below in (
-        (left, "Answers at each delay", "Delay, ms"),
-        (right, "Threshold [ms] by the people's criterion", "Mean criterion of the ratings, ms"),
-    ):
-        sheet.text(x - 22, 36, above, size=7.5, weight="bold")
-        sheet.text(x - 22, sheet.height_pt - 6, below, size=6.5, colour=style.TEXT_SOFT)
-    words = f"dashed: correct in {FORCED_CHOICE}; solid: agree in {LIKERT}, by criterion [ms]"
-    sheet.text(left - 22, 47, words, size=6.5, colour=style.TEXT_SOFT)
-    sheet.text(
-        right - 22,
-        47,
-        f"line: {FORCED_CHOICE}; dots: {LIKERT}; diamond: after adaptation",
-        size=6.5,
-        colour=style.TEXT_SOFT,
-    )
-
-
-def _shares(sheet: Sheet, axes: Axes, found: Compared, rated: Sequence[Rated]) -> None:
-    delays = np.linspace(1.0, 200.0, 200)
-    threshold = found.detected_ms[0]
-    correct = success("weibull", np.log10(delays), np.log10(threshold), LINEAR_OBSERVER[0], GUESS, LAPSE)
-    axes.plot(delays, correct, color=style.TEXT, linewidth=1.4, dashes=(4, 2), gid="correct")
-    axes.plot([threshold], [GUESS + (1 - GUESS - LAPSE) / 2], "s", markersize=4, color=style.TEXT, gid="detected")
-    below = 1.0 + LABEL_SHARE
-    for one, colour in zip(rated, style.STEPS[1:], strict=False):
-        test = one.found
-        asked = np.array(test.asked)
-        axes.plot(test.levels, np.array(test.yes) / asked, "o", markersize=3, color=colour, clip_on=False)
+    figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 3.6), layout="constrained")
+    figure.suptitle(f"{TITLE}: SIMULATED participants, n = {found.people}", fontsize=7.5)
+    shares, thresholds = figure.subplots(1, 2)
+    shares.set(title="Answers at each delay", xlabel="Delay, ms", xticks=[0, 50, 75, 100, 125, 150, 200])
+    shares.set(ylim=(-0.03, 1.03), yticks=[0.0, 0.5, 0.75, 1.0])
+    shares.yaxis.set_major_formatter(PercentFormatter(1.0))
+    criteria = [1000 * one.criterion_s for one in found.rated if not one.adapted_s]
+    thresholds.set(title="Threshold, ms", xlabel="Mean criterion of the ratings, ms", xlim=(50, 175), xticks=criteria)
+    thresholds.set(ylim=(0, 205), yticks=[0, 50, 100, 150, 200])
+    delays, (middle, low, high) = np.linspace(1.0, 200.0, 200), found.detected_ms
+    correct = success("weibull", np.log10(delays), np.log10(middle), LINEAR_OBSERVER[0], GUESS, LAPSE)
+    shares.plot(delays, correct, color=style.TEXT, dashes=(4, 2), label=f"correct in {FORCED_CHOICE}")
+    shares.plot([middle], [GUESS + (1 - GUESS - LAPSE) / 2], "s", markersize=4, color=style.TEXT)
+    thresholds.axhspan(low, high, color=style.BAND, linewidth=0)
+    thresholds.axhline(middle, color=style.TEXT, dashes=(4, 2), label=FORCED_CHOICE)
+    thresholds.axhline(THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), label="“125 ms” of the thesis")
+    for one, colour in zip(found.rated, (*style.STEPS[1 : 1 + len(criteria)], style.WARN), strict=True):
+        test, at = one.found, 1000 * one.criterion_s + (5 if one.adapted_s else 0)
         if test.effect is None or test.width is None or test.guess is None or test.lapse is None:
             continue
-        agree = success("logistic", delays, test.effect, test.width, test.guess, test.lapse)
-        axes.plot(delays, agree, color=colour, linewidth=1.2, gid=f"rated-{1000 * one.criterion_s:.0f}")
-        label = f"{1000 * one.criterion_s:.0f}"
-        below = min(float(agree[-1]), below - LABEL_SHARE)
-        axes.text(206.0, below, label, color=colour, va="center", fontproperties=sheet.font(6.5))
-    axes.set_xlim(-4, 204)
-    axes.set_ylim(-0.03, 1.03)
-    axes.set_xticks([0, 50, 75, 100, 125, 150, 200])
-    places = [0.0, 0.5, 0.75, 1.0]
-    axes.set_yticks(places, [f"{place:.0%}" for place in places])
-    _grid(sheet, axes, places)
-
-
-def _thresholds(sheet: Sheet, axes: Axes, found: Compared) -> None:
-    middle, low, high = found.detected_ms
-    axes.axhspan(low, high, color=style.BAND, linewidth=0)
-    axes.axhline(middle, color=style.TEXT, linewidth=1.4, dashes=(4, 2), gid="detected")
-    axes.axhline(THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), gid="thesis")
-    axes.text(54, THESIS_MS + 3, "“125 ms” of the thesis", color=style.TEXT_SOFT, fontproperties=sheet.font(6.5))
-    plain = 0
-    for one in found.rated:
-        test, at = one.found, 1000 * one.criterion_s
-        if test.effect is None:
-            continue
-        if one.adapted_s:
-            at, colour, marker = at + 5, style.WARN, "D"
-        else:
-            plain += 1
-            colour, marker = style.STEPS[plain], "o"
         if test.lower is not None and test.upper is not None:
-            axes.plot([at, at], [test.lower, test.upper], color=colour, linewidth=1.0)
-        axes.plot([at], [test.effect], marker, markersize=4, color=colour, gid=f"threshold-{at:.0f}")
-    axes.set_xlim(50, 175)
-    axes.set_ylim(0, 205)
-    axes.set_xticks([1000 * one.criterion_s for one in found.rated if not one.adapted_s])
-    places = [0, 50, 100, 150, 200]
-    axes.set_yticks(places, [str(place) for place in places])
-    _grid(sheet, axes, places)
-
-
-def _grid(sheet: Sheet, axes: Axes, places: Sequence[float]) -> None:
-    for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
-        label.set_fontproperties(sheet.font(6.5))
-    for place in places:
-        axes.axhline(place, color=style.GRID, linewidth=0.6, zorder=0)
+            thresholds.plot([at, at], [test.lower, test.upper], color=colour, linewidth=1.0)
+        name = f"{LIKERT}, adapted to {1000 * one.adapted_s:.0f} ms" if one.adapted_s else f"{LIKERT}, by criterion"
+        label = name if one.adapted_s or at == criteria[0] else None
+        thresholds.plot([at], [test.effect], "D" if one.adapted_s else "o", markersize=4, color=colour, label=label)
+        if not one.adapted_s:
+            shares.plot(test.levels, np.array(test.yes) / test.asked, "o", markersize=3, color=colour)
+            agree = success("logistic", delays, test.effect, test.width, test.guess, test.lapse)
+            shares.plot(delays, agree, color=colour, label=f"agree in {LIKERT}, criterion {at:.0f} ms")
+    for axes in (shares, thresholds):
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False, fontsize=6.5)
+    return figure
 
 
 CAPTION: Final = (
@@ -253,7 +189,10 @@ def evidence(found: Compared) -> Evidence:
     text = f"{head}\n\n{table.markdown()}\n"
 
     def figures() -> dict[str, bytes]:
-        drawn = {form: draw(found, style.fonts_for(form)).figure for form in style.FORMATS}
-        return {f"delay-thresholds.{form}": style.file_bytes(it, form, TITLE) for form, it in drawn.items()}
+        figure = draw(found)
+        return {
+            f"delay-thresholds.{form}": style.file_bytes(figure, form, TITLE, style.PLOT_SETTINGS)
+            for form in style.FORMATS
+        }
 
     return Evidence(text, {"delay-thresholds.md": text, "delay-thresholds.txt": f"{CAPTION}\n"}, figures)

@@ -1,17 +1,22 @@
-"""Coverage and error of thresholds: 1,000 simulated observers whose levels QUEST+ chose, at 40, 80 and 160 trials.
+"""Coverage and error of thresholds of simulated people, whose levels QUEST+ chose, at 40, 80 and 160 trials.
 
 Run it by itself: ``python tests/benchmarks/analysis/threshold_coverage.py [OBSERVERS] [SEED]``. The observers answer
-two-interval forced choice with d′ proportional to the level, lapse in 2 % of trials, and differ by a factor of 1.2.
-Exit code 3 if the coverage of a 95 % interval is not within 93 to 99 %, or the mean error is above 5 %.
+two-interval forced choice and differ by a factor of 1.2. Those that the analysis assumes have a d′ proportional to the
+level and answer 2 % of trials at random; the others of `KINDS` differ from them in one respect each. Of a threshold
+that changes, the mean over the trials is the true one; ten observers are a group. Exit code 3 if, of those assumed,
+the coverage of a 95 % interval is not within 93 to 99 %, or the mean error is above 5 %; of the others nothing is
+required.
 """
 
 import math
 import sys
-import time
 from statistics import NormalDist
+from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
+from study_app.analysis.statistics.thresholds import group_mean
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import LAPSES, Stimulus, analysis_grid, assumed_for, running_grid
 from study_app.psychophysics.adaptive import Search
@@ -22,57 +27,89 @@ STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
 DESIGN = default_design("2ifc")
 MEDIAN_75 = 0.2
 BETWEEN = 1.2
-LAPSE = 0.02
+PEOPLE = 10
 COVERAGE = (0.93, 0.99)
 MOST_ERROR = 0.05
 
 
-def proportion(level: float, level_75: float) -> float:
-    """Return P(correct) of an observer who compares ln(1 + level) with normal noise."""
-    z_75 = NormalDist().inv_cdf(0.75)
-    right = NormalDist().cdf(z_75 * math.log1p(level) / math.log1p(level_75))
-    return LAPSE / 2 + (1 - LAPSE) * right
+class Kind(NamedTuple):
+    """People: width of their functions [that assumed], share of answers at random, preference for the first interval
+    and for the last answer [SD], and how many times higher the threshold is in the last trial than in the first."""
+
+    width: float = 1.0
+    lapse: float = 0.02
+    criterion: float = 0.0
+    repeats: float = 0.0
+    change: float = 1.0
+
+
+KINDS = {
+    "as assumed": Kind(),
+    "half as wide": Kind(width=0.5),
+    "1.5 times as wide": Kind(width=1.5),
+    "2.5 times as wide": Kind(width=2.5),
+    "5 % at random": Kind(lapse=0.05),
+    "criterion of 0.5": Kind(criterion=0.5),
+    "last answer again": Kind(repeats=0.5),
+    "learning": Kind(change=1 / 1.5),
+    "fatigue": Kind(change=1.5),
+}
+
+
+def answered(kind: Kind, planted: np.ndarray, search: Search, draw: np.random.Generator) -> tuple[np.ndarray, ...]:
+    """Return the places of the levels presented, (observers, trials), and whether the answers were right."""
+    psi = search.psi.reshape(len(search.levels), len(search.grid.thresholds), -1)
+    posterior = np.tile(search.grid.prior.reshape(1, *psi.shape[1:]), (len(planted), 1, 1))
+    places, rights, last = [], [], np.zeros(len(planted))
+    firsts = draw.permuted(np.tile((True, False), (len(planted), max(TRIALS) // 2)), axis=1)
+    for trial, first in enumerate(firsts.T):
+        posterior /= posterior.sum(axis=(1, 2), keepdims=True)
+        place = search.next_of(posterior)
+        now = planted * kind.change ** (trial / (max(TRIALS) - 1) - 0.5)
+        ratio = np.log1p(np.array(STIMULUS.grid)[place]) / np.log1p(now)
+        sensed = NormalDist().inv_cdf(0.75) * ratio ** (1 / kind.width)
+        towards_first = np.where(first, sensed, -sensed) + kind.criterion + kind.repeats * last
+        said_first = draw.random(len(planted)) < kind.lapse / 2 + (1 - kind.lapse) * ndtr(towards_first)
+        right, last = said_first == first, np.where(said_first, 1.0, -1.0)
+        posterior *= np.where(right[:, None, None], psi[place], 1.0 - psi[place])
+        places.append(place)
+        rights.append(right)
+    return np.array(places).T, np.array(rights).T
 
 
 def main(observers: str = "1000", seed: str = "1") -> int:
-    """Print a row for each number of trials; return the exit code."""
-    draw = np.random.default_rng(int(seed))
+    """Print a row for each kind and number of trials; return the exit code."""
     assumed = assumed_for(STIMULUS, DESIGN)
-    running = running_grid(STIMULUS, DESIGN, assumed, LAPSES)
-    analysis = analysis_grid(STIMULUS, DESIGN, assumed)
-    levels = STIMULUS.grid
-    coordinates = tuple(STIMULUS.coordinate(level) for level in levels)
-    search = Search(running, coordinates, "threshold")
-    planted = MEDIAN_75 * BETWEEN ** draw.normal(size=int(observers))
-    found: dict[int, list[tuple[float, float, float]]] = {trials: [] for trials in TRIALS}
-    began = time.process_time()
-    fits_s = 0.0
-    for level_75 in planted:
-        counts = ([0] * len(levels), [0] * len(levels))
-        shares = [proportion(level, level_75) for level in levels]
-        for trial in range(1, max(TRIALS) + 1):
-            at = search.next(*counts)
-            counts[0 if draw.random() < shares[at] else 1][at] += 1
-            if trial in TRIALS:
-                start = time.process_time()
-                one = fit(coordinates, *counts, analysis)
-                fits_s += time.process_time() - start
-                found[trial].append((one.threshold, *one.interval))
-    truth = np.log10(planted)
-    print(f"{len(planted)} observers, 2IFC, 75 % at {MEDIAN_75} (factor {BETWEEN}), QUEST+, seed {seed}")
-    print("trials  coverage %   mean error %   SD of one %")
+    grid = analysis_grid(STIMULUS, DESIGN, assumed)
+    coordinates = tuple(STIMULUS.coordinate(level) for level in STIMULUS.grid)
+    search = Search(running_grid(STIMULUS, DESIGN, assumed, LAPSES), coordinates, "threshold")
     failed = False
-    for trials, ones in found.items():
-        threshold, low, high = np.array(ones).T
-        coverage = float(((low <= truth) & (truth <= high)).mean())
-        error = 10 ** float((threshold - truth).mean()) - 1
-        spread = 10 ** float((threshold - truth).std(ddof=1)) - 1
-        failed |= not (COVERAGE[0] <= coverage <= COVERAGE[1]) or abs(error) > MOST_ERROR
-        print(f"{trials:6d} {100 * coverage:11.1f} {100 * error:+14.1f} {100 * spread:13.0f}")
-    fits = len(planted) * len(TRIALS)
-    print(
-        f"{time.process_time() - began:.0f} s of the processor, {1000 * fits_s / fits:.1f} ms for each of {fits} fits"
-    )
+    print(f"{observers} observers, 2IFC, 75 % at {MEDIAN_75} (factor {BETWEEN}), QUEST+, seed {seed}")
+    print("                   trials  held %   error %    SD %   groups held %  half of a group's interval %")
+    for name, kind in KINDS.items():
+        draw = np.random.default_rng(int(seed))
+        planted = MEDIAN_75 * BETWEEN ** draw.normal(size=int(observers))
+        places, rights = answered(kind, planted, search, draw)
+        for trials in TRIALS:
+            counts = np.zeros((2, len(planted), len(coordinates)))
+            np.add.at(counts, (1 - rights[:, :trials], np.arange(len(planted))[:, None], places[:, :trials]), 1.0)
+            fits = [fit(coordinates, right, wrong, grid) for right, wrong in counts.transpose(1, 0, 2)]
+            threshold, low, high, variance = np.array([(it.threshold, *it.interval, it.variance) for it in fits]).T
+            moved = math.log10(kind.change) * ((trials - 1) / (max(TRIALS) - 1) - 1) / 2  # the mean of these trials
+            truth, true_mean = np.log10(planted) + moved, math.log10(MEDIAN_75) + moved
+            held, error = float(((low <= truth) & (truth <= high)).mean()), 10 ** float((threshold - truth).mean()) - 1
+            spread = 10 ** float((threshold - truth).std(ddof=1)) - 1
+            tens = zip(threshold.reshape(-1, PEOPLE).tolist(), variance.reshape(-1, PEOPLE).tolist(), strict=True)
+            ends = np.array([(one.low, one.high) for one in (group_mean(*ten) for ten in tens)], float)
+            of_groups = float(((ends[:, 0] <= true_mean) & (true_mean <= ends[:, 1])).mean())
+            half = 10 ** float(np.median(np.diff(ends, axis=1)) / 2) - 1
+            if name == "as assumed":
+                failed |= not (COVERAGE[0] <= held <= COVERAGE[1]) or abs(error) > MOST_ERROR
+            print(
+                f"{name:19s}{trials:6d}{100 * held:8.1f}{100 * error:+10.1f}{100 * spread:8.0f}"
+                f"{100 * of_groups:16.1f}{100 * half:30.0f}",
+                flush=True,
+            )
     return 3 if failed else 0
 
 

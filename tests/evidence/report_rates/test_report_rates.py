@@ -1,5 +1,8 @@
 """How often verdicts are wrong: the simulated truth, and the quick way to the same verdicts."""
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
 from study_app.analysis.evaluate import evaluate_block
@@ -8,9 +11,12 @@ from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel, Pairs, SettingsDiffer
 from study_app.analysis.planning.simulated_studies import Plan, plan
+from study_app.analysis.statistics.outcome import Interval
+from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.evidence.report_rates import simulation as studies
 from study_app.evidence.report_rates.simulation import (
     CLAIMED,
+    COVERS,
     EXTENTS,
     GENERATORS,
     LOST,
@@ -91,6 +97,22 @@ def test_every_kind_of_study_is_counted(rek: Plan, generator: Generator, monkeyp
     assert rates == [rate for cell in cells for rate in count_studies(rek, cell, truth(rek, cell), 1, 0, 2)]
     files = evidence(rates, "rates").files
     assert len(files["rates.md"].splitlines()) == len(files["rates.csv"].splitlines()) + 3 == len(rates) + 4
+
+
+@pytest.mark.parametrize(("factor", "reach", "holds"), [(1, 1, "yes"), (1.1, 1, "no"), (0.9, 1, "no"), (1, 0.7, "no")])
+def test_another_estimator_of_noticed_delays_and_narrower_intervals_are_noticed(
+    factor: float, reach: float, holds: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def other(*given: Any) -> Threshold:
+        found = noticed(*given)
+        if found.interval is None or found.effect is None:
+            return found
+        ends = (factor * (found.effect + reach * (end - found.effect)) for end in (found.lower, found.upper) if end)
+        return replace(found, interval=Interval(*ends, 0.95, "other"))
+
+    monkeypatch.setattr(studies, "noticed", other)
+    _, covers = count_single(("one threshold for all", 12), 1, 0, 150)
+    assert (covers.what, covers.holds) == (COVERS, holds)
 
 
 @pytest.mark.slow
