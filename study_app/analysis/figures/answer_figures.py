@@ -24,7 +24,7 @@ from study_app import figure_style as style
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import COUNT_COLUMNS, LEVELS, NEUTRAL, QUARTILES, Array, by_participant, quartiles
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.page_layout import MARGIN_PT, Look, Picture, Sheet, Style, picture_of
+from study_app.analysis.figures.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, Style, picture_of
 from study_app.analysis.statistics.thresholds import Threshold
 from study_app.errors import AnalysisError
 from study_app.number_text import counted
@@ -94,7 +94,7 @@ def draw_answers(
             words = f"n {low}" if low == high else f"n {low}–{high}"
             where: Style = {"transform": axes.transAxes, "ha": "right", "va": "bottom"}
             axes.text(1, 1.0, words, fontproperties=sheet.font(5.8), color=style.TEXT_SOFT, **where)
-    sheet.text(MARGIN_PT + scale_pt, sheet.height_pt - 6, foot, size=6.5, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT + scale_pt, sheet.height_pt - 6, foot, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
@@ -161,15 +161,15 @@ def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float)
 def legend(sheet: Sheet) -> None:
     """Write at the right, under the heading, what median, band and single lines are."""
     words = ("median", "middle half (IQR)", "one participant")
-    y, x = 30.0, sheet.width_pt - MARGIN_PT + 12 - sum(sheet.text_width(word, 7) + 30 for word in words)
+    y, x = 30.0, sheet.width_pt - MARGIN_PT + 12 - sum(sheet.text_width(word, SMALL) + 30 for word in words)
     for word in words:
         if word == "middle half (IQR)":
             sheet.box(x, y - 6.2, 14, 7.6, style.BAND)
         else:
             colour, width = (style.ACCENT, 1.6) if word == "median" else (style.PARTICIPANT, 0.6)
             sheet.line((x, x + 14), (y - 2.4, y - 2.4), color=colour, linewidth=width)
-        sheet.text(x + 18, y, word, size=7, colour=style.TEXT_SOFT)
-        x += sheet.text_width(word, 7) + 30
+        sheet.text(x + 18, y, word, size=SMALL, colour=style.TEXT_SOFT)
+        x += sheet.text_width(word, SMALL) + 30
 
 
 CURVE_LEFT_PT: Final = 30.0
@@ -206,7 +206,7 @@ def draw_threshold(found: Threshold, lowest_ms: float | None, look: Look) -> She
     shares = np.array(found.yes)[there] / asked[there]
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
     axes.plot(levels[there], shares, "o", **dots)
-    sheet.text(MARGIN_PT, sheet.height_pt - 5, "Added delay, ms", size=6.5, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, sheet.height_pt - 5, "Added delay, ms", size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
@@ -245,7 +245,7 @@ def draw_effects(rows: Sequence[EffectRow], bound: float | None, foot: str, look
             sheet.text(MARGIN_PT, top, line, size=LABEL_SIZE, weight="bold")
         for place, (setting, mean, low, high) in enumerate(settings):
             at = y + EFFECT_GAP_PT + (place + 0.5) * EFFECT_PT
-            sheet.text(EFFECTS_LEFT_PT - 6, EFFECTS_TOP_PT + at + 2.3, setting, size=6.5, ha="right")
+            sheet.text(EFFECTS_LEFT_PT - 6, EFFECTS_TOP_PT + at + 2.3, setting, size=SMALL, ha="right")
             means.append((mean, at))
             if low is not None and high is not None:
                 intervals.append((at, low, high))
@@ -253,7 +253,7 @@ def draw_effects(rows: Sequence[EffectRow], bound: float | None, foot: str, look
     axes.plot(*zip(*means, strict=True), "o", color=style.ACCENT, markersize=3.2, zorder=3)
     if intervals:
         axes.hlines(*zip(*intervals, strict=True), color=style.ACCENT, linewidth=1.2, zorder=2)
-    sheet.text(EFFECTS_LEFT_PT, sheet.height_pt - 6, foot, size=6.5, colour=style.TEXT_SOFT)
+    sheet.text(EFFECTS_LEFT_PT, sheet.height_pt - 6, foot, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
@@ -362,7 +362,6 @@ PANELS_A_ROW: Final = 3
 ROW_PT: Final = 19.0
 BAR_PT: Final = 12.4
 LABEL_SIZE: Final = 7.5
-COUNT_SIZE: Final = 5.8
 WIDEST_ANSWER_PT: Final = 15.0
 PANEL_PADDING_PT: Final = 7.0
 NEUTRAL_GAP_PT: Final = 8.0
@@ -398,7 +397,7 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
         if column == 0:
             for number, lines in enumerate(wrapped):
                 sheet.lines(MARGIN_PT, top + (number + 0.5) * ROW_PT + 2.7, lines, 8.4, size=LABEL_SIZE)
-            sheet.text(MARGIN_PT, top + plot_pt + 10, "counts of answers", size=6.5, colour=style.TEXT_SOFT)
+            sheet.text(MARGIN_PT, top + plot_pt + 10, "counts of answers", size=SMALL, colour=style.TEXT_SOFT)
         else:
             sheet.line((x, x), (top - 14, top + plot_pt + 10), color=style.BORDER, linewidth=0.5)
         x += (panel_pt - widths.total) / 2
@@ -446,7 +445,7 @@ def _legend(sheet: Sheet, labels: Sequence[str], x: float) -> None:
     """Name the levels in their order; the neutral one, which stands apart in the panels, stands apart here."""
     short = legend_labels(labels)
     order = [*DISAGREEMENT[::-1], *AGREEMENT, NEUTRAL]
-    size, swatch, gap = 7.0, 7.0, 9.0
+    size, swatch, gap = SMALL, 7.0, 9.0
     steps = {level: swatch + 4 + sheet.text_width(short[level - 1], size) + gap for level in order}
     x = min(x + PANEL_PADDING_PT, max(sheet.width_pt - MARGIN_PT - sum(steps.values()), MARGIN_PT))
     for level in order:
@@ -482,9 +481,9 @@ def _agreement_panel(
     zero = x + widths.left
     base = zero + widths.right + NEUTRAL_GAP_PT
     sheet.text(zero, top - 5, title, size=8, weight="bold", ha="center")
-    sheet.text(base + widths.neutral / 2, top - 5, "neutral", size=6.5, colour=style.TEXT_SOFT, ha="center")
-    sheet.text(zero - 3.5, top + plot_pt + 10, "disagree", size=6.5, colour=style.TEXT_SOFT, ha="right")
-    sheet.text(zero + 3.5, top + plot_pt + 10, "agree", size=6.5, colour=style.TEXT_SOFT)
+    sheet.text(base + widths.neutral / 2, top - 5, "neutral", size=SMALL, colour=style.TEXT_SOFT, ha="center")
+    sheet.text(zero - 3.5, top + plot_pt + 10, "disagree", size=SMALL, colour=style.TEXT_SOFT, ha="right")
+    sheet.text(zero + 3.5, top + plot_pt + 10, "agree", size=SMALL, colour=style.TEXT_SOFT)
 
     axes = sheet.axes(x, top, widths.total, plot_pt)
     axes.set_label(name)
@@ -504,7 +503,7 @@ def _agreement_panel(
             _segment(sheet, axes, lefts[level], y, level, of[level], widths.answer)
         if lacking.iloc[y]:
             place = (x + widths.total, top + (y + 0.5) * ROW_PT + 2)
-            sheet.text(*place, f"n {row['n']}", size=5.8, colour=style.TEXT_SOFT, ha="right")
+            sheet.text(*place, f"n {row['n']}", size=SMALL, colour=style.TEXT_SOFT, ha="right")
     axes.axvline(0, color=style.TEXT_SOFT, linewidth=0.9, zorder=3)
     axes.axvline(apart, color=style.AXIS, linewidth=0.5, zorder=3)
 
@@ -520,8 +519,8 @@ def _segment(sheet: Sheet, axes: Axes, left: float, y: int, level: int, count: i
     }
     bar = axes.barh(y, count, left=left, height=BAR_PT / ROW_PT, zorder=2, **look)
     bar[0].set_gid(f"{axes.get_label()}-row{y + 1}-level{level}")
-    if sheet.text_width(str(count), COUNT_SIZE) <= count * answer_pt - 0.2:
-        ink, font = style.LEVEL_INKS[level - 1], sheet.font(COUNT_SIZE)
+    if sheet.text_width(str(count), SMALL) <= count * answer_pt - 0.2:
+        ink, font = style.LEVEL_INKS[level - 1], sheet.font(SMALL)
         place: Style = {"ha": "center", "va": "center_baseline", "zorder": 4}
         axes.text(left + count / 2, y, str(count), fontproperties=font, color=ink, **place)
 
@@ -596,7 +595,7 @@ def draw_recognition(
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     first_pt = max(ruler.text_width(name, 7.5) for name in settings) + 10
     width, height = CELL_PT
-    names_wrapped = [ruler.wrap(names[place], width - 4, 7) for place in kept]
+    names_wrapped = [ruler.wrap(names[place], width - 4, SMALL) for place in kept]
     top = MATRIX_TOP_PT + NAMES_PT + 8.5 * (max(map(len, names_wrapped)) - 1)
     sheet = look.sheet(top + height * len(settings) + MATRIX_FOOT_PT)
     left = MARGIN_PT + first_pt
@@ -604,7 +603,7 @@ def draw_recognition(
         x = left + column * width + (8.0 if place >= len(labels) else 0.0)
         colour = style.TEXT if place < len(labels) else style.TEXT_SOFT
         for number, line in enumerate(reversed(names_wrapped[column])):
-            sheet.text(x + width / 2, top - 4 - 8.5 * number, line, size=7, colour=colour, ha="center")
+            sheet.text(x + width / 2, top - 4 - 8.5 * number, line, size=SMALL, colour=colour, ha="center")
         axes = sheet.axes(x, top, width, height * len(settings))
         axes.set_label(f"name{place + 1}")
         axes.set_xlim(0, 1)
@@ -614,7 +613,7 @@ def draw_recognition(
     for number, name in enumerate(settings):
         sheet.text(left - 6, top + height * (number + 0.5) + 2.6, name, size=7.5, ha="right")
     foot = "Counts, with the share of the row. Framed: the name that is right."
-    sheet.text(MARGIN_PT, sheet.height_pt - 6, foot, size=6.5, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, sheet.height_pt - 6, foot, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 

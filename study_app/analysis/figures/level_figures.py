@@ -11,7 +11,16 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import published_words
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.page_layout import MARGIN_PT, Look, Picture, Sheet, attempted, picture_of, sample_words
+from study_app.analysis.figures.page_layout import (
+    MARGIN_PT,
+    SMALL,
+    Look,
+    Picture,
+    Sheet,
+    attempted,
+    picture_of,
+    sample_words,
+)
 from study_app.analysis.levels.answers import (
     Answers,
     LevelAnswers,
@@ -63,25 +72,25 @@ def panels(
     """
     rows = math.ceil(len(names) / COLUMNS)
     sheet = look.sheet(HEAD_PT + rows * PANEL_PT + (rows - 1) * ROW_GAP_PT + foot_pt + 14)
-    sheet.text(MARGIN_PT, 28, above, size=7, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, 28, above, size=SMALL, colour=style.TEXT_SOFT)
     x = sheet.width_pt - MARGIN_PT
     for words, colour in reversed(keys):
-        x -= sheet.text_width(words, 7)
-        sheet.text(x, 28, words, size=7, colour=colour)
+        x -= sheet.text_width(words, SMALL)
+        sheet.text(x, 28, words, size=SMALL, colour=colour)
         x -= 10
     width = (sheet.width_pt - LEFT_PT - MARGIN_PT - (COLUMNS - 1) * GAP_PT) / COLUMNS
     for place, (name, words) in enumerate(names):
         row, column = divmod(place, COLUMNS)
         x, y = LEFT_PT + column * (width + GAP_PT), HEAD_PT + row * (PANEL_PT + ROW_GAP_PT)
-        sheet.text(x, y - 4, name, size=7, weight="bold")
+        sheet.text(x, y - 4, name, size=SMALL, weight="bold")
         if words:
-            aside = sheet.text_width(name, 7, "bold") + 6
-            sheet.text(x + aside, y - 4, words, size=7, colour=style.TEXT_SOFT)
+            aside = sheet.text_width(name, SMALL, "bold") + 6
+            sheet.text(x + aside, y - 4, words, size=SMALL, colour=style.TEXT_SOFT)
         axes = sheet.axes(x, y, width, PANEL_PT)
         draw(axes, place, column == 0)
         for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
             label.set_fontproperties(sheet.font(6.5))
-    sheet.text(LEFT_PT, sheet.height_pt - 10, below, size=7, colour=style.TEXT_SOFT)
+    sheet.text(LEFT_PT, sheet.height_pt - 10, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
@@ -548,7 +557,7 @@ def weber_picture(study: Study, found: LevelsResult, forms: Sequence[str], name:
 @style.own_settings()
 def _draw_fractions(found: LevelsResult, look: Look) -> Sheet:
     sheet = look.sheet(HEIGHT_PT, style.PAGE_WIDTH_PT / 2)
-    sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(found)}", size=7, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(found)}", size=SMALL, colour=style.TEXT_SOFT)
     axes = sheet.axes(
         WEBER_LEFT_PT, TOP_PT, sheet.width_pt - WEBER_LEFT_PT - RIGHT_PT, sheet.height_pt - TOP_PT - WEBER_FOOT_PT
     )
@@ -569,7 +578,7 @@ def _draw_fractions(found: LevelsResult, look: Look) -> Sheet:
     for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
         label.set_fontproperties(sheet.font(6.5))
     below = f"Standard of {found.quantity}" + (f" [{found.unit}]" if found.unit else "")
-    sheet.text(WEBER_LEFT_PT, sheet.height_pt - 8, below, size=7, colour=style.TEXT_SOFT)
+    sheet.text(WEBER_LEFT_PT, sheet.height_pt - 8, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
@@ -589,8 +598,8 @@ def _published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: 
     over_all = [f"{fraction:g}" for standard, fraction in points if standard is None]
     if over_all:
         words = f"dotted: published {', '.join(over_all)}"
-        x = sheet.width_pt - MARGIN_PT - sheet.text_width(words, 7)
-        sheet.text(x, 28, words, size=7, colour=style.TEXT_SOFT)
+        x = sheet.width_pt - MARGIN_PT - sheet.text_width(words, SMALL)
+        sheet.text(x, 28, words, size=SMALL, colour=style.TEXT_SOFT)
     for standard, fraction in points:
         if standard is None:
             axes.axhline(fraction, color=style.TEXT_SOFT, linewidth=1.0, linestyle=":", zorder=2)

@@ -21,6 +21,8 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.results import BlockResult, Failure, Failures, Results, counted
 
 MARGIN_PT = 4.0
+SMALL = 7.2
+"""Of the smallest text [pt]: 11 px where a window of 1366 px shows the figure."""
 
 Style: TypeAlias = dict[str, Any]
 """How marks of a figure look, as arguments of matplotlib."""
@@ -72,7 +74,7 @@ class Sheet:
         y: float,
         words: str,
         *,
-        size: float = 7,
+        size: float = SMALL,
         weight: str = "regular",
         colour: str = style.TEXT,
         **place: Any,
@@ -100,7 +102,7 @@ class Sheet:
         axes.set_facecolor("none")
         for spine in axes.spines.values():
             spine.set_visible(False)
-        axes.tick_params(length=0, pad=3, labelsize=6.5, labelcolor=style.TEXT_SOFT)
+        axes.tick_params(length=0, pad=3, labelsize=SMALL, labelcolor=style.TEXT_SOFT)
         axes.set_xticks([])
         axes.set_yticks([])
         return axes
@@ -148,9 +150,9 @@ class Sheet:
         self.text(x, baseline, title, size=10, weight="bold")
         x += self.text_width(title, 10, "bold") + 8
         for mark in marks:
-            width = self.text_width(mark.words, 7, "bold") + 11
+            width = self.text_width(mark.words, SMALL, "bold") + 11
             self.box(x, baseline - 9.6, width, 13.2, mark.ground, rounding=4)
-            self.text(x + 5.5, baseline - 0.6, mark.words, size=7, weight="bold", colour=mark.ink)
+            self.text(x + 5.5, baseline - 0.6, mark.words, size=SMALL, weight="bold", colour=mark.ink)
             x += width + 5
         right = self.width_pt - MARGIN_PT
         fitting = [words for words in counts if x + 10 + self.text_width(words, 7.5) <= right]

@@ -14,6 +14,7 @@ from study_app.analysis.data.blocks import PlacedQuestion
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.page_layout import (
     MARGIN_PT,
+    SMALL,
     Look,
     Picture,
     Sheet,
@@ -50,8 +51,10 @@ def rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) 
     axes.set_ylim(len(names) - 0.5, -0.5)
     for place, (name, n) in enumerate(zip(names, ns, strict=True)):
         middle = TOP_PT + row_pt * (place + 0.5) + 2.5
-        sheet.lines(LEFT_PT - 8, middle, sheet.wrap(name, LEFT_PT - MARGIN_PT - 8, 7), LINE_PT, size=7, ha="right")
-        sheet.text(sheet.width_pt - MARGIN_PT, middle, f"n = {n}", size=6.5, colour=style.TEXT_SOFT, ha="right")
+        sheet.lines(
+            LEFT_PT - 8, middle, sheet.wrap(name, LEFT_PT - MARGIN_PT - 8, SMALL), LINE_PT, size=SMALL, ha="right"
+        )
+        sheet.text(sheet.width_pt - MARGIN_PT, middle, f"n = {n}", size=SMALL, colour=style.TEXT_SOFT, ha="right")
     return sheet, axes
 
 
@@ -63,8 +66,8 @@ def _rows_of_groups(found: QuestionResult, look: Look, row_pt: float) -> tuple[S
 
 def _ends(sheet: Sheet, y: float, low: str, high: str) -> None:
     """Write what the ends of the axis mean."""
-    sheet.text(LEFT_PT, y, low, size=6.5, colour=style.TEXT_SOFT)
-    sheet.text(sheet.width_pt - RIGHT_PT, y, high, size=6.5, colour=style.TEXT_SOFT, ha="right")
+    sheet.text(LEFT_PT, y, low, size=SMALL, colour=style.TEXT_SOFT)
+    sheet.text(sheet.width_pt - RIGHT_PT, y, high, size=SMALL, colour=style.TEXT_SOFT, ha="right")
 
 
 ROW_PT: Final = 30.0
@@ -174,7 +177,7 @@ def _legend(sheet: Sheet, names: list[str], inks: list[str]) -> None:
     x = (LEFT_PT + sheet.width_pt - RIGHT_PT - SWATCH_PT * len(inks)) / 2
     for point, ink in enumerate(inks, start=1):
         sheet.box(x, y - 8.5, SWATCH_PT, 11, ink, rounding=0.5)
-        sheet.text(x + SWATCH_PT / 2, y, str(point), size=6.5, colour=_ink(ink), ha="center")
+        sheet.text(x + SWATCH_PT / 2, y, str(point), size=SMALL, colour=_ink(ink), ha="center")
         x += SWATCH_PT
 
 

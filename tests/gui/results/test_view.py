@@ -1,5 +1,6 @@
 """The results window draws a view and says what is asked for; it knows no file and computes nothing."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,8 +8,14 @@ import pytest
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QLabel
 
+from study_app import figure_style as style
+from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.figures import answer_figures
+from study_app.analysis.figures.page_layout import Look, study_marks
+from study_app.analysis.worker_messages import FigureDrawn
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.widgets.controls import ActionButton
+from tests.analysis.conftest import SAMPLE
 from tests.gui.results.sample import LEFT_OUT, facts, view
 from tests.gui.windows import results
 
@@ -128,3 +135,18 @@ def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_w
             assert not place.writing.editors["sav"].control.isEnabled()
             assert "It needs pyreadstat." in said
         place.writing.reject()
+
+
+def test_text_of_figures_is_at_least_11_px_high(place, qtbot):
+    """In the main window of 1366 × 768, whose sidebar takes 72."""
+    place.resize(1366 - 72, 768)
+    study = load_study(SAMPLE.path)
+    for block in study.blocks:
+        words = answer_figures.counts(study, block)
+        look = Look(answer_figures.title(block), study_marks(study), words, style.screen_fonts())
+        svg = style.file_bytes(answer_figures.draw_block(study, block, {}, look).figure, "svg", "")
+        place.show_view(view(figures=(FigureDrawn(block.id, "Title", "Caption", svg), *view().figures[1:])))
+        drawing = place.figures.cards[0].drawing
+        qtbot.waitUntil(lambda shown=drawing: shown.settled)
+        sizes_pt = [float(size) for size in re.findall(rb"font(?:-size)?: (?:bold )?([0-9.]+)px", svg)]
+        assert min(sizes_pt) * drawing.width() / style.PAGE_WIDTH_PT >= 11
