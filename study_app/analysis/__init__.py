@@ -1,1 +1,6 @@
-"""Analysis of results folders, never of a live session."""
+"""Analysis of results folders, never of a live session.
+
+``data.study_tables`` reads a folder into one ``Study``, ``evaluate`` computes all results of it, and
+``findings.finding`` is the base of what a report states; read these first. ``levels`` analyses blocks with a design,
+``planning`` simulates studies that do not exist yet.
+"""

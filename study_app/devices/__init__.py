@@ -1,4 +1,8 @@
-"""Haptic devices: interface, drivers, emulators and measurement."""
+"""Haptic devices: interface, drivers, emulators and measurement.
+
+``descriptor`` says what a device is, ``driver`` opens, guards and closes one, and ``rig`` opens device and servo
+together; read these first. ``descriptors`` lists the devices of the program.
+"""
 
 from typing import Final
 

@@ -1,1 +1,5 @@
-"""The windows of operator and participant."""
+"""The windows of operator and participant.
+
+Windows show frozen values and emit signals; they open no file and compute no statistics. Read ``kit.fields`` (what is
+edited), ``kit.commands`` (actions) and ``theme.themed`` (colours) first, then a folder as an example, such as ``home``.
+"""

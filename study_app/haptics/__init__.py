@@ -1,4 +1,5 @@
 """The force model: the force on a body in a liquid, and the servo that renders it.
 
-Imports nothing, so that reading a scene (``haptics.model.scene``) never loads the compiler.
+``kernels.tick`` is one tick from top to bottom, ``model.scene`` what is simulated, ``runtime.servo`` the interface of
+the loop; read these first. The package imports nothing, so that reading a scene never loads the compiler.
 """

@@ -1,1 +1,5 @@
-"""The liquid lab without its windows: adjustable parameters, two settings side by side, and their forces."""
+"""The liquid lab without its windows: adjustable parameters, two settings side by side, and their forces.
+
+``live`` is device and servo with a scene that is edited, ``ab_comparison`` the two settings, ``estimation.estimator``
+the fit of a liquid while force is measured; read these first. ``identify`` fits liquids to files of measurements.
+"""

@@ -1,1 +1,4 @@
-"""Work in other processes: a worker process for a window, and executors for many independent cases."""
+"""Work in other processes: a worker process for a window, and executors for many independent cases.
+
+``client`` and ``server`` are the two ends of a worker process; ``executors`` runs cases in processes or on a cluster.
+"""
