@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 from shiboken6 import isValid
 
-from study_app.designer.document.steps import MoveTo, SetValue
+from study_app.designer.document.steps import AddInstrument, MoveTo, SetValue
 from study_app.designer.outline.card import ROW_ROLE
 from study_app.protocol.source.files import shipped
 from study_app.store.study_settings import begin_settings
@@ -61,7 +61,7 @@ def test_a_row_is_dragged_to_where_the_line_is_and_esc_cancels(qtbot: Any, desig
     )
     drag(qtbot, designer, first, third + QPoint(0, 14), drop=False)
     assert tree.target is not None
-    assert tree.target[0] == 3
+    assert tree.target[0] == ("sequence", 3)
     qtbot.keyClick(tree, Qt.Key.Key_Escape)
     qtbot.mouseRelease(tree.viewport(), LEFT, pos=third)
     assert designer.text == text
@@ -69,6 +69,75 @@ def test_a_row_is_dragged_to_where_the_line_is_and_esc_cancels(qtbot: Any, desig
     assert sequence(designer) == (*before[1:3], before[0], *before[3:])
     designer.editing.undo()
     assert designer.text == text
+
+
+TLX = ("questionnaires", "nasa_tlx")
+
+
+@pytest.fixture
+def with_form(designer: Any) -> Any:
+    """The study with a standard questionnaire that no step asks."""
+    designer.change(("format = 1", "format = 2"))
+    designer.open()
+    designer.editing.ask(AddInstrument("nasa-tlx"))
+    designer.controller.show_outline()
+    return designer
+
+
+@pytest.mark.parametrize(
+    ("words", "steps"),
+    [
+        ("Before the first block", ["welcome", "nasa_tlx", "liquids", "reaching", "delays", "thanks"]),
+        ("After each trial of Delays", ["welcome", "liquids", "reaching", "delays", "thanks"]),
+        ("After each block", ["welcome", "liquids", "nasa_tlx", "reaching", "delays", "nasa_tlx", "thanks"]),
+        ("At the end", ["welcome", "liquids", "reaching", "delays", "nasa_tlx", "thanks"]),
+    ],
+)
+def test_a_questionnaire_is_asked_when_the_menu_says(with_form: Any, words: str, steps: list[str]) -> None:
+    head = with_form.place.form.head
+    assert head.used.whole == "not used"
+    assert head.ask.isVisible()
+    with_form.click_on(head.ask)
+    assert head.asks.isVisible()
+    action = next(one for one in head.asks.actions() if one.text().startswith(words))
+    assert action.text().partition("\t")[2]  # what differs is said
+    QTest.mouseClick(head.asks, LEFT, pos=head.asks.actionGeometry(action).center())
+    assert list(sequence(with_form)) == steps
+    asked = [name for name, block in with_form.value("blocks").items() if block.get("questionnaire") == "nasa_tlx"]
+    assert bool(asked) == ("trial" in words)
+    assert head.used.whole.startswith("used by")
+    assert len(with_form.steps) == 2
+    assert with_form.study.faults == ()
+
+
+def test_a_questionnaire_is_dragged_into_the_session(qtbot: Any, with_form: Any) -> None:
+    tree, before = with_form.place.outline.tree, with_form.text
+    start = place_of(with_form, *TLX)
+    drag(qtbot, with_form, start, start + QPoint(0, 30))
+    assert with_form.text == before  # far from the session
+    qtbot.mousePress(tree.viewport(), LEFT, pos=start)
+    event_move(tree.viewport(), start - QPoint(0, 20))
+    tree.verticalScrollBar().setValue(0)
+    thanks = tree.visualRect(with_form.index("pages", "thanks")).center()
+    event_move(tree.viewport(), thanks - QPoint(0, 12))
+    qtbot.mouseRelease(tree.viewport(), LEFT, pos=thanks)
+    assert list(sequence(with_form)) == ["welcome", "liquids", "reaching", "delays", "nasa_tlx", "thanks"]
+    with_form.editing.undo()
+    assert with_form.text == before
+
+
+def test_the_outline_has_a_row_for_the_session_order_with_that_of_the_blocks(designer: Any) -> None:
+    designer.change(("format = 1", "format = 2"))
+    designer.open()
+    click_first = place_of(designer, "sequence")
+    QTest.mouseClick(designer.place.outline.tree.viewport(), LEFT, pos=click_first)
+    row = designer.place.outline.tree.currentIndex().data(ROW_ROLE)
+    assert (row.title, row.note) == ("Session order", "5 steps")
+    names = designer.field("sequence").names
+    names.activated.emit(next(at for at in range(names.count()) if names.itemText(at) == "delay"))
+    assert sequence(designer)[-1] == "delay"
+    designer.click_on(designer.field("study", "block_order").segments.buttons[1])
+    assert designer.value("study", "block_order") == "balanced"
 
 
 def _thing(designer: Any, at: int) -> tuple[str, str]:

@@ -10,6 +10,7 @@ from study_app.designer.document.fields import Row, counted_elements, label_of, 
 from study_app.designer.document.names import ITEMS, languages_of, named_at, uses
 from study_app.designer.document.study import Study
 from study_app.number_text import counted, exact_duration
+from study_app.protocol.formats import is_second
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, entries, has, value_at
 
@@ -19,6 +20,7 @@ NAMED: Final = 3
 """By so many of its texts an entry without a title is called."""
 FIRST: Final = ("study",)
 """What is selected where nothing else is."""
+SEQUENCE: Final = ("sequence",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +55,9 @@ def outline(study: Study) -> Outline:
         for section in named
         for path, depth in ((section, 0), *((path, 1) for path, _ in entries(study.document, f"{section[0]}.*")))
     )
-    return Outline(tuple(_session(study)), tuple(parts), tuple(element(study, path) for path in tables))
+    order = [path for path in (SEQUENCE, ("sequences",)) if value_at(study.document, path)]
+    session = (*(element(study, path) for path in order), *_session(study))
+    return Outline(session, tuple(parts), tuple(element(study, path) for path in tables))
 
 
 def element(study: Study, path: Path, depth: int = 0) -> Element:
@@ -124,6 +128,14 @@ def _session(study: Study) -> Iterator[Element]:
             contained = sum(one.faults for one in below if one.depth == 1 and one.path != thing)
             yield replace(own, step=step, faults=own.faults + contained)
             yield from below
+
+
+def rows_of_blocks(document: Mapping[str, Any]) -> tuple[Row, ...]:
+    """Return what is decided about the main blocks together: their order, where there are several, and hypotheses."""
+    blocks = [block for _, block in entries(document, "blocks.*") if isinstance(block, Mapping)]
+    several = sum(block.get("phase", "main") == "main" for block in blocks) > 1
+    places = [("study", "block_order")] * several + [("analysis", "contrasts")]
+    return tuple(row for place in places if (row := row_at(document, place)) is not None) if is_second(document) else ()
 
 
 def _texts(value: Any) -> Iterator[str]:
@@ -282,7 +294,12 @@ def _fields(study: Study) -> tuple[tuple[Path, Row, str], ...]:
     shown = outline(study)
     parts = [one.path for one in (*shown.session, *shown.parts) if len(one.path) > 1]
     elements = dict.fromkeys((*parts, *(one.path for one in shown.study)))
-    return tuple((element, row, label) for element in elements for row, label in _of_table(study, element, ""))
+    of_blocks = rows_of_blocks(study.document)  # not again elsewhere
+    found: dict[Path, tuple[Path, Row, str]] = {row.path: (SEQUENCE, row, row.label) for row in of_blocks}
+    for element in elements:
+        for row, label in _of_table(study, element, ""):
+            found.setdefault(row.path, (element, row, label))
+    return tuple(found.values())
 
 
 def _of_table(study: Study, path: Path, above: str, depth: int = 0) -> Iterator[tuple[Row, str]]:

@@ -144,6 +144,8 @@ _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |
 
 LABELS: Final = {
     "between_s": "Between trials",
+    "block_order": "Order of blocks",
+    "contrasts": "Hypotheses",
     "delay_ms": "Visual delay",
     "design": "Trial design",  # a study has a design, too
     "designs": "Trial designs",
@@ -151,6 +153,7 @@ LABELS: Final = {
     "level_error_ms": "Level error of delays",
     "obrien-fleming": "O’Brien–Fleming",
     "participants": "Participants planned",
+    "sequence": "Session order",
 }
 """Labels of keys and values whose names are unclear or ambiguous, without their unit."""
 
@@ -352,7 +355,7 @@ def _sentences(description: str) -> dict[str, str]:
     return {value: match[2].strip() for match in _SENTENCES.finditer(description) for value in match[1].split(", ")}
 
 
-SINGULAR: Final = {"items": "question", "stimuli": "stimulus", "analysis": "analysis"}
+SINGULAR: Final = {"items": "question", "stimuli": "stimulus", "analysis": "analysis", "contrasts": "hypothesis"}
 """Singular names of sections' elements that are not the section's name without its last letter."""
 _PLURAL: Final = {"items": "questions"}
 """Plural names of sections' elements that are not the section's name."""

@@ -354,6 +354,19 @@ class MoveTo(Request):
 
 
 @dataclass(frozen=True, slots=True)
+class AddToSession(Request):
+    """Name an element in the session, before each of the steps at ``places``."""
+
+    path: Path
+    places: tuple[Path, ...]
+
+    def step(self, at: Situation) -> Step:
+        title, places = title_of(at.study.document, self.path), sorted(self.places, key=index_of, reverse=True)
+        said = f"{title}, now step {index_of(places[-1]) + 1}"
+        return Step(f"Add {title} to the session", tuple(Insert(place, self.path[1]) for place in places), said=said)
+
+
+@dataclass(frozen=True, slots=True)
 class Paste(Request):
     """Paste a text after an element: elements as TOML, or lines that become questions."""
 

@@ -7,7 +7,7 @@ from functools import partial
 
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QApplication, QGridLayout, QWidget
+from PySide6.QtWidgets import QApplication, QGridLayout, QMenu, QWidget
 
 from study_app.designer.document.steps import AddKey, LeaveText, RemoveKey, RenameElement, SetValue
 from study_app.designer.form.fields import LanguagesField, add_button, stacked
@@ -20,7 +20,7 @@ from study_app.designer.place.segments import cut_text, small_button
 from study_app.designer.problems.problems import NameRefusal, ProblemRow, RepairButton
 from study_app.gui.kit.commands import tip
 from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import RADIUS_CONTROL
+from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
@@ -72,6 +72,10 @@ class FormHead(QWidget):
         self.kind = Elided("small", "text2")
         self.followed = Elided("small", "text2")
         self.used = Elided("small", "text2")
+        self.ask = small_button("list", "Ask after …", height=34)
+        self.ask.hide()
+        self.asks = QMenu(self)
+        self.asks.setFont(font("label"))
         self.id = TypedLine("Id")
         self.id.setMinimumWidth(110)
         self.id.setMaximumWidth(230)
@@ -96,7 +100,9 @@ class FormHead(QWidget):
         grid.setHorizontalSpacing(8)
         grid.addWidget(self.tile, 0, 0)
         add_layout(grid, words, 0, 1)
-        add_layout(grid, hbox(self.feel, self.series, self.up, self.down, self.copy, self.delete, spacing=8), 0, 2)
+        add_layout(
+            grid, hbox(self.ask, self.feel, self.series, self.up, self.down, self.copy, self.delete, spacing=8), 0, 2
+        )
         self.id_line = QWidget()
         words_of_id = label("Id", "label")
         words_of_id.setFixedWidth(LABEL_PX)
@@ -110,6 +116,7 @@ class FormHead(QWidget):
         self.unlock.clicked.connect(self.unlock_asked)
         self.comments.clicked.connect(self.comments_asked)
         self.feel.clicked.connect(self._ask_to_feel)
+        self.ask.clicked.connect(lambda: self.asks.popup(self.ask.mapToGlobal(self.ask.rect().bottomLeft())))
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
         if self.form is None or self.form.path != form.path or self.form.id != form.id:
@@ -121,6 +128,10 @@ class FormHead(QWidget):
         at = "" if form.position is None else f"{form.position[0]} of {form.position[1]}"
         self.kind.show_text("  ·  ".join(filter(None, (form.kind, at))))
         self.used.show_text(form.used)
+        self.ask.setVisible(bool(form.asks) and not read_only)
+        self.asks.clear()
+        for words, asked in form.asks:
+            self.asks.addAction(words).triggered.connect(lambda _on=False, asked=asked: self.asked.emit(asked))
         self.id_line.setVisible(form.id is not None)
         self._read_only = read_only
         self._apply_lock()
@@ -372,7 +383,8 @@ class FormCard(Card):
         """Give the keyboard of a part that is gone to the row in its place, or that it added; else to the first row."""
         path: Path | None = None
         if before is not None and isinstance(gone, RowWidget):
-            path = (*form.path, *gone.row.row.path[len(before.path) :])
+            path = gone.row.row.path
+            path = (*form.path, *path[len(before.path) :]) if path[: len(before.path)] == before.path else path
         elif before is not None:
             path = added_row(form, before)
         if path is None or not self.focus(path):
@@ -406,7 +418,8 @@ class FormCard(Card):
                         None,
                     )
                 heads = beside
-                yield (at, row.row.path[len(form.path) :], structure_of(row)), partial(self._row, row), row
+                inner = row.row.path[len(form.path) :] if row.row.path[: len(form.path)] == form.path else row.row.path
+                yield (at, inner, structure_of(row)), partial(self._row, row), row
             if section.absent and not self.read_only:
                 added = tuple((one.path[len(form.path) :], one.label, one.help) for one in section.absent)
                 yield ("adds", at, added), partial(AddKeys, added, self._add), None

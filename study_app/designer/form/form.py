@@ -1,24 +1,37 @@
 """The form of one element of a study, made from its tables, faults and places in the file."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
 from study_app.designer.document.additions import number_rows
-from study_app.designer.document.elements import FIRST, brief, kind_of, place_words, position_of, title_of, used_by
+from study_app.designer.document.elements import (
+    FIRST,
+    SEQUENCE,
+    brief,
+    kind_of,
+    place_words,
+    position_of,
+    rows_of_blocks,
+    title_of,
+    used_by,
+)
 from study_app.designer.document.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
 from study_app.designer.document.names import languages_of, named_at
+from study_app.designer.document.steps import AddToSession, Request, SetValue, index_of
 from study_app.designer.document.study import Study
 from study_app.designer.form.row_widget import EDITORS
 from study_app.designer.form.rows import NO_QUESTIONS, STUDY_LANGUAGES, Entry, Form, FormRow, Section, question_lines
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.number_text import capitalised
-from study_app.protocol.source.document import Path, Places, places_of, value_at
+from study_app.protocol.groups import sequences_in
+from study_app.protocol.source.document import Path, Places, names, places_of, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 ENTRIES: Final = "Entries"
 DEEPEST: Final = 3
+KINDS: Final[Mapping[Path, str]] = {SEQUENCE: "Pages, blocks and questionnaires"}
 """So many tables within each other are shown in one form."""
 UNREADABLE: Final = "Correct the text in the tab File"
 WITH_LIQUIDS = ("liquids", "conditions", "blocks")
@@ -39,6 +52,10 @@ def form(study: Study, path: Path) -> Form:
         sections: tuple[Section, ...] = (Section(path, "", (_form_row(study, own_row, places),)),)
     else:
         sections = tuple(_sections(study, path, places, 0))
+        main = path[:1] == ("blocks",) and value_at(document, (*path, "phase")) in {None, "main"}
+        if (path == SEQUENCE or main) and (of_blocks := rows_of_blocks(document)):
+            together = tuple(_form_row(study, row, places) for row in of_blocks)
+            sections = (*sections, Section(path, "The main blocks together", together))
     shown = {row.row.path for section in sections for row in section.rows}
     shown |= {section.path for section in sections if section.path != path}
     within = [fault for fault in study.faults if fault.path[: len(path)] == path]
@@ -53,14 +70,42 @@ def form(study: Study, path: Path) -> Form:
         name = ""
     title = title_of(document, path)
     return Form(
-        path, title, icon_of(path, document), kind_of(path) or "Section of the file",
+        path, title, icon_of(path, document), kind_of(path) or KINDS.get(path, "Section of the file"),
         None if name is None else str(name), sections, own, of_id, position_of(document, path),
         question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
         tuple((path[:length], title_of(document, path[:length])) for length in (1, 2, 4) if length <= len(path)),
         f"Feel {title}" if len(path) == 2 and path[0] in WITH_LIQUIDS else "",
         bool(number_rows(document, path)),
         used_by(document, path),
+        tuple(asking(document, path)),
     )  # fmt: skip
+
+
+def asking(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Request]]:
+    """Yield when a questionnaire can be asked and is not yet, in words, with the request that does it."""
+    if len(path) != 2 or path[0] != "questionnaires":
+        return
+    steps = [((*place, at), str(step)) for place, listed in sequences_in(document) for at, step in enumerate(listed)]
+    blocks = [step for step in steps if step[1] in names(document, "blocks")]
+    main = [step for step in blocks if value_at(document, ("blocks", step[1], "phase")) in {None, "main"}]
+    firsts = {place[:-1]: place for place, _ in reversed(blocks)}
+    yield "Before the first block\tonce", AddToSession(path, tuple(firsts.values()))
+    for name in dict.fromkeys(step for _, step in blocks):
+        title, block = title_of(document, ("blocks", name)), value_at(document, ("blocks", name))
+        if isinstance(block, Mapping) and "design" not in block and block.get("questionnaire") != path[1]:
+            asked = SetValue(("blocks", name, "questionnaire"), path[1])
+            yield f"After each trial of {title}\tabout that trial", asked
+    ends = {name: _after(place for place, step in main if step == name) for name in dict.fromkeys(s for _, s in main)}
+    for name, after in ends.items():
+        yield f"After {title_of(document, ('blocks', name))}\tonce, about the block", AddToSession(path, after)
+    if len(ends) > 1:
+        yield f"After each block\t{len(ends)} times, compared", AddToSession(path, _after(place for place, _ in main))
+    lasts = {place[:-1]: place if step in names(document, "pages") else _after([place])[0] for place, step in steps}
+    yield "At the end\tonce, about the session", AddToSession(path, tuple(lasts.values()))
+
+
+def _after(places: Iterable[Path]) -> tuple[Path, ...]:
+    return tuple((*place[:-1], index_of(place) + 1) for place in places)
 
 
 def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[Section]:

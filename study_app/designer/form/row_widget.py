@@ -23,6 +23,7 @@ from study_app.designer.form.fields import (
     UnknownField,
     stacked,
 )
+from study_app.designer.form.hypotheses import BLOCK_ORDER, HYPOTHESES
 from study_app.designer.form.lists import CONDITIONS, EntriesField, LanguageListField, LinesField
 from study_app.designer.form.rows import STUDY_LANGUAGES, FormRow
 from study_app.designer.form.special import DESCRIPTION, ORDER, POINTS, QUESTION_KIND, QUESTION_LIST, SENTENCES
@@ -119,6 +120,7 @@ EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
     key: editor
     for editor in (
         CONDITIONS, DESCRIPTION, SENTENCES, ORDER, POINTS, QUESTION_KIND, QUESTION_LIST, LEVELS, TRIAL, TARGETS,
+        BLOCK_ORDER, HYPOTHESES,
     )
     for key in editor.keys
 }  # fmt: skip

@@ -7,6 +7,7 @@ from typing import Any, Final
 from study_app.designer.document.changes import is_copied
 from study_app.designer.document.fields import Choice, Row, label_of, singular
 from study_app.designer.document.names import languages_of
+from study_app.designer.document.steps import Request
 from study_app.designer.document.study import Study
 from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name
@@ -168,6 +169,7 @@ class Form:
     feel: str = ""  # what the button says that opens the lab with its liquids, "" where it has none
     series: bool = False  # whether there can be a series of it: elements that differ in one of its numbers
     used: str = ""  # how many other elements use it (`used_by`); "" where that is not said
+    asks: tuple[tuple[str, Request], ...] = ()  # when a questionnaire can be asked, with the steps that add it there
     # whether nothing can be edited but the text of the file, in which the study cannot be read
     unreadable: bool = False
 

@@ -238,8 +238,9 @@ class MeasuresPage(Themed, QWidget):
             return
         self.earlier.setVisible(shown.earlier)
         self.area.widget().setEnabled(not shown.earlier)
-        self.blocks.setVisible(shown.blocks is not None)
-        self.blocks.show_cards(() if shown.blocks is None else (shown.blocks,))
+        above = tuple(one for one in (shown.hypotheses, shown.blocks) if one is not None)
+        self.blocks.setVisible(bool(above))
+        self.blocks.show_cards(above)
         self.numbers.show_numbers(shown.numbers, shown.simulated.waiting)
         self.curves.setVisible(bool(shown.numbers))
         of = shown.levels

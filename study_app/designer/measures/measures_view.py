@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from study_app.designer.document.elements import title_of
+from study_app.designer.document.elements import SEQUENCE, title_of
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.names import blocks_using, languages_of
 from study_app.designer.document.study import Study
@@ -25,7 +25,15 @@ from study_app.designer.measures.cards import (
     Verdict,
 )  # fmt: skip
 from study_app.designer.measures.levels import LIMIT_NAMES, LevelBlock, LevelWords, level_block, rounded
-from study_app.designer.measures.simulation import ENOUGH, Controls, Focus, Simulated, balance_of, focus_of
+from study_app.designer.measures.simulation import (
+    ENOUGH,
+    Controls,
+    Focus,
+    Simulated,
+    balance_of,
+    focus_of,
+    hypotheses_of,
+)
 from study_app.designer.measures.study_facts import (
     Facts,
     copied_texts,
@@ -64,8 +72,9 @@ class MeasuresView:
     """What the tab shows: numbers and plots of a block with a method, else cards; and the cards below other tabs.
 
     ``words`` are those of the levels where observers are simulated, ``levels`` those whose forces are drawn, and
-    ``problems`` theirs, each with the words of its repairs. ``blocks`` says which use the element, where it is not one
-    itself; ``earlier``: all is of the last study without faults.
+    ``problems`` theirs, each with the words of its repairs. ``hypotheses`` are those of the block, or of the
+    study; ``blocks`` says which use the element, where it is not one itself; ``earlier``: all is of the last study
+    without faults.
     """
 
     controls: Controls
@@ -75,6 +84,7 @@ class MeasuresView:
     simulated: Simulated = field(default_factory=Simulated)
     problems: tuple[tuple[ProblemRow, tuple[str, ...]], ...] = ()
     cards: tuple[MeasureCard, ...] = ()
+    hypotheses: MeasureCard | None = None
     blocks: MeasureCard | None = None
     earlier: bool = False
 
@@ -107,6 +117,7 @@ def measures_view(
         return MeasuresView(controls, simulated=simulated, cards=tuple(cards), earlier=earlier)
     block, plan = focus.block, focus.plan
     blocks = blocks_card(study, protocol, facts, path, "" if block is None else block.id)
+    asked = hypotheses_card(protocol, path, controls, simulated)
     levels = None if block is None else level_block(protocol, block, forces=valid.forces)
     words = None if plan is None else LevelWords(plan.stimulus, plan.design)
     of = None if block is None else ("stimuli", str(block.stimulus), "levels")
@@ -117,7 +128,7 @@ def measures_view(
         cards = [session_card(study, facts, path), *warnings_card(facts, simulated.warnings)]
     else:
         numbers, cards = (), _cards(study, facts, path, focus, controls, simulated, parts)
-    return MeasuresView(controls, words, numbers, levels, simulated, own, tuple(cards), blocks, earlier)
+    return MeasuresView(controls, words, numbers, levels, simulated, own, tuple(cards), asked, blocks, earlier)
 
 
 def _cards(
@@ -278,6 +289,16 @@ def questions_card(protocol: Protocol, name: str, parts: int | None) -> MeasureC
     if not times:
         asked = ("warn", "warning", "It is never asked")
     return MeasureCard("Each time it is asked", "", (Figures(figures), *_ruled((*_fit(parts), asked))))
+
+
+def hypotheses_card(protocol: Protocol, path: Path, controls: Controls, simulated: Simulated) -> MeasureCard | None:
+    """Return the hypotheses about a block, or at the session's order all, with what the participants show of each."""
+    block = str(path[1]) if path[:1] == ("blocks",) and len(path) > 1 else ""
+    found = hypotheses_of(protocol, block) if block or path == SEQUENCE else ()
+    known, waiting = dict(simulated.hypotheses), simulated.failed or simulated.waiting or "liquid-study power plans it"
+    said = [f"{capitalised(words)}: {known.get(words, waiting)}" for words in (one.described() for one in found)]
+    who = people(controls.participants, controls.planned)
+    return MeasureCard("Hypotheses", who, tuple(("neutral", "flag", one) for one in said), wide=True) if said else None
 
 
 def blocks_card(study: Study, protocol: Protocol, facts: Facts, path: Path, shown: str) -> MeasureCard | None:

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
+from study_app.designer.document.elements import SEQUENCE
 from study_app.designer.document.study import Study
 from study_app.designer.measures.study_facts import text_keys
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import ObserverAnswers, ThresholdPlan, imprecise, threshold_plan
-from study_app.protocol.model import Protocol
+from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.orders.balance import Evenness, balances, numbered
 from study_app.protocol.orders.sequences import row_count
 from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.trials.presented_levels import clipping
 from study_app.psychophysics.families import Floats
+from study_app.psychophysics.precision import BETWEEN_PEOPLE
 from study_app.workers.client import WorkerClient
 from study_app.workers.server import Send, Stop, Stopped
 
@@ -156,7 +158,8 @@ class Detectable:
 class Simulated:
     """What was simulated of an element, None what nothing simulates.
 
-    ``waiting`` is said of numbers that are of an earlier study while others are simulated, ``failed`` why they cannot
+    ``hypotheses`` are those that can be planned, each with what the simulated participants show of it. ``waiting`` is
+    said of numbers that are of an earlier study while others are simulated, ``failed`` why they cannot
     be; both are "" otherwise. ``warnings`` are those of ``check`` that take simulated observers.
     """
 
@@ -164,6 +167,7 @@ class Simulated:
     measurable: Measurable | None = None
     group: GroupPrecision | None = None
     detectable: Detectable | None = None
+    hypotheses: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
     waiting: str = ""
     failed: str = ""
@@ -294,6 +298,8 @@ def balance_of(protocol: Protocol, block: Block, participants: int) -> tuple[str
 
 
 STUDIES: Final = 200
+SPREAD_OF: Final = 30
+"""A batch has at least so many participants of a study where one person's error is computed."""
 THRESHOLD_STUDIES: Final = 60
 MORE: Final = 4 / 3
 MOST_PEOPLE: Final = 60
@@ -341,9 +347,11 @@ class Focus:
 
 def focus_of(protocol: Protocol | None, path: Path) -> Focus:
     """Return what the measures of an element are of."""
-    if protocol is None or len(path) < 2:
+    if protocol is None or (len(path) < 2 and path != SEQUENCE):
         return Focus()
     block = protocol.blocks.get(str(path[1])) if path[0] == "blocks" else None
+    if path == SEQUENCE:  # the first hypothesis leads
+        block = next((protocol.blocks.get(one.blocks[0]) for one in hypotheses_of(protocol)), None)
     if (key := _NAMED_BY.get(str(path[0]))) is not None:
         users = [one for one in protocol.blocks_in_order if getattr(one, key) == path[1]]
         block = next((one for one in users if one.phase == "main"), next(iter(users), None))
@@ -353,6 +361,12 @@ def focus_of(protocol: Protocol | None, path: Path) -> Focus:
     statements = () if questionnaire is None else questionnaire.statements
     compares = block.phase == "main" and bool(statements) and len(block.conditions) > 1
     return Focus(block, threshold_plan(protocol, block), compares)
+
+
+def hypotheses_of(protocol: Protocol, block: str = "") -> tuple[Contrast, ...]:
+    """Return the hypotheses of a study, or those that compare a block."""
+    every = () if protocol.analysis is None else protocol.analysis.contrasts
+    return tuple(one for one in every if block in {"", *one.blocks})
 
 
 @dataclass(frozen=True, slots=True)
@@ -450,8 +464,11 @@ def carry_out(order: Simulation, _send: Send, stop: Stop) -> Simulated:
             measurable(plan, controls.lapses, least_of(protocol, plan), check, most),
             _group(plan, controls, check),
         )
+    shown = tuple(_ratios(protocol, order.block, controls.participants, check)) if order.block else ()
     if focus.compares:
-        found = replace(found, detectable=_detectable(order, check))
+        detectable, powers = _detectable(order, check)
+        found, shown = replace(found, detectable=detectable), (*shown, *powers)
+    found = replace(found, hypotheses=shown)
     if advises(protocol):
         found = replace(found, warnings=_warnings(replace(order, block="", controls=Controls())))
     return found
@@ -491,12 +508,33 @@ def _studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> thresho
     return total
 
 
-def _detectable(order: Simulation, check: Check) -> Detectable | None:
+def _ratios(protocol: Protocol, block: str, people: int, check: Check) -> Iterator[tuple[str, str]]:
+    """Yield for each hypothesis about the thresholds of two blocks which ratio 80 % of studies show, as ``power``."""
+    from study_app.analysis.data.blocks import decisions  # noqa: PLC0415 - loads scipy: only in this process
+    from study_app.analysis.planning import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
+
+    for one in hypotheses_of(protocol, block):
+        plans = [threshold_plan(protocol, protocol.blocks[name]) for name in one.blocks]
+        spreads = []
+        for plan in plans if one.measure == "threshold" and len(plans) == 2 else ():
+            check()
+            if plan is not None:
+                case = threshold_studies.Case("", plan, (SEED, 0, plan.trials, 0))
+                errors = threshold_studies.study_batch(case, (max(people, SPREAD_OF),)).spread
+                spreads.append(errors / math.sqrt(plan.standards))
+        if len(spreads) == 2 and all(map(math.isfinite, spreads)):
+            tail = decisions(protocol).alphas[-1] / (2 if one.expected is None else 1)
+            apart = math.hypot(math.log(BETWEEN_PEOPLE), *spreads) * threshold_studies.detectable(people, tail)
+            yield one.described(), f"80 % of studies of {people} show a ratio of {math.exp(apart):.2f}"
+
+
+def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tuple[tuple[str, str], ...]]:
+    """Return the smallest differences that studies show, and how many show each hypothesis about statements."""
     from study_app.analysis.planning.power_curves import powers  # noqa: PLC0415 - loads scipy
     from study_app.analysis.planning.simulated_studies import BATCH, HIGHEST, Counts, compares_statements, count, plan  # noqa: PLC0415 - loads scipy
 
     if not compares_statements(order.protocol):
-        return None
+        return None, ()
     planned = plan(order.protocol, _features(order, check))
     people = order.controls.participants
     counts = Counts()
@@ -512,7 +550,13 @@ def _detectable(order: Simulation, check: Check) -> Detectable | None:
         and one.item not in planned.unknown
     ]  # fmt: skip
     findings.sort(key=lambda one: (one.detectable is None, one.detectable or 0.0))
-    return Detectable(people, STUDIES, HIGHEST, tuple(findings))
+    of_block = {one.described() for one in hypotheses_of(order.protocol, order.block)}
+    shown = tuple(
+        (one.over, f"{one.power[0]:.0%} of studies of {people} show it, if people answer as the model does")
+        for one in curves
+        if one.question == "contrast" and one.over in of_block
+    )
+    return Detectable(people, STUDIES, HIGHEST, tuple(findings)), shown
 
 
 _features_of: dict[str, ConditionFeatures] = {}

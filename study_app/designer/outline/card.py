@@ -93,7 +93,7 @@ class RowPainter(QStyledItemDelegate):
                 painter.setBrush(Qt.BrushStyle.NoBrush)
                 painter.drawRoundedRect(place.adjusted(1, 2, -1, -2), RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
         x = sign_right(row) - INDENT
-        if row.step and self.movable and (chosen or pointed):
+        if row.drags and self.movable and (chosen or pointed):
             paint_grip(painter, QRectF(x - 8, place.top(), 8, place.height()), t.text2)
         if self.tree.model().hasChildren(index):
             chevron = "chevron_down" if self.tree.isExpanded(index) else "chevron"
@@ -142,12 +142,12 @@ EDGE_PX = 24
 class Tree(Themed, QTreeView):
     """The rows.
 
-    Signals: ``entered_row`` (by Enter), ``dropped`` (entries of a list, and the index that they come before). Its menu
-    shows its actions.
+    Signals: ``entered_row`` (by Enter), ``dropped`` (entries of a list, or an element, and the place of the entry that
+    they come before). Its menu shows its actions.
     """
 
     entered_row = Signal()
-    dropped = Signal(object, int)
+    dropped = Signal(object, object)
 
     def __init__(self) -> None:
         super().__init__()
@@ -167,7 +167,7 @@ class Tree(Themed, QTreeView):
         self.setItemDelegate(self.rows)
         self.setStyleSheet("QTreeView { background: transparent; border: none; outline: none; }")
         self.dragged: tuple[ElementPath, ...] = ()
-        self.target: tuple[int, float] | None = None
+        self.target: tuple[ElementPath, float] | None = None
         self.arrow_pressed = False
         self._pressed: tuple[QPoint, tuple[ElementPath, ...]] | None = None
 
@@ -197,9 +197,9 @@ class Tree(Themed, QTreeView):
         arrow = row is not None and self.model().hasChildren(index) and event.position().x() < sign_right(row)
         self.arrow_pressed = arrow
         plain = event.button() == Qt.MouseButton.LeftButton and not event.modifiers()
-        if plain and row is not None and row.step and self.rows.movable:
+        if plain and row is not None and row.drags and self.rows.movable:
             selected = [one.step for one in self.selected_rows() if one.step[:-1] == row.step[:-1]]
-            together = tuple(dict.fromkeys(selected)) if row.step in selected else (row.step,)
+            together = tuple(dict.fromkeys(selected)) if row.step and row.step in selected else (row.drags,)
             self._pressed = (event.position().toPoint(), together)
             if len(together) > 1:
                 self.setFocus(Qt.FocusReason.MouseFocusReason)
@@ -238,24 +238,27 @@ class Tree(Themed, QTreeView):
         self.viewport().unsetCursor()
         self.viewport().update()
 
-    def _target(self, at: QPoint) -> tuple[int, float]:
-        """Return the index of the entry that comes next where the line is, and how far down the line is."""
-        best, place = (0, 0.0), self.dragged[0][:-1]
-        nearest = float("inf")
+    def _target(self, at: QPoint) -> tuple[ElementPath, float] | None:
+        """Return the place of the entry that comes next where the line is, and how far down the line is.
+
+        What is no step yet comes into the session alone, not where the pointer is far from it.
+        """
+        place = self.dragged[0][:-1] if isinstance(self.dragged[0][-1], int) else None
+        found: list[tuple[ElementPath, float]] = []
+        ends: dict[ElementPath, tuple[ElementPath, float]] = {}
+        last: ElementPath = ()
         index = self.model().index(0, 0)
-        last = -1
-        bottom = 0.0
         while index.isValid():
-            row = index.data(ROW_ROLE)
-            box = QRectF(self.visualRect(index))
-            if row.step and row.step[:-1] == place:
-                last, bottom = int(row.step[-1]), box.bottom()
-                if abs(box.top() - at.y()) < nearest:
-                    nearest, best = abs(box.top() - at.y()), (last, box.top())
-            elif last >= 0 and row.path and self._below(index, place):
-                bottom = box.bottom()
+            row, box = index.data(ROW_ROLE), QRectF(self.visualRect(index))
+            if row.step and (row.step[:-1] == place or (place is None and "items" not in row.step)):
+                last = row.step[:-1]
+                found.append((row.step, box.top()))
+                ends[last] = (*last, int(row.step[-1]) + 1), box.bottom()
+            elif last and row.path and self._below(index, last):
+                ends[last] = ends[last][0], box.bottom()
             index = self.indexBelow(index)
-        return (last + 1, bottom) if abs(bottom - at.y()) < nearest else best
+        best = min((*found, *ends.values()), key=lambda one: abs(one[1] - at.y()), default=None)
+        return None if best is None or (place is None and abs(best[1] - at.y()) > ROW_PX) else best
 
     def _below(self, index: QModelIndex, place: ElementPath) -> bool:
         """Return whether a row is shown below an entry of a list."""

@@ -13,6 +13,7 @@ from study_app.designer.document.additions import number_rows
 from study_app.designer.document.elements import (
     FIRST,
     LABEL,
+    SEQUENCE,
     Element,
     FoundField,
     brief,
@@ -33,6 +34,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.labels import label
 from study_app.number_text import counted, duration
+from study_app.protocol.checks.cross_references import OWN
 from study_app.protocol.formats import TABLES, is_second
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.source.document import Path, names, value_at
@@ -41,7 +43,8 @@ from study_app.protocol.wording.languages import LANGUAGES
 ICONS: Final = {
     "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",
     "conditions": "columns", "scales": "scale", "stimuli": "pulse", "designs": "columns", "methods": "bars",
-    "groups": "people", "study": "file", "device": "device", "scene": "drop", "limits": "check", "analysis": "bars",
+    "sequence": "bars", "sequences": "bars", "groups": "people", "study": "file", "device": "device", "scene": "drop",
+    "limits": "check", "analysis": "bars",
 }  # fmt: skip
 """The icon of each section; a section that is not listed has a ring."""
 PAGES: Final[Mapping[Any, str]] = {"consent": "pen", "break": "pause", "debrief": "flag"}
@@ -49,6 +52,7 @@ PAGES: Final[Mapping[Any, str]] = {"consent": "pen", "break": "pause", "debrief"
 SECTIONS: Final = ("Session, in order", "Parts it is made of", "Settings")
 """The headings; above them is the study itself, with its title, description and languages."""
 SESSION, PARTS, SETTINGS = SECTIONS
+QUESTIONNAIRES: Final = "questionnaires"
 FORCE_LIMIT: Final = ("device", "force_limit_n")
 
 ElementPath: TypeAlias = Path
@@ -70,6 +74,11 @@ class OutlineRow:
     field: Path = ()  # the field of it that was found, () where none was looked for
     named: bool = False  # whether what was looked for is in its title or id
 
+    @property
+    def drags(self) -> Path:
+        """What is dragged by it: its entry in a list, or a questionnaire, which can be dropped into the session."""
+        return self.step or (self.path if self.path[:1] == (QUESTIONNAIRES,) and len(self.path) == 2 else ())
+
 
 def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
     """Return the outline of a study; with words to find only the elements that hold them.
@@ -90,7 +99,7 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
         named = [replace(one, title=titles[one.path]) for one in elements]
         inner = [_row(study, element, times_s, in_session=heading == SESSION) for element in named]
         if words:
-            inner = [row for row in inner if len(row.path) > 1 or heading in {"", SETTINGS}]
+            inner = [row for row in inner if len(row.path) > 1 or heading != PARTS]
             inner = [kept for row in inner if (kept := _found(study, row, words, fields.get(row.path))) is not None]
         total = duration(sum(times_s.values())) if times_s and heading == SESSION else ""
         if inner:
@@ -126,7 +135,9 @@ def icon_of(path: Path, document: Mapping[str, Any]) -> str:
 
 def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_session: bool) -> OutlineRow:
     path, note, kind = element.path, "", str(element.path[0])
-    if in_session and element.depth == 0:
+    if in_session and len(path) == 1:
+        note = counted(len(value_at(study.document, path)), "step" if path == SEQUENCE else "session")
+    elif in_session and element.depth == 0:
         note = duration(times_s[element.id]) if element.id in times_s else ""
     elif in_session:
         note = brief(study.document, path)
@@ -155,11 +166,10 @@ def _at(document: Any, path: Path) -> Any:
     return document
 
 
-SECTIONS_OF_TABLES: Final = frozenset(ICONS) - {"study", "device", "scene", "limits", "analysis"}
+SECTIONS_OF_TABLES: Final = frozenset(ICONS) - {*OWN, "study", "device", "scene", "limits", "analysis"}
 
 
 MOST_FIELDS: Final = 12
-QUESTIONNAIRES: Final = "questionnaires"
 HELP: Final = {"designs": "2IFC and other trial designs"}
 """What a section is for, where its name does not say it."""
 SERIES: Final = "Copies at several levels of one number: {}"

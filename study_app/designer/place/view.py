@@ -10,6 +10,7 @@ from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QApplication, QSizePolicy, QStackedWidget, QWidget
 
 from study_app.designer.document.steps import (
+    AddToSession,
     Do,
     DuplicateElement,
     GoTo,
@@ -20,6 +21,7 @@ from study_app.designer.document.steps import (
     SetText,
     SetValue,
     Task,
+    index_of,
     with_path,
 )
 from study_app.designer.form.card import FormCard
@@ -580,7 +582,7 @@ class DesignerPlace(Place):
         outline.field_asked.connect(self.areas.focus_field)
         outline.form_asked.connect(self.areas.focus_form)
         outline.element_clicked.connect(self.areas.leave_drawer)
-        outline.tree.dropped.connect(lambda entries, to: self.asked.emit(MoveTo(entries, to)))
+        outline.tree.dropped.connect(self._drop)
         outline.several_changed.connect(lambda: form.show_selected(outline.selected))
         self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
         self.parts.path.open_asked.connect(partial(self._ask, "select"))
@@ -658,6 +660,10 @@ class DesignerPlace(Place):
         if self.form.head.delete.isEnabled():
             self.flush()
             self.ask("delete", path, also)
+
+    def _drop(self, dragged: tuple[ElementPath, ...], to: ElementPath) -> None:
+        steps = isinstance(dragged[0][-1], int)
+        self.asked.emit(MoveTo(dragged, index_of(to)) if steps else AddToSession(dragged[0], (to,)))
 
     def move_by(self, by: int) -> None:
         path, also = self._several()

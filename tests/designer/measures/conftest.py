@@ -13,6 +13,7 @@ from study_app.designer.measures.simulation import (
     Observed,
     Simulated,
     Simulation,
+    hypotheses_of,
 )
 from study_app.protocol.checks.expected_precision import threshold_plan
 
@@ -61,7 +62,9 @@ def answer_to(wanted: Simulation) -> Simulated:
         tuple((level, 1 / len(levels)) for level in levels), ((10, QUANTILES), (20, QUANTILES)), one, 0.26, 20,
     )  # fmt: skip
     group = GroupPrecision(controls.participants, 60, controls.precision, 80, 0.93, 107, 0.98, 60, 20)
-    return Simulated(observed, Measurable((0.05, 0.5), ()), group, warnings=warnings)
+    hypotheses = tuple((one.described(), "80 % of studies of 12 show a ratio of 1.2") for one in
+                       hypotheses_of(wanted.protocol))  # fmt: skip
+    return Simulated(observed, Measurable((0.05, 0.5), ()), group, hypotheses=hypotheses, warnings=warnings)
 
 
 @pytest.fixture

@@ -5,8 +5,9 @@ from typing import Any
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
+from study_app.designer.measures.simulation import hypotheses_of
 from study_app.store.study_settings import kept_participants
 from tests.designer.measures.conftest import Worker, jnd, shown
 
@@ -31,6 +32,33 @@ def test_what_is_simulated_is_typed_at_the_right(qtbot: Any, designer: Any, work
     designer.editing.select(("pages", "welcome"))
     qtbot.waitUntil(lambda: not controls.threshold.isVisible())
     assert controls.participants.isVisible()
+
+
+@pytest.mark.parametrize("path", [("sequence",), ("blocks", "viscosity_2")])
+def test_the_hypothesis_comes_first_with_what_the_planned_participants_show(
+    qtbot: Any, designer: Any, worker: Worker, path: tuple[str, ...]
+) -> None:
+    jnd(designer)
+    designer.place.duplicate()
+    designer.go_to("sequence")
+    designer.click_on(designer.field("analysis", "contrasts").add)
+    designer.go_to(*path)
+    above = designer.place.measures.blocks
+
+    def texts() -> list[str]:
+        return [part.text() for part in above.findChildren(QLabel) if part.text()]
+
+    qtbot.waitUntil(lambda: texts()[:2] == ["Hypotheses", "24 planned"])
+    qtbot.waitUntil(lambda: bool(worker.orders and worker.orders[-1].block))
+    qtbot.waitUntil(lambda: bool(hypotheses_of(worker.orders[-1].protocol)))
+    worker.answer()
+    words = "Threshold is higher in viscosity than in viscosity_2: 80 % of studies of 12 show a ratio of 1.2"
+    qtbot.waitUntil(lambda: words in texts())
+    assert designer.place.measures.numbers.isVisible()
+    assert above.mapTo(designer.place, above.pos()).y() < designer.place.measures.numbers.mapTo(
+        designer.place, designer.place.measures.numbers.pos()).y()  # fmt: skip
+    designer.go_to("pages", "welcome")
+    qtbot.waitUntil(lambda: "Hypotheses" not in texts())
 
 
 def test_the_number_of_participants_is_kept_for_each_study(qtbot: Any, designer: Any, worker: Worker) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QSize, Qt
 
-from study_app.analysis.planning.threshold_studies import plans, sweep
-from study_app.designer.document.steps import RetypeFile
+from study_app.analysis.planning.threshold_studies import Precisions, plans, sweep, threshold_markdown
+from study_app.designer.document.steps import DuplicateElement, RetypeFile, Situation
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.cards import UNKNOWN
@@ -106,15 +106,15 @@ def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> 
     assert designer.place.measures.numbers.parts[3].number.text() == "17"
 
 
+BLOCK = ("blocks", "viscosity")
+NO_BREAKS = Unset((*BLOCK, "break_every")), Unset((*BLOCK, "break_page")), Unset(("pages", "rest"))
+
+
 def order(trials: int, **controls: float) -> Simulation:
     """Return the simulation of the block of a template with so many trials."""
-    block = ("blocks", "viscosity")
-    study, _ = template("viscosity-jnd").edited(
-        Set(("methods", "adaptive", "trials"), trials), Unset((*block, "break_every")), Unset((*block, "break_page")),
-        Unset(("pages", "rest")),
-    )  # fmt: skip
+    study, _ = template("viscosity-jnd").edited(Set(("methods", "adaptive", "trials"), trials), *NO_BREAKS)
     assert study.protocol is not None
-    focus = focus_of(study.protocol, block)
+    focus = focus_of(study.protocol, BLOCK)
     found = simulation_of(study.protocol, focus, Controls(**controls))  # type: ignore[arg-type]
     assert found is not None
     return found
@@ -189,6 +189,25 @@ def test_the_share_of_studies_is_that_of_the_command_power() -> None:
     ((_, found),) = list(sweep(planned, sizes, THRESHOLD_STUDIES, 1, Serial()))[-1:]
     within = [found["viscosity", 20].within(at, 0.5) for at in range(len(sizes))]
     assert group.enough == next(size for size, share in zip(sizes, within, strict=True) if share >= ENOUGH)
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+def test_the_ratio_that_studies_show_is_that_of_the_command_power() -> None:
+    study, _ = template("viscosity-jnd").edited(*NO_BREAKS, Set(("methods", "adaptive", "trials"), 20))
+    step = DuplicateElement(("blocks", "viscosity")).step(Situation(study))
+    contrast = {"measure": "threshold", "blocks": ["viscosity", "viscosity_2"]}
+    protocol = study.edited(*step.edits, Set(("analysis", "contrasts"), [contrast]))[0].protocol
+    assert protocol is not None
+    focus = focus_of(protocol, ("sequence",))
+    wanted = simulation_of(protocol, focus, Controls(participants=30))
+    assert wanted is not None
+    assert wanted.block == "viscosity"
+    ((_, said),) = carry_out(wanted, print, lambda: False).hypotheses
+    ((done, found),) = list(sweep(plans(protocol, ()), (30,), 10, 1, Serial()))[-1:]
+    (row,) = [line for line in threshold_markdown(Precisions(protocol, (30,), done, done, 1, found)).splitlines()
+              if line.startswith("| 20 | 30 | ") and "×/÷" in line]  # fmt: skip
+    assert float(said.rsplit(" ", 1)[1]) == pytest.approx(float(row.rsplit("×/÷ ", 1)[1].split()[0]), rel=0.05)
 
 
 @pytest.mark.slow

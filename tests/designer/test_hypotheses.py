@@ -1,0 +1,97 @@
+"""Order and hypotheses of the main blocks: found in their words, chosen beside the blocks, planned in Measures."""
+
+from typing import Any
+
+import pytest
+
+from study_app.designer.outline.card import ROW_ROLE
+
+pytestmark = pytest.mark.slow
+
+CONTRASTS, ORDER = ("analysis", "contrasts"), ("study", "block_order")
+
+
+@pytest.fixture
+def planned(designer: Any) -> Any:
+    """The study in format 2 with a number of participants."""
+    designer.change(("format = 1", "format = 2"), ("[limits]", "[analysis]\nparticipants = 11\n\n[limits]"))
+    designer.open()
+    return designer
+
+
+def choose(box: Any, words: str) -> None:
+    """Choose an entry of a list as a user does: open it, and press its place."""
+    at = next(at for at in range(box.count()) if box.itemText(at).startswith(words))
+    box.setFocus()
+    box.setCurrentIndex(at)
+    box.activated.emit(at)
+
+
+@pytest.mark.parametrize("words", ["counterbalance", "order of blocks", "block order"])
+@pytest.mark.parametrize("how", ["find", "add"])
+def test_the_order_of_the_blocks_is_found_in_the_words_of_the_field(planned: Any, words: str, how: str) -> None:
+    if how == "find":
+        planned.hit("ctrl+f")
+        planned.type(words)
+        planned.hit("Return")
+    else:
+        planned.hit("Insert")
+        planned.type(words)
+        planned.hit("Return")
+    assert planned.editing.selected == ("sequence",)
+    assert planned.form_row(*ORDER).isAncestorOf(planned.keyboard)
+
+
+@pytest.mark.parametrize("path", [("sequence",), ("blocks", "delays")])
+def test_the_order_of_the_blocks_says_what_the_planned_participants_get(planned: Any, path: tuple[str, ...]) -> None:
+    planned.go_to(*path)
+    assert planned.field(*ORDER).said.text() == "Everybody has them in this order."
+    planned.click_on(planned.field(*ORDER).segments.buttons[1])
+    assert planned.value(*ORDER) == "balanced"
+    said = planned.field(*ORDER).said
+    assert said.isVisible()
+    assert said.text() == (
+        "2 orders, by the number in the participant's id; 11 participants have each block in each place 5 to 6 times, "
+        "5.5 on average; 12 would be even."
+    )
+
+
+def test_a_hypothesis_is_a_sentence_with_choices(planned: Any) -> None:
+    planned.go_to("sequence")
+    before = planned.text
+    planned.click_on(planned.field(*CONTRASTS).add)
+    line = planned.field(*CONTRASTS).lines[0]
+    assert line.isAncestorOf(planned.keyboard)
+    thin = {"measure": "feels_liquid", "blocks": ("liquids",), "conditions": ("thin", "thick")}
+    assert dict(planned.value(*CONTRASTS)[0]) == {**thin, "expected": "higher"}
+    choose(line.first, "Late in Delays")
+    late = {"measure": "harder", "blocks": ("delays",), "conditions": ("late", "prompt")}
+    assert dict(planned.value(*CONTRASTS)[0]) == {**late, "expected": "higher"}
+    choose(line.measure, "Comfortable")
+    choose(line.relation, "is equal to")
+    assert dict(planned.value(*CONTRASTS)[0]) == {**late, "measure": "comfortable", "bound": 0.5}
+    planned.fill(line.bound, "0.25")
+    assert planned.value(*CONTRASTS)[0]["bound"] == 0.25
+    choose(line.relation, "is different from")
+    assert dict(planned.value(*CONTRASTS)[0]) == {**late, "measure": "comfortable"}
+    assert planned.study.faults == ()
+    planned.go_to("blocks", "delays")
+    assert planned.field(*CONTRASTS).lines[0].first.currentText() == "Late in Delays"
+    planned.click_on(planned.field(*CONTRASTS).lines[0].away)
+    assert planned.value(*CONTRASTS) is None
+    assert planned.undo_all() == before
+
+
+def test_two_blocks_of_levels_are_compared_by_their_thresholds(designer: Any) -> None:
+    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.go_to("blocks", "viscosity")
+    assert not designer.field(*CONTRASTS).add.isEnabled()
+    assert "add a second one" in designer.field(*CONTRASTS).why.text()
+    designer.place.duplicate()
+    designer.go_to("sequence")
+    designer.click_on(designer.field(*CONTRASTS).add)
+    first, second = (one for one in designer.value("blocks") if one.startswith("viscosity"))
+    wanted = {"measure": "threshold", "blocks": (first, second), "expected": "higher"}
+    assert dict(designer.value(*CONTRASTS)[0]) == wanted
+    (row,) = [one for one in designer.place.outline.indexes() if one.data(ROW_ROLE).path == ("sequence",)]
+    assert row.data(ROW_ROLE).faults == 0
