@@ -14,6 +14,7 @@ from study_app.store.atomic import write_file
 
 PATIENCE_S: Final = 180.0  # the first session after an installation compiles
 SETTLED_MS: Final = 250
+PAINTED_S: Final = 2.0
 TURN_MS: Final = 20
 
 T = TypeVar("T")
@@ -67,7 +68,7 @@ class Camera:
             before = window.size()
             window.resize(width, height)
             self.wait(SETTLED_MS)
-            wait_for_jobs(PATIENCE_S)  # a tank's glass is painted for each size
+            wait_for_jobs(PAINTED_S)  # a tank's glass is painted for each size
             self.wait(SETTLED_MS)
             self._keep(window, f"{name}-{width}x{height}")
             window.resize(before)
