@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from datetime import date
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QEventLoop, QObject, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
@@ -53,23 +53,6 @@ if TYPE_CHECKING:
     from study_app.gui.sessions.session_facts import SessionFacts
     from study_app.lab.ab_comparison import Setting, Side
 
-CALLED: Final = {
-    "screen": "participant's screen",
-    "viewing_distance_mm": "viewing distance",
-    "screen_width_mm": "screen width",
-    "display_offset": "display offset",
-    "device": "device",
-    "firmware": "firmware",
-    "camera": "camera",
-    "workspace": "workspace",
-    "theme": "theme",
-    "sound": "sound",
-    "photodiode": "photodiode square",
-    "lsl_markers": "LSL markers",
-    "lsl_samples": "LSL samples",
-    "triggers": "trigger port",
-}
-
 
 class WorkstationController(QObject):
     """Holds the settings, keeps them at once, and takes the last change back.
@@ -99,7 +82,8 @@ class WorkstationController(QObject):
         if made == self.settings:
             self._show()
             return
-        self._before.append((CALLED[next(iter(values))], self.settings))
+        changed = next(iter(values)).removesuffix("_mm").replace("_", " ").replace("lsl", "LSL")
+        self._before.append((changed, self.settings))
         self._keep(made)
 
     def remember_operator(self, operator: str) -> None:

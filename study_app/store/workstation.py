@@ -108,8 +108,8 @@ class MachineSettings(_Strict):
     firmware: Place | None = None
     workspace: Place | None = None
     recent: Annotated[tuple[Place, ...], Field(max_length=MOST_RECENT, strict=False)] = ()
-    theme: Literal["light", "dark"] = "light"
-    sound: bool = False
+    theme: Annotated[Literal["light", "dark"], Field(title="Theme of the operator's windows")] = "light"
+    sound: Annotated[bool, Field(title="Sound when a device needs attention")] = False
     photodiode: bool = False
     camera: Annotated[str, Field(max_length=CAMERA_LENGTH)] = ""
     operator: Annotated[str, Field(max_length=40)] = ""

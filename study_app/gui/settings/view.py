@@ -1,9 +1,11 @@
 """The machine's place: what this computer and its screens are like, apart from every study; kept at once, with undo.
 
-`FIELDS` says what is set, `MachinePlace` where it stands. It reads and writes no file.
+`FIELDS` says what is set, as does a title in `MachineSettings`; `MachinePlace` says where it stands. It reads and
+writes no file.
 """
 
 from functools import partial
+from typing import get_args
 
 from PySide6.QtCore import QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import (
@@ -70,8 +72,13 @@ FIELDS = (
     Field("photodiode", "Square for a photodiode in the tank's corner", "switch"),
     choice("device", "Device", {name: title_of(name) for name in list_devices()}),
     Field("camera", "Camera of conditions that show one", longest=CAMERA_LENGTH, placeholder=USUAL),
-    choice("theme", "Theme of the operator's windows", {"light": "Light", "dark": "Dark"}),
-    Field("sound", "Sound when a device needs attention", "switch"),
+)
+OF_PROGRAM = tuple(  # what has a title in `MachineSettings`: one of a few words, or a switch
+    choice(name, found.title, {word: word.capitalize() for word in words})
+    if (words := get_args(found.annotation))
+    else Field(name, found.title, "switch")
+    for name, found in MachineSettings.model_fields.items()
+    if found.title
 )
 
 
@@ -171,7 +178,9 @@ class MachinePlace(Place):
         self.test: DisplayTest | None = None
         self.devices = ActionButton("", "Devices", height=40)
         self.change = ActionButton("", "Change …", height=40)
-        self.editors = {one.name: Editor(one, self.devices if one.name == "device" else None) for one in FIELDS}
+        self.editors = {
+            one.name: Editor(one, self.devices if one.name == "device" else None) for one in (*FIELDS, *OF_PROGRAM)
+        }
         for editor in self.editors.values():
             editor.changed.connect(lambda name, value: self.changed.emit({name: value}))
         self.screens, self.offset = ScreensCard(), OffsetForm()
@@ -218,7 +227,7 @@ class MachinePlace(Place):
             (
                 card("Display offset", self.offset, Rule(), "photodiode"),
                 card("New sessions", "device", folder, "camera"),
-                card("This program", "theme", "sound"),
+                card("This program", *(one.name for one in OF_PROGRAM)),
             ),
         )
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
