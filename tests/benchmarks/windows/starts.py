@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -66,6 +67,17 @@ def main() -> None:
         surroundings["QT_QPA_PLATFORM"] = "offscreen"
     ends: Counter[tuple[str, str]] = Counter()
     began = time.monotonic()
+    with suppress(KeyboardInterrupt):  # Ctrl+C prints what there is
+        count(starts, surroundings, ends)
+    print(f"{ends.total()} starts in {(time.monotonic() - began) / 60:.0f} min\n\n| started | ended | times |")
+    print("| --- | --- | --: |")
+    for (kind, how), times in sorted(ends.items()):
+        print(f"| {kind} | {how} | {times} |")
+    sys.exit(any(how != "as it should" for _, how in ends))
+
+
+def count(starts: int, surroundings: dict[str, str], ends: Counter[tuple[str, str]]) -> None:
+    """Start and end the program, and count how it ended."""
     for at in range(starts):
         kind = list(KINDS)[at % len(KINDS)]
         with tempfile.TemporaryDirectory() as folder:
@@ -79,11 +91,6 @@ def main() -> None:
                 continue
         failed = done.returncode != KINDS[kind] or "Traceback" in done.stderr
         ends[kind, f"exit code {done.returncode}: {done.stderr[-2000:]}" if failed else "as it should"] += 1
-    print(f"{starts} starts in {(time.monotonic() - began) / 60:.0f} min\n\n| started | ended | times |")
-    print("| --- | --- | --: |")
-    for (kind, how), times in sorted(ends.items()):
-        print(f"| {kind} | {how} | {times} |")
-    sys.exit(any(how != "as it should" for _, how in ends))
 
 
 if __name__ == "__main__":
