@@ -8,7 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QBoxLayout, QDialog, QHBoxLayout, QLayout, QSizePolicy, QWidget
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
@@ -42,7 +42,6 @@ from study_app.gui.kit.commands import add_commands, key_cap, with_key
 from study_app.gui.kit.devices import DeviceShown, looking
 from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.sessions.session_facts import SessionFacts, extent_of, sessions
-from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
@@ -87,7 +86,7 @@ class HomePlace(Place):
         self.results = results
         self._draft_words = draft_words
         self.machine = DEFAULTS
-        self.dialog: NewSessionDialog | RehearsalDialog | SessionPage | None = None
+        self.dialog: QDialog | None = None
         self._opened: list[str] = []
         self._facts: tuple[Facts, ...] = ()
         self._files: frozenset[tuple[Path, int, int]] | None = None  # as the studies were read from them last
@@ -324,6 +323,8 @@ class HomePlace(Place):
         dialog.accepted.connect(lambda: self.results_asked.emit(dialog.folder))
 
     def _open_session(self, session: SessionFacts) -> None:
+        from study_app.gui.sessions.session_page import SessionPage  # noqa: PLC0415 - pyqtgraph: only once it is needed
+
         page = SessionPage(self, self.theme, session, open_here)
         page.changed.connect(self.show_sessions)
         self._open(page)
@@ -332,7 +333,7 @@ class HomePlace(Place):
         for dialog in self.findChildren(RehearsalDialog):
             dialog.end()
 
-    def _open(self, dialog: NewSessionDialog | RehearsalDialog | SessionPage) -> None:
+    def _open(self, dialog: QDialog) -> None:
         self.dialog = dialog
         dialog.finished.connect(dialog.deleteLater)
         dialog.open()
