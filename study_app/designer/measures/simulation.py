@@ -509,22 +509,24 @@ def _studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> thresho
 
 
 def _ratios(protocol: Protocol, block: str, people: int, check: Check) -> Iterator[tuple[str, str]]:
-    """Yield for each hypothesis about the thresholds of two blocks which ratio 80 % of studies show, as ``power``."""
+    """Yield for each hypothesis about thresholds which ratio 80 % of studies show, as ``power`` computes it."""
     from study_app.analysis.data.blocks import decisions  # noqa: PLC0415 - loads scipy: only in this process
-    from study_app.analysis.planning import threshold_studies  # noqa: PLC0415 - loads scipy: only in this process
+    from study_app.analysis.planning.power_curves import detectable  # noqa: PLC0415 - the same
+    from study_app.analysis.planning.simulated_studies import group_shares  # noqa: PLC0415 - the same
+    from study_app.analysis.planning.threshold_studies import Case, study_batch  # noqa: PLC0415 - the same
 
     for one in hypotheses_of(protocol, block):
         plans = [threshold_plan(protocol, protocol.blocks[name]) for name in one.blocks]
+        groups = [int(people * share + 1e-9) for share in group_shares(protocol, one) or (1.0,)]
         spreads = []
-        for plan in plans if one.measure == "threshold" and len(plans) == 2 else ():
+        for plan in plans if one.measure == "threshold" and min(groups) > 1 else ():
             check()
             if plan is not None:
-                case = threshold_studies.Case("", plan, (SEED, 0, plan.trials, 0))
-                errors = threshold_studies.study_batch(case, (max(people, SPREAD_OF),)).spread
-                spreads.append(errors / math.sqrt(plan.standards))
-        if len(spreads) == 2 and all(map(math.isfinite, spreads)):
+                found = study_batch(Case("", plan, (SEED, 0, plan.trials, 0)), (max(people, SPREAD_OF),))
+                spreads.append(found.spread / math.sqrt(plan.standards))
+        if len(spreads) == len(plans) and all(map(math.isfinite, spreads)):
             tail = decisions(protocol).alphas[-1] / (2 if one.expected is None else 1)
-            apart = math.hypot(math.log(BETWEEN_PEOPLE), *spreads) * threshold_studies.detectable(people, tail)
+            apart = math.hypot(math.log(BETWEEN_PEOPLE), *spreads) * detectable(*groups, tail=tail)[1]
             yield one.described(), f"80 % of studies of {people} show a ratio of {math.exp(apart):.2f}"
 
 
