@@ -177,6 +177,15 @@ class Held(QObject):
         self.over.emit()
 
 
+def test_the_sidebar_has_one_width_per_size_of_window_at_every_place(visit: MainController, qtbot: Any) -> None:
+    for size, width in ((1024, 640), 72), ((1440, 900), 72), ((1920, 1080), 216):
+        visit.window.resize(*size)
+        for name in (*visit.window.rail.buttons, "home"):
+            visit.window.go(name)
+            qtbot.wait(1)
+            assert (visit.window.size().toTuple(), visit.window.rail.width()) == (size, width), name
+
+
 def test_results_show_what_was_run_last(visit: MainController, monkeypatch: Any) -> None:
     shown: list[Path] = []
     monkeypatch.setattr(main_controller, "LiveSession", Held)

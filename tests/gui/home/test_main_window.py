@@ -1,14 +1,10 @@
 """The main window: places are made when one goes there, entered and left; the rail tells where one is."""
 
-from pathlib import Path
-
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton, QVBoxLayout
 
 from study_app.gui.home.main_window import DESTINATIONS, MainWindow
-from study_app.gui.lab.view import LabPlace
-from study_app.gui.results.view import ResultsPlace
 from study_app.gui.widgets.main_view import Place
 
 
@@ -117,15 +113,3 @@ def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
     assert main.focusWidget() is not began
     main.come_back()
     assert main.focusWidget() is began
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("size", "width"), [((1024, 640), 72), ((1440, 900), 72), ((1920, 1080), 216)])
-def test_the_sidebar_has_one_width_per_size_of_window(qtbot, size, width):
-    window = MainWindow({"home": Place, "results": lambda: ResultsPlace(handed_to=Path()), "lab": LabPlace})
-    qtbot.addWidget(window)
-    window.resize(*size)
-    window.show()
-    for place in ("home", "results", "lab", "home"):
-        window.go(place)
-        assert window.rail.width() == width

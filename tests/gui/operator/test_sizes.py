@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.gui.operator.controls import LEAST_HEIGHT, LEAST_WIDTH
 from study_app.gui.operator.plots import ForceCard
 from study_app.gui.operator.servo_health import Forces
 from study_app.gui.operator.window import OperatorWindow
@@ -118,8 +117,8 @@ def test_nothing_is_clipped(window: OperatorWindow, told: Any, health: Any, stat
         assert window.arrangement.side_area.verticalScrollBar().maximum() == 0, size
         assert window.header.study.text() == "demo", size
         stop = window.stop.stop
-        assert stop.width() >= LEAST_WIDTH
-        assert stop.height() >= LEAST_HEIGHT
+        assert stop.width() >= 320
+        assert stop.height() >= 160
         assert window.rect().contains(place_of(stop, window))
         assert not scrolls(stop, window)
     assert {size: found for size, found in problems.items() if found} == {}
