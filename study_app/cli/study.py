@@ -32,7 +32,13 @@ STARTED = 16  # letters of a time down to the minute
 
 @click.command()
 @click.argument("protocol", metavar="FILE", required=False)
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of protocol files instead.")
+@click.option(
+    "--schema",
+    is_flag=False,
+    flag_value="protocol",
+    type=click.Choice(["protocol", "journal"]),
+    help="Print the JSON Schema of protocol files instead, or that of a line of a session's journal.",
+)
 @click.option(
     "--delay-ticks",
     type=click.IntRange(1, MOST_DELAY),
@@ -40,7 +46,7 @@ STARTED = 16  # letters of a time down to the minute
     show_default=True,
     help="Delay of the device's forces [ticks] for which levels are checked; the pre-flight uses the measured delay.",
 )
-def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
+def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None:
     """Describe the study or the scenes, or list every problem of the file with line and hint."""
     from study_app.protocol import describe, load
 
@@ -48,8 +54,10 @@ def check(protocol: str | None, *, schema: bool, delay_ticks: int) -> None:
         import json
 
         from study_app.protocol.source.json_schema import editor_schema
+        from study_app.store.journals.journal_events import journal_schema
 
-        click.echo(json.dumps(editor_schema(), indent=2, ensure_ascii=False))
+        printed = editor_schema() if schema == "protocol" else journal_schema()
+        click.echo(json.dumps(printed, indent=2, ensure_ascii=False))
         return
     if protocol is None:
         raise click.UsageError("check needs a protocol: a file, or one of " + ", ".join(load.shipped()))

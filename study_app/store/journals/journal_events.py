@@ -6,6 +6,7 @@ does not declare (the measures of a task, fields of another version) are in ``ot
 """
 
 import dataclasses
+import inspect
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -37,10 +38,12 @@ _RESPONSE = ("item", "number", "kind", "value", "onset_s", "first_s", "last_s", 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a field may be: in words, and whether a value is so."""
+    """What a field may be: in words, whether a value is so, and the type of JSON Schema, with more of its keys."""
 
     words: str
     holds: Callable[[object], bool]
+    type: str
+    more: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
 
 def _is_integer(value: object) -> bool:
@@ -75,33 +78,54 @@ def _are_answers(value: object) -> bool:
     )
 
 
-def _matches(pattern: re.Pattern[str]) -> Callable[[object], bool]:
-    return lambda value: isinstance(value, str) and pattern.fullmatch(value) is not None
+def _matches(pattern: re.Pattern[str]) -> tuple[Callable[[object], bool], str, Mapping[str, str]]:
+    def matches(value: object) -> bool:
+        return isinstance(value, str) and pattern.fullmatch(value) is not None
+
+    return matches, "string", {"pattern": f"^({pattern.pattern})$"}
 
 
-Text: TypeAlias = Annotated[str, Kind("text", lambda value: isinstance(value, str))]
-StudyName: TypeAlias = Annotated[str, Kind("study's name", _matches(STUDY_NAME))]
-ParticipantId: TypeAlias = Annotated[str, Kind("participant's id", _matches(PARTICIPANT_ID))]
-RecordingName: TypeAlias = Annotated[str, Kind("recording's name", _matches(RECORDING_NAME))]
-Flag: TypeAlias = Annotated[bool, Kind("flag", lambda value: isinstance(value, bool))]
-Integer: TypeAlias = Annotated[int, Kind("integer", _is_integer)]
-Number: TypeAlias = Annotated[float, Kind("number", _is_number)]
-Time: TypeAlias = Annotated[str, Kind("time", _is_time)]
-Described: TypeAlias = Annotated[Mapping[str, Any], Kind("object", lambda value: isinstance(value, dict))]
+Text: TypeAlias = Annotated[str, Kind("text", lambda value: isinstance(value, str), "string")]
+StudyName: TypeAlias = Annotated[str, Kind("study's name", *_matches(STUDY_NAME))]
+ParticipantId: TypeAlias = Annotated[str, Kind("participant's id", *_matches(PARTICIPANT_ID))]
+RecordingName: TypeAlias = Annotated[str, Kind("recording's name", *_matches(RECORDING_NAME))]
+Flag: TypeAlias = Annotated[bool, Kind("flag", lambda value: isinstance(value, bool), "boolean")]
+Integer: TypeAlias = Annotated[int, Kind("integer", _is_integer, "integer")]
+Number: TypeAlias = Annotated[float, Kind("number", _is_number, "number")]
+Time: TypeAlias = Annotated[str, Kind("time", _is_time, "string", {"format": "date-time"})]
+Described: TypeAlias = Annotated[Mapping[str, Any], Kind("object", lambda value: isinstance(value, dict), "object")]
 Checks: TypeAlias = Annotated[
     Sequence[Mapping[str, Any]],
-    Kind("list of objects", lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value)),
+    Kind(
+        "list of objects",
+        lambda value: isinstance(value, list) and all(isinstance(one, dict) for one in value),
+        "array",
+        {"items": {"type": "object"}},
+    ),
 ]
 Numbers: TypeAlias = Annotated[
     Mapping[str, float],
-    Kind("table of numbers", lambda value: isinstance(value, dict) and all(map(_is_number, value.values()))),
+    Kind(
+        "table of numbers",
+        lambda value: isinstance(value, dict) and all(map(_is_number, value.values())),
+        "object",
+        {"additionalProperties": {"type": "number"}},
+    ),
 ]
-Texts: TypeAlias = Annotated[Sequence[str], Kind("list of texts", _are_texts)]
-Answers: TypeAlias = Annotated[Sequence["Response"], Kind("list of answers", _are_answers)]
+Texts: TypeAlias = Annotated[Sequence[str], Kind("list of texts", _are_texts, "array", {"items": {"type": "string"}})]
+Answers: TypeAlias = Annotated[
+    Sequence["Response"], Kind("list of answers", _are_answers, "array", {"items": {"$ref": "#/$defs/answer"}})
+]
 AnyAnswer: TypeAlias = Annotated[
-    Any, Kind("answer", lambda value: isinstance(value, str) or _is_number(value) or _are_texts(value))
+    Any,
+    Kind(
+        "answer",
+        lambda value: isinstance(value, str) or _is_number(value) or _are_texts(value),
+        "string",
+        {"type": ["string", "number", "array"], "items": {"type": "string"}},
+    ),
 ]
-OldAnswer: TypeAlias = Annotated[Any, Kind("integer", _is_integer)]
+OldAnswer: TypeAlias = Annotated[Any, Kind("integer", _is_integer, "integer")]
 """Of a question without a kind, in format 1."""
 
 
@@ -585,6 +609,43 @@ def problem(line: Mapping[str, Any]) -> str | None:
         if not holds(known := _kind_name(line, name), line[name]):
             return f"({event}) holds {name} {shortened(line[name])}, expected: {_KINDS[known][0].words}"
     return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has t_s {line['t_s']:g}"
+
+
+def journal_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a line of a journal, which has no `problem`."""
+    of_fields = {name: _schema_of(name) for name in _KINDS if name not in {"answer", "value"}}
+    answer = {
+        "type": "object",
+        "properties": of_fields,
+        "required": [name for name in _RESPONSE if name != "kind"],
+        "if": {"required": ["kind"]},
+        "then": {"properties": {"value": _schema_of("answer")}},
+        "else": {"properties": {"value": _schema_of("value")}},
+    }
+    of_events = []
+    for name, kind in EVENTS.items():
+        wanted: dict[str, Any] = {"description": inspect.getdoc(kind), "required": list(kind.required)}
+        if kind.one_of:
+            wanted["oneOf"] = [{"required": [one]} for one in kind.one_of]
+        of_events.append({"if": {"properties": {"event": {"const": name}}}, "then": wanted})
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "A line of journal.jsonl",
+        "$defs": {"answer": answer},
+        **answer,
+        "properties": {**of_fields, "t_s": {"type": "number", "minimum": 0, "maximum": _MOST_SECONDS}},
+        "required": ["n", "event", "t_s", "at"],
+        "allOf": of_events,
+    }
+
+
+def _schema_of(name: str) -> dict[str, Any]:
+    kind, may_be_null = _KINDS[name]
+    schema: dict[str, Any] = {"type": kind.type, **kind.more}
+    if may_be_null:
+        types = schema["type"]
+        schema["type"] = [*([types] if isinstance(types, str) else types), "null"]
+    return schema
 
 
 def read_event(line: Mapping[str, Any]) -> Event:

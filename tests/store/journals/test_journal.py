@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from jsonschema import Draft7Validator
 
 from study_app.errors import StoreError
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal import Journal, SessionClock, read, scan
-from study_app.store.journals.journal_events import problem, unknown_events
+from study_app.store.journals.journal_events import journal_schema, problem, unknown_events
 from tests.journal_lines import event_of, raw
 from tests.store.conftest import AWKWARD, Start
 
@@ -197,6 +198,22 @@ def test_what_is_wrong_with_a_line_is_named(held: dict[str, Any], sentence: str)
     assert said is not None
     assert sentence in said
     assert len(said) < 300
+    if "holds at" not in sentence:  # a format in JSON Schema is a remark
+        assert [*Draft7Validator(journal_schema()).iter_errors(held)]
+
+
+@pytest.mark.slow
+def test_every_stored_line_follows_the_schema() -> None:
+    schema = Draft7Validator(journal_schema())
+    root = Path(__file__).resolve().parents[3]
+    paths = [
+        *(root / "tests" / "store" / "releases").rglob("journal.jsonl"),
+        *(root / "results").rglob("journal.jsonl"),
+    ]
+    lines = [line for path in paths for line in path.read_text(encoding="utf-8").splitlines()]
+    assert len(lines) > 4000
+    for line in lines:
+        schema.validate(json.loads(line))
 
 
 def test_an_event_of_another_version_is_told_once_and_what_the_store_writes_is_known(finished: Start) -> None:
