@@ -20,15 +20,12 @@ class Device(Driver, Protocol):
 
     def open(self) -> None:
         """Prepare the device; raise ``DeviceNotFound`` if there is none."""
-        ...
 
     def close(self) -> None:
         """Release the device; a second call does nothing."""
-        ...
 
     def describe(self) -> dict[str, Any]:
         """Return its record for a receipt: names and numbers, no folders of this machine."""
-        ...
 
     def __enter__(self) -> Self:
         self.open()

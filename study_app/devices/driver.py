@@ -95,7 +95,6 @@ class Connection(Protocol):
 
     def close(self) -> object:
         """Close it; its force was ended before."""
-        ...
 
 
 AtClose: TypeAlias = Literal["stand_down", "release", "leave"]

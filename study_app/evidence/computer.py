@@ -42,9 +42,9 @@ class Windows(Protocol):
     """
 
     @property
-    def frames(self) -> int: ...  # noqa: D102
-    def timer(self, period_ms: int, count: int, fire: Callable[[], object]) -> int: ...  # noqa: D102
-    def during(self, work: Callable[[], T]) -> T: ...  # noqa: D102
+    def frames(self) -> int: ...
+    def timer(self, period_ms: int, count: int, fire: Callable[[], object]) -> int: ...
+    def during(self, work: Callable[[], T]) -> T: ...
 
 
 def under_load(load: LoadName, windows: Windows | None, work: Callable[[], T]) -> T:

@@ -79,13 +79,11 @@ class TickTimer:
         self.run(WARM_UP)
 
     def batch(self) -> None:
-        """Run a batch of ticks and store its time."""
         began = time.perf_counter_ns()
         self.run(BATCH)
         self.costs_ns.append((time.perf_counter_ns() - began) / BATCH)
 
     def run(self, ticks: int) -> None:
-        """Run ``ticks`` ticks."""
         _take(self._model, self._safety[0], self._sample[0], self._positions_m, self._ticks, ticks)
         self._ticks += ticks
 
@@ -114,6 +112,5 @@ def _pairs(scene: Scene) -> dict[tuple[str, Effect], tuple[Scene, Scene]]:
 
 
 def _with(scene: Scene, liquid: Liquid, effects: tuple[Effect, ...]) -> Scene:
-    """Return the scene with other effects in one liquid."""
     changed = liquid.model_copy(update={"effects": effects})
     return scene.model_copy(update={"liquids": tuple(changed if it is liquid else it for it in scene.liquids)})

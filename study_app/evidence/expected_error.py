@@ -159,7 +159,6 @@ def physical_n(scene: Scene, speed_mps: float, rate_per_s: float, t_s: Floats) -
 
 
 def _stroke(speed_mps: float, rate_per_s: float, t_s: Floats) -> tuple[Floats, Floats]:
-    """Return velocity and acceleration (n,) of a stroke along x."""
     return speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
 
 
@@ -174,7 +173,6 @@ def _non_newtonian_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s:
 
 
 def _lift_n(scene: Scene) -> float:
-    """Return net buoyancy, upward [N]."""
     return (scene.liquids[0].density_kg_m3 - scene.body.density_kg_m3) * scene.body.volume_m3 * GRAVITY_MPS2
 
 

@@ -33,7 +33,6 @@ class Table:
     left: int | tuple[int, ...] = 0
 
     def text(self) -> str:
-        """Return the table for a terminal."""
         cells = [[str(cell) for cell in row] for row in (self.headings, *self.rows)]
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         aligned = [f"{'<' if words else '>'}{width}" for words, width in zip(self._words(), widths, strict=True)]
@@ -41,16 +40,13 @@ class Table:
         return "\n".join(lines)
 
     def markdown(self) -> str:
-        """Return the table as Markdown."""
         marks = ["---" if words else "--:" for words in self._words()]
         return "\n".join(f"| {' | '.join(map(str, row))} |" for row in (self.headings, marks, *self.rows))
 
     def csv(self) -> str:
-        """Return the table for machines."""
         return csv_text_of([self.headings, *self.rows])
 
     def _words(self) -> list[bool]:
-        """Return which columns are words."""
         words = range(self.left) if isinstance(self.left, int) else self.left
         return [k in words for k in range(len(self.headings))]
 

@@ -58,7 +58,6 @@ class ThesisFigure:
 
     @property
     def name(self) -> str:
-        """Name of its files."""
         return f"figure-{self.number}"
 
 
@@ -295,7 +294,6 @@ def _components(axes: Axes, run: Run, events: Sequence[tuple[float, str]], *, se
 
 
 def _path(axes: Axes, run: Run) -> None:
-    """Draw the path as seen from above."""
     colour = style.TEXT_SOFT
     x_m, z_m = run.motion.position_m[:, 0], run.motion.position_m[:, 2]
     axes.set_title("Path from above [m]", pad=HEADING_PT)

@@ -69,7 +69,6 @@ class Setting:
 
     @property
     def is_edited(self) -> bool:
-        """Whether it was edited since it was chosen."""
         return self.scene != self.origin
 
     @property
@@ -78,7 +77,6 @@ class Setting:
         return f"{self.name}, edited" if self.is_edited else self.name
 
     def value(self, name: str) -> Value:
-        """Return the present value of a parameter."""
         return value_of(self.scene, name)
 
     def chosen_value(self, name: str) -> Value:
@@ -86,7 +84,6 @@ class Setting:
         return value_of(self.origin, name)
 
     def changed_names(self) -> tuple[str, ...]:
-        """Return the parameters that were changed."""
         names = (it.name for section in sections(self.scene) for it in section.parameters)
         return tuple(name for name in names if self.value(name) != self.chosen_value(name))
 
@@ -109,7 +106,6 @@ class Workbench:
     held: tuple[Side, str] | None = None
 
     def setting(self, side: Side) -> Setting:
-        """Return the setting of a side."""
         return self.a if side == "A" else self.b
 
     @property
@@ -119,12 +115,10 @@ class Workbench:
 
     @property
     def may_undo(self) -> bool:
-        """Whether there is an edit to undo."""
         return bool(self.past) and not self.blind
 
     @property
     def may_redo(self) -> bool:
-        """Whether an undone edit can be redone."""
         return bool(self.future) and not self.blind
 
     def shown_name(self, side: Side) -> str:
@@ -188,7 +182,6 @@ class Workbench:
         return self._edited(side, Setting(name, scene, scene))
 
     def copy_to_other(self) -> Workbench:
-        """Return a copy with the presented setting on both sides."""
         self._refuse_blind("copied")
         return self._edited(other(self.presented), self.in_hand)
 
@@ -207,7 +200,6 @@ class Workbench:
         return replace(self, a=a, b=b, past=(*self.past, (self.a, self.b)), future=future, held=None)
 
     def switch(self) -> Workbench:
-        """Return a copy that presents the other setting."""
         return replace(self, presented=other(self.presented), held=None)
 
     def blinded(self, chance: Random) -> Workbench:
@@ -219,7 +211,6 @@ class Workbench:
         return replace(self, blind=True, first=first, presented=presented, held=None)
 
     def revealed(self) -> Workbench:
-        """Return a copy that is no longer blind."""
         return replace(self, blind=False, first="A")
 
     def _edited(

@@ -50,7 +50,6 @@ class LimiterCounts:
         self._batches: deque[tuple[int, Any]] = deque()
 
     def add(self, samples: Any) -> None:
-        """Count in samples of telemetry (recarray of ``SAMPLE``)."""
         if len(samples) == 0:
             return
         newest_ns = int(samples.time_ns[-1])
@@ -217,7 +216,6 @@ class Live:
         self.servo.fade_in()
 
     def limiters(self) -> tuple[LimiterCount, ...]:
-        """Return which limiters acted in the last 10 s."""
         scene = Scene() if self.workbench is None else self.workbench.in_hand.scene
         limit_n = min(self.device.force_limit_n, scene.force_limit_n)
         slew_n = slew_limit_n(1 / self.servo.rate_hz, self.device.dynamics, scene.velocity)
@@ -228,7 +226,6 @@ class Live:
         return self._shown.trace()
 
     def tail(self, side: Side) -> Tail | None:
-        """Return the tail of a side; None without a wake."""
         return self._shown.tail(side)
 
     def reading(self) -> Reading | None:
@@ -308,7 +305,6 @@ class _Ghost:
         self._serial = 0
 
     def begin(self, presented: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
-        """Present these settings from the next sample on."""
         self._serial += 1
         self.shadow.expect(self._serial, presented, a, b, goes_on=goes_on)
 

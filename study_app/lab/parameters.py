@@ -189,7 +189,6 @@ def _parameter(scene: Scene, name: str) -> Parameter:
 
 
 def _model(scene: Scene, place: str) -> type[BaseModel]:
-    """Return the model that has a table's fields."""
     if place == "scene":
         return Scene
     liquid = the_liquid(scene)
@@ -197,7 +196,6 @@ def _model(scene: Scene, place: str) -> type[BaseModel]:
 
 
 def _default(scene: Scene, place: str, field: str, row: Parameter) -> Any:
-    """Return a field's default in its model; None without one."""
     model = _model(scene, place)
     if place in NAMED and field in NAMED[place].open_values:
         return NAMED[place].open_values[field](scene)
@@ -254,7 +252,6 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
 
 
 def _checked(it: Parameter, value: Value) -> Value:
-    """Return the value converted and checked for its parameter."""
     if it.choices:
         if value not in {choice for choice, _ in it.choices}:
             words = ", ".join(repr(choice) for choice, _ in it.choices)

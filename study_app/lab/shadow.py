@@ -170,11 +170,9 @@ class Shadow:
                 self._follow(part)
 
     def trace(self) -> Trace | None:
-        """Return the last 2.5 s; None before the first sample."""
         return self._recent.trace()
 
     def tail(self, side: Side) -> Tail | None:
-        """Return the tail of a side; None without a wake."""
         return self._sides[side].tail()
 
     def _change_to(self, serial: int) -> None:
@@ -217,7 +215,6 @@ class _Half:
         self._trail, self._places = new_wake_places(elements)
 
     def restart(self) -> None:
-        """Reset to the state before the first sample."""
         self.safety = new_safety(self.safety[0].device_limit_n)
 
     def begin(self, scene: Scene) -> None:
@@ -239,7 +236,6 @@ class _Half:
         return out
 
     def tail(self) -> Tail | None:
-        """Return its tail."""
         scene = resolve(self.scene)
         if not scene.liquids:
             return None
@@ -257,7 +253,6 @@ class _Recent:
         self._rows: Any = records(_ROW, 0)
 
     def add(self, time_ns: Any, a: Any, b: Any, *, presented_a: bool) -> None:
-        """Add samples of the same times, one array per side."""
         rows = records(_ROW, len(time_ns))
         rows.time_ns, rows.force_a_n, rows.force_b_n = time_ns, a.device_force_n, b.device_force_n
         rows.body_mps = np.linalg.norm((a if presented_a else b).velocity_mps, axis=1)
@@ -268,7 +263,6 @@ class _Recent:
         self._rows = joined[joined["time_ns"] > time_ns[-1] - round(SPAN_S * 1e9)].view(np.recarray)
 
     def trace(self) -> Trace | None:
-        """Return the trace; None without samples."""
         rows = self._rows
         if len(rows) == 0:
             return None

@@ -127,7 +127,6 @@ class Sink(Protocol):
         OutletError
             Neither this marker nor later ones are sent.
         """
-        ...
 
     def close(self) -> None: ...
 
@@ -227,7 +226,6 @@ class TriggerPort(Protocol):
 
     def write(self, byte: int) -> None:
         """Write a byte to the lines; returns when the port has it (OutletError: it does not accept it)."""
-        ...
 
     def close(self) -> None: ...
 

@@ -44,11 +44,9 @@ class Transport(Protocol):
     @property
     def name(self) -> str:
         """The word by which `open_transport` opens it again."""
-        ...
 
     def control(self, request: int, value: int) -> None:
         """Send a control request (``constants.REQUEST_*``) with its value."""
-        ...
 
     def write(self, data: bytes, timeout_s: float) -> None: ...
 
@@ -57,11 +55,9 @@ class Transport(Protocol):
 
         Nothing at all (``b""``) when the time is out.
         """
-        ...
 
     def calls(self) -> BulkCalls:
         """Return the bridge as compiled code sees it; good until `close` or `reopen`."""
-        ...
 
     def now_s(self) -> float:
         return time.monotonic()
@@ -71,11 +67,9 @@ class Transport(Protocol):
 
     def reopen(self) -> None:
         """Close it and open it again, as new."""
-        ...
 
     def close(self) -> None:
         """Let go of it; a second call does nothing."""
-        ...
 
 
 def open_transport(name: str = "") -> Transport:

@@ -26,7 +26,6 @@ class Functions(Protocol):
 
     def close(self) -> bool:
         """End the force and close the device; return whether it accepted the end."""
-        ...
 
 
 class ForceDimensionDevice(FramedDevice):

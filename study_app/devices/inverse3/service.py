@@ -45,21 +45,17 @@ class Link(Protocol):
 
     def calls(self) -> TransferCalls:
         """Return it as compiled code sees it; from then on nothing waits."""
-        ...
 
     def send(self, data: bytes) -> None:
         """Send all of it; raise a ``DeviceFailure`` where it does not go in time."""
-        ...
 
     def receive(self, most: int = LONGEST) -> bytes:
         """Return what came, nothing at its end; raise a ``DeviceFailure`` where nothing comes in time."""
-        ...
 
     def now_s(self) -> float: ...
 
     def close(self) -> None:
         """Close it; a second call does nothing."""
-        ...
 
 
 class SocketLink(io.RawIOBase):

@@ -111,12 +111,9 @@ class _Panel:
 
     @property
     def height_pt(self) -> float:
-        """Height with heading and the room below."""
         return self._top_pt + PANEL_PT + (STRIP_PT + BREAK_PT if self._strip else 0.0) + 12
 
     def draw(self, figure: Figure, down_pt: float, height_pt: float, span: tuple[float, float], *, last: bool) -> None:
-        """Draw heading, axes, lines and points."""
-
         def place(top_pt: float, tall_pt: float) -> Axes:
             width = (WIDTH_PT - LEFT_PT - RIGHT_PT) / WIDTH_PT
             return figure.add_axes((LEFT_PT / WIDTH_PT, 1 - (top_pt + tall_pt) / height_pt, width, tall_pt / height_pt))
@@ -180,7 +177,6 @@ class _Panel:
             axes.annotate("fluid solver", foot, (-2, 3), rotation=90, ha="right", va="bottom", **offset)
 
     def _rounding(self, axes: Axes, main: Axes) -> None:
-        """Draw the points with rounding errors only."""
         errors = [max(100 * row.error.rms, 1e-15) for row in self._strip]
         axes.set_ylim(10.0 ** (np.floor(np.log10(min(errors))) - 4), 100 * ROUNDED * 10)
         axes.yaxis.set_major_locator(FixedLocator([1e-12, 1e-8, 1e-4]))

@@ -158,22 +158,18 @@ class Candidate:
 
     @property
     def _run_scene(self) -> Scene:
-        """The scene that the tick runs."""
         return self.scene
 
     @property
     def ticks(self) -> int:
-        """The number of ticks of the motion for this candidate."""
         return len(self.force_n)
 
     @property
     def rate_hz(self) -> float:
-        """Ticks per second of the motion."""
         return self.scene.rate_hz
 
     @property
     def memory_bytes(self) -> int:
-        """The size of the model's state between ticks."""
         return sum(rows.nbytes for rows in _packed(self._run_scene).arrays)
 
     def take(self, start: int, stop: int) -> None:
@@ -218,7 +214,6 @@ class LinearViscosity(Candidate):
         return self.scene.model_copy(update={"liquids": ()})
 
     def take(self, start: int, stop: int) -> None:
-        """Run these ticks and set their rows of ``force_n``."""
         damping_nspm = 3 * math.pi * (self.scene.liquids[0].viscosity_pa_s or math.nan) * self.scene.body.diameter_m
         _by_damping(
             self._model, self._safety[0], self._sample[0], self._motion, damping_nspm, self.force_n, start, stop
@@ -232,7 +227,6 @@ class WakeList(Candidate):
     precision: type[np.floating[Any]] = np.float64
 
     def begin(self, motion: Motion) -> None:
-        """Reset, and prepare for the ticks of a motion with velocities."""
         super().begin(motion)
         self._liquid = _packed(self.scene).liquids[0]
         self._list = self._new_list()
@@ -246,11 +240,9 @@ class WakeList(Candidate):
 
     @property
     def memory_bytes(self) -> int:
-        """The size of the list."""
         return sum(rows.nbytes for rows in self._new_list())
 
     def take(self, start: int, stop: int) -> None:
-        """Run these ticks and set their rows of ``force_n``."""
         tail, element, arc, segment = self._list
         tick = (self._model, self._safety[0], self._sample[0], self._motion)
         _by_the_list(tick, self._liquid, (tail[0], element, arc, segment), self.force_n, start, stop)

@@ -79,7 +79,6 @@ class Accuracy:
     motion: str
 
     def of(self, kind: Kind) -> tuple[Row, ...]:
-        """Return the rows against one kind of reference."""
         return tuple(row for row in self.rows if row.kind == kind)
 
 
@@ -195,7 +194,6 @@ class _Bench:
         return min(self._candidate.BATCH, self._candidate.ticks)
 
     def batch(self) -> None:
-        """Run one batch and store its time."""
         if self._at + self._size > self._candidate.ticks:
             self._begin()
         began_s, began = time.perf_counter(), self._clock_ns()

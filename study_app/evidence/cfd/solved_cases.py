@@ -52,7 +52,6 @@ class VelocityProfile:
 
     @property
     def description(self) -> str:
-        """The motion in words and numbers."""
         changes = ", ".join(f"{by:+g} U within {RAMP:g} D/U from {at:g} D/U on" for at, by in self.steps)
         sines = " + ".join(f"{a:g} sin(2πt/{T:g} + {phase:g})" for a, T, phase in self.sines)
         return f"speed {changes}{f', times {sines}' if sines else ''}; end at {self.end:g} D/U"
@@ -223,7 +222,6 @@ class Case:
 
     @property
     def title(self) -> str:
-        """Motion and speed in words."""
         return f"{self.profile.words} at {self.speed_mps:.3g} m/s"
 
     @property

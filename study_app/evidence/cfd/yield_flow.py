@@ -124,7 +124,6 @@ def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None
 
 
 def _solved(flow_index: float) -> list[tuple[float, ...]]:
-    """Return the rows of the table of one flow index."""
     fine, coarse = YieldFlow(GRID).drags(flow_index, BINGHAM), YieldFlow(COARSE).drags(flow_index, BINGHAM)
     return [
         (flow_index, bingham, drag, rough, smooth)

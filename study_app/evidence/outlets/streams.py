@@ -41,13 +41,11 @@ class Listener:
         )
 
     def ready(self) -> None:
-        """Wait until it receives."""
         assert self._process.stdout is not None  # noqa: S101 - asked for above
         if self._process.stdout.readline() != "ready\n":
             raise WorkerError(f"the listener receives nothing: {self._process.communicate()[1].strip()}")
 
     def end(self) -> Any:
-        """End the listener and return what it received."""
         said, error = self._process.communicate(timeout=PATIENCE_S)
         if self._process.returncode != 0:
             raise WorkerError(f"the listener ended: {error.strip()}")
@@ -76,7 +74,6 @@ class MeasuredStream(SampleStream):
         super().send_new()
 
     def push(self, channels: NDArray[np.float32], times_s: NDArray[np.float64]) -> None:
-        """Push samples."""
         self.hashed.update(channels.tobytes())
         super().push(channels, times_s)
 
@@ -195,7 +192,6 @@ class Ratio:
 
     @property
     def verdict(self) -> str:
-        """The verdict in a word or two."""
         if self.high <= MOST_RATIO:
             return "met"
         return "missed" if self.low > MOST_RATIO else "undecided: measure for longer"

@@ -170,7 +170,6 @@ class Rate:
         return replace(self, hits=self.hits + other.hits, studies=self.studies + other.studies)
 
     def __str__(self) -> str:
-        """Return the rate in one line."""
         low, high = (100 * end for end in self.interval)
         return (
             f"{self.cell}, n = {self.participants}: {self.what}: {self.hits} of {self.studies}, "
@@ -179,7 +178,6 @@ class Rate:
 
     @property
     def share(self) -> float:
-        """The share of studies."""
         return self.hits / self.studies if self.studies else 0.0
 
     @property
@@ -267,7 +265,6 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """The cell in words, without its size."""
         looks = f", looks at {', '.join(map(str, self.looks))} by {self.spending}" if self.looks else ""
         return f"{self.generator}, {self.extent}{looks}"
 

@@ -125,14 +125,12 @@ class SoakResult:
 
     @property
     def verdict(self) -> str:
-        """The result in one line."""
         if self.findings:
             return f"found: {'; '.join(self.findings)}"
         part = "" if self.ticks >= self.planned else f" in the {100 * self.ticks / self.planned:.1f} % that were run"
         return f"sound: nothing found{part}"
 
     def text(self) -> str:
-        """Return the report for people."""
         clock = "virtual" if self.virtual else "real"
         pace = self.ticks / self.rate_hz / self.took_s if self.took_s > 0.0 else 0.0
         fast = f", {pace:.0f} times as fast as real time" if self.virtual else ""
@@ -196,7 +194,6 @@ class SoakResult:
         )
 
     def table(self) -> dict[str, Any]:
-        """Return the report for machines."""
         return {
             "hours": self.hours,
             "virtual": self.virtual,
@@ -233,7 +230,6 @@ class SoakResult:
         }
 
     def evidence(self) -> Evidence:
-        """Return both reports."""
         table = json.dumps(self.table(), indent=2, ensure_ascii=False)
         text = f"{self.text()}\n"
         return Evidence(text, {"soak.txt": text, "soak.json": f"{table}\n"}, missed=bool(self.findings))

@@ -200,7 +200,6 @@ class Soak:
 
     @property
     def done(self) -> int:
-        """How many ticks were taken."""
         return int(self.servo.telemetry.written[0])
 
     def __enter__(self) -> Self:
@@ -278,7 +277,6 @@ class Soak:
         )
 
     def _at(self, tick: int) -> Stretch:
-        """Return the part of its round that a tick is in."""
         length = round(self._rate_hz * min(max(900 * self.hours, SHORTEST_ROUND_S), LONGEST_ROUND_S))
         number = tick // length
         rest = round(SETTLING_S * self._rate_hz) + self._longest_wake
@@ -294,7 +292,6 @@ class Soak:
         return Stretch(part, number, end)
 
     def _enter(self, stretch: Stretch, tick: int) -> None:
-        """Set the stage for a part of a round."""
         self._due = _Due(motion=tick)
         if stretch.part == "rest":
             self._still_from = tick
@@ -312,7 +309,6 @@ class Soak:
             self._due.stop = self._later(tick, 1.0, 10.0)
 
     def _leave(self) -> None:
-        """Read what a rest has left of wake and force."""
         sample = self.servo.telemetry.latest()
         if self._is_left_alone and sample is not None:
             self._rests.count += 1

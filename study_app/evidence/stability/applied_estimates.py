@@ -134,7 +134,6 @@ def evidence(verdicts: Sequence[AppliedVerdict]) -> Evidence:
 
 
 def _run(applied: AppliedCase, way: Way) -> _Run:
-    """Return the trace of a case."""
     case = applied.case
     scene, dynamics = scene_of(case), dynamics_of(case)
     most = most_drag_coefficient(scene, dynamics, FORCE_LIMIT_N)
@@ -168,12 +167,10 @@ class _Follower:
 
     @property
     def drag(self) -> float:
-        """The drag coefficient that is applied."""
         return self._scene.body.drag_coefficient
 
     @property
     def estimate(self) -> Estimate:
-        """The present estimate."""
         return self._estimator.estimate
 
     def apply(self, bench: Bench, part: Any, dynamics: Any, now_s: float) -> None:
@@ -202,7 +199,6 @@ class _Follower:
 
 
 def _reasons(run: _Run, case: Case, calm_n: Sequence[Floats]) -> tuple[str, ...]:
-    """Return why a run is unstable."""
     trace = run.trace
     if run.broken:
         return (REASONS[0],)

@@ -107,13 +107,11 @@ class Delivered(NamedTuple):
 
     @property
     def group(self) -> str:
-        """The group whose limits apply."""
         of_file = (group for name, group in GROUPS.items() if self.liquid.startswith(name))
         return SINGLE.get(self.liquid) or next(of_file, THESIS)
 
     @property
     def share_of_limits(self) -> tuple[float, float]:
-        """Error and share withheld over their limits."""
         limit = LIMITS[self.group, self.estimator][self.delay - 1]
         most = limit.error * self.bound if self.group == BOUNDED else limit.error
         return self.error / most, self.withheld / limit.withheld

@@ -43,7 +43,6 @@ class Fidelity(NamedTuple):
 
     @property
     def share(self) -> float:
-        """The difference as a share of the force."""
         return self.difference_n / self.force_n if self.force_n > 0 else 0.0
 
     @property
@@ -53,7 +52,6 @@ class Fidelity(NamedTuple):
 
     @property
     def within(self) -> bool:
-        """Whether it is no greater than that."""
         return self.difference_n <= self.target_n
 
 

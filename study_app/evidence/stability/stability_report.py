@@ -91,7 +91,6 @@ def _boundary(axes: Axes) -> None:
 
 
 def _limits(axes: Axes) -> None:
-    """Draw boundary and limit over the tick period."""
     periods_ms = [period_s * 1e3 for period_s in PERIODS_S]
     for delay in LIMIT_DELAYS:
         measured = [boundary_nspm(Ewma(), period_s, delay) for period_s in PERIODS_S]
@@ -164,7 +163,6 @@ class Judged:
 
     @property
     def unstable(self) -> tuple[Verdict, ...]:
-        """Those that are unstable."""
         return tuple(verdict for verdict in self.verdicts if not verdict.stable)
 
 
@@ -267,7 +265,6 @@ def _group_lines(swept: Swept) -> Iterator[str]:
 
 
 def _limiters(swept: Swept) -> Iterator[str]:
-    """Yield how often each limiter acted."""
     cases = len(swept.on)
     yield f"{'with safety on':24}   in cases    in ticks"
     for k, name in enumerate(LIMITER_NAMES):

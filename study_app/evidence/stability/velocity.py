@@ -62,7 +62,6 @@ class Stroke(NamedTuple):
         return f"{self.frequency_hz:g} Hz ±{1e3 * self.amplitude_m:g} mm"
 
     def places_m(self, t_s: Floats) -> Floats:
-        """Return the positions (n,) [m] at times (n,) [s]."""
         if not self.reach_s:
             swing_m: Floats = self.amplitude_m * np.sin(2 * math.pi * self.frequency_hz * t_s)
             return swing_m
@@ -73,7 +72,6 @@ class Stroke(NamedTuple):
         return places_m
 
     def speeds_mps(self, t_s: Floats) -> Floats:
-        """Return the velocities (n,) [m/s] at times (n,) [s]."""
         step_s = 1e-6
         return (self.places_m(t_s + step_s) - self.places_m(t_s - step_s)) / (2 * step_s)
 

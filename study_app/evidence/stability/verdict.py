@@ -86,7 +86,6 @@ class Verdict:
 
     @property
     def stable(self) -> bool:
-        """Whether there is no reason to call it unstable."""
         return not self.reasons
 
 

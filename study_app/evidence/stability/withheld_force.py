@@ -81,7 +81,6 @@ class Withheld(NamedTuple):
 
     @property
     def most(self) -> float:
-        """The greatest share permitted in a stroke."""
         return MOST_REVERSED if (self.liquid, self.estimator) == REVERSED else MOST
 
     @property
@@ -165,7 +164,6 @@ def _measured(case: Case, mode: str) -> Withheld:
 
 
 def _stroke_m(stroke: Stroke, lasts_s: float) -> NDArray[np.float64]:
-    """Return places (rows, 3) [m] of a stroke, one a millisecond."""
     t_s = np.arange(round(lasts_s * RATE_HZ)) / RATE_HZ
     along_m = 1e-3 * stroke.amplitude_mm * np.cos(2.0 * math.pi * stroke.frequency_hz * t_s)
     return np.outer(along_m, DIRECTION)
@@ -178,7 +176,6 @@ def _stirring_m(from_m: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _played(case: Case, path_m: NDArray[np.float64], mode: str) -> Any:
-    """Return the trace of a handle along a path."""
     bench = Bench(case)
     handle = bench.handle
     handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = HAND_KG, HAND_NPM, HAND_NSPM

@@ -93,7 +93,6 @@ class Estimated(NamedTuple):
 
     @property
     def covered(self) -> bool:
-        """Whether the interval holds the true value."""
         return self.low <= self.truth <= self.high
 
 
@@ -235,11 +234,9 @@ class KnownThreshold(KnownValue):
         yield Verdict(self.name, what, f"{slope:.3f}", limit, abs(slope - true) <= SLOPE_ERROR_MOST)
 
     def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
-        """Yield each participant's threshold at each standard."""
         return (row.threshold for row in thresholds(block, rows) if row.participant is not None)
 
     def recovered(self, values: Sequence[float], spread: float) -> Verdict:
-        """Return whether rehearsed participants have the threshold."""
         error = self.error(values)
         what = f"threshold of {REHEARSED} people, {'ms' if self.threshold > 1 else 'Weber fraction'}"
         value = f"{self.threshold * math.exp(error):.3g}"
@@ -283,18 +280,15 @@ class KnownExponent(KnownValue):
         return StudyFound((Estimated(float(own.mean()), low, high, EXPONENT),), each)
 
     def verdicts(self, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
-        """Yield the mean."""
         mean = float(np.mean([found.group[0].value for found in studies]))
         what = f"exponent over {stimulus_of(self.protocol, self.block).vary}"
         limit = f"{EXPONENT:g} ± {EXPONENT_ERROR_MOST:g}"
         yield Verdict(self.name, what, f"{mean:.3f}", limit, abs(mean - EXPONENT) <= EXPONENT_ERROR_MOST)
 
     def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
-        """Yield each participant's exponent."""
         return (found.exponent for found in estimated_exponents(block, rows) if found.participant is not None)
 
     def recovered(self, values: Sequence[float], spread: float) -> Verdict:
-        """Return whether rehearsed participants have the exponent."""
         mean = float(np.mean(values))
         what, limit = f"exponent of {len(values)} people", f"{EXPONENT:g} ± {SPREADS} SD ({SPREADS * spread:.3f})"
         return Verdict(self.name, what, f"{mean:.3f}", limit, abs(mean - EXPONENT) <= SPREADS * spread)

@@ -52,7 +52,6 @@ class Shown:
 
     @property
     def frames(self) -> int:
-        """How many frames were shown."""
         return len(self.painted_ns)
 
     @property
@@ -68,21 +67,17 @@ class Shown:
 
     @property
     def achieved_ms(self) -> float:
-        """The mean delay of what was seen [ms]."""
         return 1e3 * self.delay_s + self.mean_ms
 
     @property
     def mean_ms(self) -> float:
-        """The mean error [ms]."""
         return float(self.errors_ms.mean())
 
     @property
     def worst_ms(self) -> float:
-        """The largest error [ms]."""
         return float(self.errors_ms.max())
 
     def percentile_ms(self, percent: float) -> float:
-        """Return a percentile of the errors [ms]."""
         return float(np.percentile(self.errors_ms, percent))
 
     @property
@@ -116,12 +111,10 @@ class Delayed:
 
     @property
     def screens(self) -> tuple[str, ...]:
-        """The screens there are, in their order."""
         return tuple(dict.fromkeys(one.screen for one in self.shown))
 
     @property
     def loads(self) -> tuple[LoadName, ...]:
-        """The concurrent loads, in their order."""
         return tuple(dict.fromkeys(one.load for one in self.shown))
 
     def on(self, screen: str, load: LoadName) -> tuple[Shown, ...]:
@@ -285,7 +278,6 @@ def evidence(found: Delayed) -> Evidence:
 
 
 def _values(trial: Shown) -> tuple[object, ...]:
-    """Return the row of a trial in the CSV."""
     errors_ms = (trial.mean_ms, *map(trial.percentile_ms, PERCENTILES), trial.worst_ms)
     return (
         *(trial.screen, trial.paced, trial.load),

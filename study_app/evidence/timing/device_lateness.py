@@ -46,7 +46,6 @@ class DeviceLateness:
 
     @property
     def verdict(self) -> str:
-        """What that comes to, in a word or two."""
         if self.missed:
             return "missed"
         return "met" if self.ratio <= MOST_RATIO else "undecided: measure for longer"

@@ -130,7 +130,7 @@ class Loop(Protocol):
     kind: Kind
     grant: Grant
 
-    def run(self, ticks: int) -> Ticks: ...  # noqa: D102
+    def run(self, ticks: int) -> Ticks: ...
 
 
 class ServoLoop:
@@ -177,7 +177,6 @@ class BareLoop:
         _sleep_on(self._clock.sleep.address, self._clock.context, 0, np.zeros(0, np.int64), np.zeros(1, np.int64))
 
     def run(self, ticks: int) -> Ticks:
-        """Take so many ticks."""
         lateness_ns, overruns = np.zeros(ticks + LEAD_IN, np.int64), np.zeros(1, np.int64)
 
         def take() -> None:
@@ -225,7 +224,6 @@ class ThreadLoop:
         self.tick = _SameTick()
 
     def run(self, ticks: int) -> Ticks:
-        """Take so many ticks."""
         times: list[tuple[int, int]] = []
         start_ns = 0
 
@@ -259,7 +257,6 @@ class QtLoop:
         self.tick = _SameTick()
 
     def run(self, ticks: int) -> Ticks:
-        """Take so many ticks."""
         times: list[tuple[int, int]] = []
 
         def fire() -> None:
@@ -334,12 +331,10 @@ class LoopTiming:
 
     @property
     def name(self) -> str:
-        """The loop in words."""
         return NAMES[self.kind]
 
     @property
     def ticks(self) -> int:
-        """How many ticks were taken."""
         return len(self.lateness_ns)
 
     def late_us(self, percent: float) -> float:
@@ -347,7 +342,6 @@ class LoopTiming:
         return float(np.percentile(self.lateness_ns, percent)) * 1e-3
 
     def busy_us(self, percent: float) -> float:
-        """Return a percentile of how long a tick took [µs]."""
         return float(np.percentile(self.busy_ns, percent)) * 1e-3
 
     @property
@@ -388,11 +382,9 @@ class Timed:
 
     @property
     def levels(self) -> tuple[Level, ...]:
-        """The priority classes there are."""
         return tuple(dict.fromkeys(loop.grant.level for loop in self.loops))
 
     def loop(self, kind: Kind, level: Level) -> LoopTiming | None:
-        """Return one of the loops, if it was timed."""
         return next((loop for loop in self.loops if (loop.kind, loop.grant.level) == (kind, level)), None)
 
     def ratio(self, loop: LoopTiming, percent: float) -> float:
@@ -401,7 +393,6 @@ class Timed:
         return loop.late_us(percent) / max(bare.late_us(percent), 1e-3) if bare is not None else float("nan")
 
     def limits(self) -> tuple[Limit, ...]:
-        """Return the limits and what was found, class by class."""
         return tuple(limit for level in self.levels for limit in self._of(level))
 
     def _of(self, level: Level) -> Sequence[Limit]:

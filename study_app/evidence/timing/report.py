@@ -177,7 +177,6 @@ def evidence(found: Timed) -> Evidence:
 
 
 def _values(found: Timed, loop: LoopTiming) -> tuple[object, ...]:
-    """Return the row of a loop in the CSV."""
     return (
         *(loop.grant.level, loop.grant.how, loop.name, loop.ticks, loop.overruns, loop.late),
         *(f"{loop.late_us(percent):.3f}" for percent in (*PERCENTILES, 100.0)),

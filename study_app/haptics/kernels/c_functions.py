@@ -59,7 +59,6 @@ class Driver(Protocol):
     @property
     def dynamics(self) -> Dynamics:
         """The dynamics that the device measured when it was opened."""
-        ...
 
     @property
     def failure(self) -> str | None:

@@ -124,7 +124,6 @@ class OnlineEstimator:
 
     @property
     def estimate(self) -> Estimate:
-        """The estimate from all rows so far."""
         if self._pending is not None and self._pending.done():
             search, self._pending = self._pending, None
             self._finish(search.result())
@@ -176,7 +175,6 @@ class OnlineEstimator:
         self._estimate = self._judged(fit)
 
     def _search(self, rows: Rows) -> None:
-        """Store rows, and search them at intervals."""
         assert self._rate_hz is not None  # noqa: S101 - known before
         self._kept.append(rows)
         if self._seconds < LEAST_S:
@@ -200,7 +198,6 @@ class OnlineEstimator:
             self._pending = self._executor.submit(search.run, *start, anew=self._known is None)
 
     def _finish(self, fit: WakeFit | None) -> None:
-        """Set the estimate from the result of a search."""
         if fit is None:
             self._estimate, self._known = _waits(self._seconds), None
             return
@@ -209,7 +206,6 @@ class OnlineEstimator:
         self._known = dict(fit.values) if sure else None
 
     def _judged(self, fit: WakeFit) -> Estimate:
-        """Return the estimate with a verdict on the values found."""
         half = fit.information.half
         reason = self._doubt(fit)
         intervals = {n: interval(it, float(h)) for (n, it), h in zip(fit.values.items(), half, strict=True) if it > 0}

@@ -135,7 +135,6 @@ class LiveEstimation:
         self.chosen = chosen
 
     def close(self) -> None:
-        """Stop the estimation."""
         if self._lsl is not None:
             self._lsl.close()
         self._file = self._lsl = self._basis = self._estimator = None
@@ -143,12 +142,10 @@ class LiveEstimation:
 
     @property
     def estimate(self) -> Estimate:
-        """The present estimate."""
         return NOTHING if self._estimator is None else self._estimator.estimate
 
     @property
     def applies(self) -> bool:
-        """Whether estimates of this source may be applied."""
         return self.chosen.source not in {"off", "device"}
 
     def poll(self, live: Live | None, bench: Workbench) -> dict[str, float]:
@@ -200,7 +197,6 @@ class LiveEstimation:
         self._reader = None if live is None else live.servo.telemetry.reader()
 
     def _rows(self, bench: Workbench) -> Rows:
-        """Return the rows measured since the last call."""
         if self._file is not None:
             return self._file.poll()
         if self._lsl is not None:

@@ -53,7 +53,6 @@ class Rows:
         return len(self.t_s)
 
     def part(self, first: int, behind: int | None = None) -> Rows:
-        """Return the rows from one number on, up to another."""
         return Rows(*(getattr(self, name)[first:behind] for name in self.__slots__))
 
 
@@ -239,7 +238,6 @@ class LslForce:
 
     @property
     def connected(self) -> bool:
-        """Whether a stream was found."""
         return self._inlet is not None
 
     def poll(self) -> Rows:
@@ -265,7 +263,6 @@ class LslForce:
         return self._centred.take(t_s, rows[:, :3], rows[:, 3:6])
 
     def close(self) -> None:
-        """End the inlet."""
         inlet, self._inlet = self._inlet, None
         if inlet is not None:
             inlet.close_stream()
@@ -309,7 +306,6 @@ class LslForce:
 
 
 def _labels(info: Any) -> list[str]:
-    """Return the labels of a stream's channels."""
     labels, channel = [], info.desc().child("channels").child("channel")
     while not channel.empty():
         labels.append(channel.child_value("label"))

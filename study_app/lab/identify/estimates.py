@@ -51,7 +51,6 @@ class Estimates:
         return (f"{value}" if it.whole else f"{value:.5g}"), "anything" if anything else f"{lower:.5g} … {upper:.5g}"
 
     def summary(self) -> str:
-        """Return the amount of data, and the residual of the fit."""
         raise NotImplementedError
 
 

@@ -43,7 +43,6 @@ class Fit(Estimates):
 
     @property
     def residual_n(self) -> Floats:
-        """Measured − fitted force, (n, 3) [N]."""
         residual_n: Floats = self.measured_n - self.fitted_n
         return residual_n
 
@@ -58,7 +57,6 @@ class Fit(Estimates):
         return self.rms_n / _rms(self.measured_n)
 
     def summary(self) -> str:
-        """Return the amount of data, and the residual of the fit."""
         lasted_s = self.motion.t_s[-1] - self.motion.t_s[0]
         left = f"residual {self.rms_n:.3g} N RMS, {100 * self.share:.1f} % of the force"
         return f"{len(self.motion.t_s)} rows over {lasted_s:.3g} s; {left}"
@@ -117,7 +115,6 @@ class CurveFit(Estimates):
         return float(np.sqrt(np.mean((self.fitted_pa / self.curve.stress_pa - 1) ** 2)))
 
     def summary(self) -> str:
-        """Return the amount of data, and the residual of the fit."""
         rates = self.curve.rate_per_s
         said = f"{len(rates)} shear rates from {rates.min():.3g} to {rates.max():.3g} per s"
         return f"{said}; residual {100 * self.share:.1f} % of the stress, RMS"

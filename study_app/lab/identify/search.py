@@ -155,7 +155,6 @@ class Problem:
         return moved
 
     def scene(self, z: Floats) -> Scene:
-        """Return the scene with the values of z, a length rounded."""
         return replace(self._scene, self._liquid_id, self.parameters, self.values(z))
 
     def _longest(self, values: Sequence[float], k: int) -> float:
@@ -164,7 +163,6 @@ class Problem:
         return math.floor(min(self.parameters[k].most, scaling) * (1 + 1e-12))
 
     def _range(self, it: Parameter) -> tuple[float, float]:
-        """Return the least and the greatest z."""
         least, most = u_range(it)
         return (0.0 if self.parameters.index(it) in self.lesser else least), most
 
@@ -200,7 +198,6 @@ class ForceProblem(Problem):
 
     @property
     def columns(self) -> int:
-        """The number of axes in use."""
         return len(self.axes)
 
     def force_n(self, z: Floats) -> Floats:
@@ -213,7 +210,6 @@ class ForceProblem(Problem):
         return force_n if share == 0 else (1 - share) * force_n + share * self._simulated(above)
 
     def misfit(self, z: Floats) -> Floats:
-        """Return simulated − measured force on the axes in use, (m,)."""
         misfit: Floats = (self.force_n(z) - self.measured.force_n)[:, self.axes].ravel()
         return misfit
 

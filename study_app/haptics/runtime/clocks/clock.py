@@ -44,7 +44,6 @@ class Clock(Protocol):
 
     def suspended_ns(self) -> int:
         """Return how long this clock stopped during suspensions of the machine since its start [ns]."""
-        ...
 
 
 class SystemClock:
