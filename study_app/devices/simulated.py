@@ -133,13 +133,7 @@ def _write(context: int, command: int) -> int:
 
 
 class PointedDevice(SimulatedDevice):
-    """A handle connected to a pointer; the subclass moves the pointer.
-
-    Parameters
-    ----------
-    workspace_m : half extents of the handle's workspace [m]
-    force_limit_n : the greatest force that may be commanded [N]
-    """
+    """A handle connected to a pointer; the subclass moves the pointer."""
 
     def __init__(
         self, workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05), force_limit_n: float = 8.0
@@ -188,8 +182,6 @@ class ScriptedDevice(SimulatedDevice):
     Parameters
     ----------
     random : random numbers for frequencies and phases of the tremor; None: always the same ones
-    workspace_m : half extents of the handle's workspace [m]
-    force_limit_n : the greatest force that may be commanded [N]
     tremor_m : amplitude of each of the tremor's three waves per axis [m]; 0: no tremor
     quantum_m : one count of the encoders [m]; 0: exact
     """

@@ -54,7 +54,7 @@ FRAMES: tuple[Column, ...] = (
     ),
 )
 FORMAT = 4
-RECORDED = tuple(field for field in SAMPLE_FIELDS if field.column)
+RECORDED = tuple(field for field in SAMPLE_FIELDS if field.words)
 ROUNDED_TO = {field.name: field.step for field in RECORDED if field.step}
 """Fields of ``layout.SAMPLE`` that are recorded rounded, and the step."""
 FRAME = np.dtype([(column.name, np.int64) for column in FRAMES])
@@ -73,13 +73,13 @@ def _columns(field: SampleField) -> list[Column]:
     meanings = [field.words.replace("*", words) for words in field.parts.values()] or [field.words]
     return [
         Column(name, kind, meaning, field.unit, field.levels, field.minimum, field.maximum)
-        for name, meaning in zip(field.named(field.column), meanings, strict=True)
+        for name, meaning in zip(field.named(), meanings, strict=True)
     ]
 
 
 SAMPLES = tuple(column for field in RECORDED for column in _columns(field))
 _STORED = {
-    **{name: pa.from_numpy_dtype(field.stored) for field in RECORDED for name in field.named(field.column)},
+    **{name: pa.from_numpy_dtype(field.stored) for field in RECORDED for name in field.named()},
     **{column.name: pa.int64() for column in FRAMES},
 }
 
@@ -125,7 +125,7 @@ def read_samples(path: Path, secret: bytes | None = None) -> Any:
     for field in RECORDED:
         values: Any = field.before
         if field.since <= facts["format"]:
-            values = np.column_stack([columns[name] for name in field.named(field.column)])
+            values = np.column_stack([columns[name] for name in field.named()])
             if field.measured:
                 values = np.where(columns["measured"][:, np.newaxis] & field.measured, values, 0.0)
         if field.beside:
@@ -221,7 +221,7 @@ def _read(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str, NDArra
     if kind == "frames":
         columns = [column.name for column in FRAMES if held >= _VIDEO_SINCE or column.name not in NO_VIDEO]
     else:
-        columns = [name for field in RECORDED if field.since <= held for name in field.named(field.column)]
+        columns = [name for field in RECORDED if field.since <= held for name in field.named()]
     if not _are_of(table, columns, facts["rows"]):
         raise StoreError(f"{path} is damaged (its columns differ from those of {kind}): restore it from a copy")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
@@ -350,7 +350,7 @@ def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
                 values = field.sign * (values - _rounded(_rows(samples, field.beside), field.step))
             if field.measured:
                 values = np.where(samples["measured"][:, np.newaxis] & field.measured, values, np.nan)
-            for name, column in zip(field.named(field.column), values.T, strict=True):
+            for name, column in zip(field.named(), values.T, strict=True):
                 columns[name] = np.ascontiguousarray(column, field.stored)
     return columns
 

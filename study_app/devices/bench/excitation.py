@@ -10,7 +10,7 @@ host do not respond; then it stays zero until the next excitation.
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from types import TracebackType
 from typing import Any, Final, Self
@@ -44,54 +44,6 @@ SILENT_TICKS: Final = 20
 SLOW_S: Final = 8e-3  # a first-order filter of 20 Hz: faster motion counts as oscillation
 SHAKE_S: Final = 0.1
 
-EXCITATION = np.dtype(
-    [
-        # the device behind
-        ("context", np.intp),
-        ("read", np.intp),
-        ("write", np.intp),
-        # written by the host
-        ("armed", np.int64),  # 1: forces are sent
-        ("alive_ns", np.int64),  # the host's latest report, on the servo's clock
-        ("limit_n", np.float64),
-        ("stiffness_npm", np.float64),
-        ("damping_nspm", np.float64),  # of the spring
-        ("integral_per_s", np.float64),  # rate at which the spring's integral compensates its deflection
-        ("centre_m", np.float64, (3,)),
-        ("push_n", np.float64, (3,)),
-        ("axis", np.int64),  # of the chirp
-        ("wave_n", np.float64),
-        ("from_hz", np.float64),
-        ("hz_per_s", np.float64),
-        ("rise_nspm_per_s", np.float64),  # growth rate of the damper
-        ("most_nspm", np.float64),
-        ("shake_limit_n", np.float64),  # the greatest effective force of the damper above 20 Hz; 0: any
-        ("reach_m", np.float64),  # greatest distance from its initial place; 0: unlimited
-        # of the loop
-        ("ended", np.int64),  # RUNNING, or the reason of the end
-        ("started", np.int64),
-        ("pending", np.int64),  # 1 between a reading and its write
-        ("silent", np.int64),  # readings without a usable new position in a row
-        ("now_ns", np.int64),
-        ("new_ns", np.int64),  # when the last new position was read
-        ("position_m", np.float64, (3,)),
-        ("from_m", np.float64, (3,)),  # its place when this excitation began
-        ("velocity_mps", np.float64, (3,)),
-        ("aim_m", np.float64, (3,)),  # target of the spring, moving to the centre
-        ("bias_n", np.float64, (3,)),
-        ("pushed_n", np.float64, (3,)),
-        ("wave_s", np.float64),
-        ("damper_nspm", np.float64),
-        ("slow_n", np.float64, (3,)),  # the damper's force below 20 Hz
-        ("shake_n2", np.float64),  # mean square of the rest
-        ("force_n", np.float64, (3,)),
-    ],
-    align=True,
-)
-
-_excitation_at = c_functions.record_at(EXCITATION)
-_inner_read, _inner_write = c_functions.call_at(c_functions.READ), c_functions.call_at(c_functions.WRITE)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Excitation:
@@ -120,6 +72,43 @@ class Excitation:
     most_nspm: float = 0.0
     shake_limit_n: float = 0.0
     reach_m: float = 0.0
+
+
+EXCITATION = np.dtype(
+    [
+        # the device behind
+        ("context", np.intp),
+        ("read", np.intp),
+        ("write", np.intp),
+        # written by the host
+        ("armed", np.int64),  # 1: forces are sent
+        ("alive_ns", np.int64),  # the host's latest report, on the servo's clock
+        ("limit_n", np.float64),
+        *((it.name, np.int64 if it.name == "axis" else np.float64, np.shape(it.default)) for it in fields(Excitation)),
+        # of the loop
+        ("ended", np.int64),  # RUNNING, or the reason of the end
+        ("started", np.int64),
+        ("pending", np.int64),  # 1 between a reading and its write
+        ("silent", np.int64),  # readings without a usable new position in a row
+        ("now_ns", np.int64),
+        ("new_ns", np.int64),  # when the last new position was read
+        ("position_m", np.float64, (3,)),
+        ("from_m", np.float64, (3,)),  # its place when this excitation began
+        ("velocity_mps", np.float64, (3,)),
+        ("aim_m", np.float64, (3,)),  # target of the spring, moving to the centre
+        ("bias_n", np.float64, (3,)),
+        ("pushed_n", np.float64, (3,)),
+        ("wave_s", np.float64),
+        ("damper_nspm", np.float64),
+        ("slow_n", np.float64, (3,)),  # the damper's force below 20 Hz
+        ("shake_n2", np.float64),  # mean square of the rest
+        ("force_n", np.float64, (3,)),
+    ],
+    align=True,
+)
+
+_excitation_at = c_functions.record_at(EXCITATION)
+_inner_read, _inner_write = c_functions.call_at(c_functions.READ), c_functions.call_at(c_functions.WRITE)
 
 
 class BenchDriver:

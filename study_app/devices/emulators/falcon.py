@@ -7,7 +7,7 @@ it is open, the emulator's time is that of the servo's ticks, so that it runs as
 """
 
 import errno
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -22,8 +22,6 @@ from study_app.devices.emulators.falcon_emulator import Emulator
 from study_app.devices.falcon import constants
 from study_app.devices.falcon.bulk import BulkCalls
 from study_app.devices.falcon.device import FalconDevice
-from study_app.devices.falcon.exchange import FORCE_LIMIT_N
-from study_app.devices.falcon.mechanics import WORKSPACE_M
 from study_app.devices.falcon.transport import PyUsbTransport, Transport
 
 _STRINGS: Final = {1: "Novint", 2: constants.PRODUCT}
@@ -280,11 +278,8 @@ class EmulatedFalcon(FalconDevice):
     ----------
     random : random numbers for the hand's tremor and the emulator's faults; None: always the same ones
     firmware : file to load into it; without one its program runs already
-    workspace_m : half extents of the grip's workspace [m]
-    force_limit_n : the greatest force that may be commanded [N]
-    progress : receives instructions while it is opened
     emulator : an existing one to use
-    options : of ``FalconDevice``
+    given : of a `FalconDevice`
     """
 
     name = "falcon-emulated"
@@ -295,16 +290,11 @@ class EmulatedFalcon(FalconDevice):
         random: Random | None = None,
         *,
         firmware: str | Path | None = None,
-        workspace_m: tuple[float, float, float] = WORKSPACE_M,
-        force_limit_n: float = FORCE_LIMIT_N,
-        progress: Callable[[str], object] | None = None,
         emulator: Emulator | None = None,
-        **options: Any,
+        **given: Any,
     ) -> None:
-        super().__init__(
-            firmware=firmware, workspace_m=workspace_m, force_limit_n=force_limit_n, progress=progress, **options
-        )
-        self.hand = emulator or Emulator(random, running=firmware is None, workspace_m=workspace_m)
+        super().__init__(firmware=firmware, **given)
+        self.hand = emulator or Emulator(random, running=firmware is None, workspace_m=self.workspace_m)
         self._backend = EmulatedBackend(self.hand)
 
     @classmethod

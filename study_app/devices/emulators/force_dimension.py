@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from study_app.devices.descriptor import OpenRequest
-from study_app.devices.force_dimension.device import FORCE_LIMIT_N, WORKSPACE_M, ForceDimensionDevice, Functions
+from study_app.devices.force_dimension.device import ForceDimensionDevice, Functions
 from study_app.devices.force_dimension.exchange import BUTTONS, FILL, FUNCTIONS, PUSH, PUSH_ALL, STOP, TIMEGUARD, VECTOR
 from study_app.devices.force_dimension.library import FORCE, FORCE_OFF_CAUSE
 from study_app.devices.simulated import TREMOR_M, ScriptedDevice
@@ -94,24 +94,17 @@ class EmulatedForceDimension(ForceDimensionDevice):
     Parameters
     ----------
     random : where the hand's tremor is drawn from; None: always the same one
-    workspace_m : half extents of where the handle shall reach, and can be sent [m]
-    force_limit_n : the greatest force it may be asked for [N]
     tremor_m : amplitude of the tremor's waves [m]
+    given : of a `ForceDimensionDevice`
     """
 
     name = "force-dimension-emulated"
     ends_force = None  # it ends with the program
 
-    def __init__(
-        self,
-        random: Random | None = None,
-        *,
-        workspace_m: tuple[float, float, float] = WORKSPACE_M,
-        force_limit_n: float = FORCE_LIMIT_N,
-        tremor_m: float = TREMOR_M,
-    ) -> None:
-        super().__init__(workspace_m=workspace_m, force_limit_n=force_limit_n)
-        self.hand = ScriptedDevice(random, workspace_m=workspace_m, force_limit_n=force_limit_n, tremor_m=tremor_m)
+    def __init__(self, random: Random | None = None, *, tremor_m: float = TREMOR_M, **given: Any) -> None:
+        super().__init__(**given)
+        limits: dict[str, Any] = {"workspace_m": self.workspace_m, "force_limit_n": self.force_limit_n}
+        self.hand = ScriptedDevice(random, tremor_m=tremor_m, **limits)
         self.hand.measure_velocity()
         self.emulated = EmulatedFunctions(self.hand)
         self.emulated.state.clock = self.context  # FORCE_DIMENSION begins with the time of the tick

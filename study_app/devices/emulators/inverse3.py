@@ -4,7 +4,6 @@ All of the driver is the real one, down to the bytes of the WebSocket; in place 
 of the emulator. Once it is open, the emulator's time is that of the servo's ticks.
 """
 
-from collections.abc import Callable
 from random import Random
 from typing import Any, Self
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from study_app.devices.descriptor import OpenRequest
 from study_app.devices.emulators.inverse3_service import Service, service_calls
-from study_app.devices.inverse3.device import FORCE_LIMIT_N, WORKSPACE_M, Inverse3Device
+from study_app.devices.inverse3.device import Inverse3Device
 from study_app.devices.inverse3.service import FAILURES, LONGEST, Link, TransferCalls
 
 FAULT_AFTER = 1000  # commands
@@ -50,25 +49,15 @@ class EmulatedInverse3(Inverse3Device):
     Parameters
     ----------
     random : where the hand's tremor is drawn from; None: always the same one
-    workspace_m : half extents of where the handle shall reach, and can be sent [m]
-    force_limit_n : the greatest force it may be asked for [N]
-    progress : is given what to do while it is opened
     service : another than a new one
+    given : of an `Inverse3Device`
     """
 
     name = "inverse3-emulated"
 
-    def __init__(
-        self,
-        random: Random | None = None,
-        *,
-        workspace_m: tuple[float, float, float] = WORKSPACE_M,
-        force_limit_n: float = FORCE_LIMIT_N,
-        progress: Callable[[str], object] | None = None,
-        service: Service | None = None,
-    ) -> None:
-        super().__init__(workspace_m=workspace_m, force_limit_n=force_limit_n, progress=progress)
-        self.hand = service if service is not None else Service(random, workspace_m=workspace_m)
+    def __init__(self, random: Random | None = None, *, service: Service | None = None, **given: Any) -> None:
+        super().__init__(**given)
+        self.hand = service if service is not None else Service(random, workspace_m=self.workspace_m)
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:

@@ -40,8 +40,6 @@ class FalconDevice(FramedDevice):
     ----------
     serial : of its bridge; "": the first one
     firmware : file of its program, which it needs after it was switched on
-    workspace_m : half extents of the grip's required workspace [m]
-    force_limit_n : the greatest force that may be commanded [N]
     geometry : published dimensions, unless a calibration names others
     progress : receives instructions while it is opened, one line at a time
     cancelled : returns during homing whether to stop

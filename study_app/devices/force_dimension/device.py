@@ -35,8 +35,6 @@ class ForceDimensionDevice(FramedDevice):
     ----------
     serial : its serial number; "": the first device
     library : path of libdrd; None: see ``library.Library``
-    workspace_m : half extents of where the handle shall reach [m]
-    force_limit_n : the greatest force it may be asked for [N]
     """
 
     name = "force-dimension"

@@ -27,8 +27,6 @@ class Inverse3Device(FramedDevice):
     Parameters
     ----------
     where : "", "ID", "HOST:PORT" or "HOST:PORT:ID"
-    workspace_m : half extents of where the handle shall reach [m]
-    force_limit_n : the greatest force it may be asked for [N]
     progress : is given what to do while it is opened, a line at a time
     """
 

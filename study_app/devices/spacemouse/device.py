@@ -39,8 +39,6 @@ class SpaceMouseDevice(PointedDevice):
 
     Parameters
     ----------
-    workspace_m : half extents of where the handle reaches [m]
-    force_limit_n : the greatest force it may be asked for [N]
     hid : the module to talk through; None: hidapi's, loaded when it is opened
     """
 

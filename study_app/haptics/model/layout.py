@@ -107,17 +107,17 @@ _AXES: Final = {"x": "to the right", "y": "up", "z": "toward the participant"}
 _QUATERNION: Final = {part: part for part in "wxyz"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class SampleField:
     """A field of `SAMPLE`, and the columns that recordings and streams have of it.
 
     Attributes
     ----------
     name : of the field
+    words : meaning of its column in recordings, with ``*`` for the words of the component; "": it is not recorded
+    column : name of the column, with ``*`` for the letter; "": the field's
     kind : type of its numbers
     parts : of a vector: the letter of each component, and its words
-    column : its name in a recording, with ``*`` for the letter; "": it is not recorded
-    words : meaning of the column, with ``*`` for the words of the component
     unit : of the column, "" without one
     stored : type of the column's numbers
     step : to which the column is rounded; 0: exact
@@ -129,10 +129,10 @@ class SampleField:
     """
 
     name: str
+    words: str = ""
+    column: str = ""
     kind: type = np.int64
     parts: Mapping[str, str] = field(default_factory=dict)
-    column: str = ""
-    words: str = ""
     unit: str = ""
     stored: type = np.int64
     step: float = 0.0
@@ -146,9 +146,9 @@ class SampleField:
     levels: tuple[tuple[str, str], ...] = ()
     stream: str = ""
 
-    def named(self, pattern: str) -> list[str]:
-        """Return a name for each component, or one for a number."""
-        return [pattern.replace("*", part) for part in self.parts] or [pattern]
+    def named(self, pattern: str = "") -> list[str]:
+        """Return a name for each component, or one for a number; ``pattern`` "": of the column."""
+        return [(pattern or self.column or self.name).replace("*", part) for part in self.parts or ("",)]
 
 
 _VECTOR: Final = partial(SampleField, kind=np.float64, parts=_AXES, stored=np.float32)
@@ -157,78 +157,67 @@ _FORCE: Final = partial(_VECTOR, unit="N", step=FORCE_STEP_N)
 _CODE: Final = partial(SampleField, stored=np.int32)
 
 SAMPLE_FIELDS: Final = (
-    SampleField(name="tick", column="tick", words="Number of the servo's tick since its start; gaps are lost samples."),
+    SampleField("tick", "Number of the servo's tick since its start; gaps are lost samples."),
+    SampleField("time_ns", "Time when the device was read, on the servo's clock.", unit="ns"),
     SampleField(
-        name="time_ns", column="time_ns", words="Time when the device was read, on the servo's clock.", unit="ns"
-    ),
-    SampleField(
-        name="lateness_ns",
+        "lateness_ns",
+        "Time when the tick was due; its lateness is time_ns - due_ns.",
         column="due_ns",
-        words="Time when the tick was due; its lateness is time_ns - due_ns.",
         unit="ns",
         beside="time_ns",
         sign=-1,
     ),
-    SampleField(name="fresh", column="fresh", words="true where the device reported a new sample.", stored=np.bool_),
+    SampleField("fresh", "true where the device reported a new sample.", stored=np.bool_),
     _VECTOR(
-        name="position_m",  # device, hand frame
+        "position_m",
+        "Position of the hand, exact, *.",
         column="position_*_m",
-        words="Position of the hand, exact, *.",
         unit="m",
         stored=np.float64,
         stream="position_*",
-    ),
+    ),  # device, hand frame
     _SPEED(
-        name="velocity_mps",  # after estimator and compression
+        "velocity_mps",
+        "Velocity in the scene from which the force was computed; resolution 1/4096 m/s, *.",
         column="velocity_*_mps",
-        words="Velocity in the scene from which the force was computed; resolution 1/4096 m/s, *.",
         stream="velocity_*",
-    ),
+    ),  # after estimator and compression
     _SPEED(
-        name="wake_mps",  # as used by this tick's drag
-        column="wake_*_mps",
-        words="Velocity of the liquid's wake in the scene; resolution 1/4096 m/s, *.",
-    ),
+        "wake_mps", "Velocity of the liquid's wake in the scene; resolution 1/4096 m/s, *.", column="wake_*_mps"
+    ),  # as used by this tick's drag
     _FORCE(
-        name="device_force_n",
+        "device_force_n",
+        "Force that the device applied to the hand; resolution 1/16384 N, *.",
         column="device_force_*_n",
-        words="Force that the device applied to the hand; resolution 1/16384 N, *.",
         stream="force_*",
     ),
     _FORCE(
-        name="command_n",
+        "command_n",
+        "Force that the servo commanded and the device did not apply, *.",
         column="undelivered_*_n",
-        words="Force that the servo commanded and the device did not apply, *.",
         beside="device_force_n",
         since=2,
     ),
     _FORCE(
-        name="force_n",  # sum of the effects on the body, before slope limit and safety
+        "force_n",
+        "Force of the liquid that was withheld: the force of the liquid is device_force + withheld, *.",
         column="withheld_*_n",
-        words="Force of the liquid that was withheld: the force of the liquid is device_force + withheld, *.",
         beside="device_force_n",
-    ),
-    _CODE(name="buttons", column="buttons", words="Pressed buttons of the device, as bits."),  # button 1 is bit 0
+    ),  # sum of the effects on the body, before slope limit and safety
+    _CODE("buttons", "Pressed buttons of the device, as bits."),  # button 1 is bit 0
+    _CODE("limiters", "Limiters that acted, as bits in the order of the trial's limiter columns.", stream="limiters"),
     _CODE(
-        name="limiters",
-        column="limiters",
-        words="Limiters that acted, as bits in the order of the trial's limiter columns.",
-        stream="limiters",
-    ),
-    _CODE(
-        name="delay_ticks",  # in writes
-        column="delay_ticks",
-        words="Estimated delay of the force, in ticks.",
+        "delay_ticks",
+        "Estimated delay of the force, in ticks.",
         minimum=0,
         maximum=MOST_DELAY,
         since=2,
         before=ASSUMED_TICKS,
-    ),
-    _CODE(name="scene", column="scene", words="Number of the presented scene; 0 is none.", minimum=0),
+    ),  # in writes
+    _CODE("scene", "Number of the presented scene; 0 is none.", minimum=0),
     _CODE(
-        name="status",
-        column="status",
-        words="State of the servo.",
+        "status",
+        "State of the servo.",
         levels=(
             ("0", "running normally"),
             ("1", "no usable sample for 50 ms"),
@@ -237,50 +226,42 @@ SAMPLE_FIELDS: Final = (
         ),
     ),
     _CODE(
-        name="measured",
-        column="measured",
-        words="What the device measured itself, as bits: 1 velocity, 2 orientation, 4 gripper, 8 time.",
+        "measured",
+        "What the device measured itself, as bits: 1 velocity, 2 orientation, 4 gripper, 8 time.",
         minimum=0,
         maximum=15,
         since=3,
     ),
     _VECTOR(
-        name="device_velocity_mps",
+        "device_velocity_mps",
+        "Velocity of the hand, as the device measured it (NaN if not measured), *.",
         column="device_velocity_*_mps",
-        words="Velocity of the hand, as the device measured it (NaN if not measured), *.",
         unit="m/s",
         stored=np.float64,
         measured=MEASURED_VELOCITY,
         since=3,
     ),
     _VECTOR(
-        name="orientation",
-        parts=_QUATERNION,
+        "orientation",
+        "Orientation of the handle in the hand frame: * of a unit quaternion; NaN if not measured.",
         column="orientation_*",
-        words="Orientation of the handle in the hand frame: * of a unit quaternion; NaN if not measured.",
+        parts=_QUATERNION,
         measured=MEASURED_ORIENTATION,
         since=3,
     ),
     SampleField(
-        name="gripper_m",
+        "gripper_m",
+        "Opening of the gripper; NaN if not measured.",
         kind=np.float64,
-        column="gripper_m",
-        words="Opening of the gripper; NaN if not measured.",
         unit="m",
         stored=np.float32,
         measured=MEASURED_GRIPPER,
         since=3,
     ),
-    SampleField(
-        name="device_time_ns",
-        column="device_time_ns",
-        words="Time of the sample on the device's clock; 0 if not measured.",
-        unit="ns",
-        since=3,
-    ),
-    SampleField(name="busy_ns"),  # how long the tick took, from reading to writing
-    SampleField(name="permitted_n", kind=np.float64),  # size of the force of the effects after norm and fades
-    SampleField(name="withheld_n", kind=np.float64),  # size of its change by slope limits, passivity, slew and device
+    SampleField("device_time_ns", "Time of the sample on the device's clock; 0 if not measured.", unit="ns", since=3),
+    SampleField("busy_ns"),  # how long the tick took, from reading to writing
+    SampleField("permitted_n", kind=np.float64),  # size of the force of the effects after norm and fades
+    SampleField("withheld_n", kind=np.float64),  # size of its change by slope limits, passivity, slew and device
 )
 """What a tick tells: recorded columns, their dictionary and the channels of a stream follow from it, in this order.
 
