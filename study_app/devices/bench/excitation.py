@@ -10,7 +10,7 @@ host do not respond; then it stays zero until the next excitation.
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import cache
 from types import TracebackType
 from typing import Any, Final, Self
@@ -74,6 +74,8 @@ class Excitation:
     reach_m: float = 0.0
 
 
+_AT_REST = asdict(Excitation())
+
 EXCITATION = np.dtype(
     [
         # the device behind
@@ -84,7 +86,7 @@ EXCITATION = np.dtype(
         ("armed", np.int64),  # 1: forces are sent
         ("alive_ns", np.int64),  # the host's latest report, on the servo's clock
         ("limit_n", np.float64),
-        *((it.name, np.int64 if it.name == "axis" else np.float64, np.shape(it.default)) for it in fields(Excitation)),
+        *((name, np.int64 if name == "axis" else np.float64, np.shape(rest)) for name, rest in _AT_REST.items()),
         # of the loop
         ("ended", np.int64),  # RUNNING, or the reason of the end
         ("started", np.int64),

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from study_app.devices.base import Device
+from study_app.devices.driver import FramedDevice
 from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
 from study_app.devices.emulators.force_dimension import EmulatedForceDimension
@@ -42,7 +42,7 @@ NOISE_N = 0.5
 class Stand(NamedTuple):
     """An open device, the hand at it, what acts on the handle (while the servo ticks or not), and commands so far."""
 
-    device: Device
+    device: FramedDevice
     hand: HandOrders
     acting: Callable[[bool], Any]
     commands: Callable[[], int]
