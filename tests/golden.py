@@ -19,9 +19,9 @@ import pytest
 
 CHANGING = re.compile(
     r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?(?:Z|[+-]\d\d:\d\d)?)?"
-    r"|\b\d+\.\d+\.\d+\b|\b(?<!\.)[0-9a-f]{12,}\b"
+    r"|\b\d+\.\d+\.\d+\b|\b(?<!\.)[0-9a-f]{12,}\b|\b[a-z2-7]{4}-[a-z2-7]{4}-[a-z2-7]{4}(?:-[a-z2-7]{2})?\b"
 )
-"""Dates, versions and hashes."""
+"""Dates, versions, hashes and fingerprints."""
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 SHOWN = 40
 """Most lines of a difference that are printed."""

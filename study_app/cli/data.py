@@ -191,7 +191,9 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
 )
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
     """Erase the data of a participant; date, operator, reason and checksums remain."""
+    from study_app.store.checksums import checked_line
     from study_app.store.sites.merged import own_place
+    from study_app.store.withdrawals import proof_of_withdrawal
     from study_app.store.withdrawals import withdraw as withdraw_from
 
     done = withdraw_from(*own_place(results, participant), by=by, reason=reason, also=also)
@@ -199,6 +201,7 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
         click.echo(f"erased     participant {participant} from {folder}")
     for path in done.outputs:
         click.echo(f"deleted    {path}, made from the results")
+    click.echo(f"keep, with the fingerprints:  {checked_line(*proof_of_withdrawal(done.tombstone))}")
     if not (done.folders or done.outputs):
         click.echo(f"nothing to erase: participant {participant} withdrew at {done.tombstone.at}")
     for output in done.elsewhere:
@@ -277,7 +280,7 @@ def reproduce(session: Path) -> None:
     "--fingerprints",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Compare with a copy of fingerprints.txt kept elsewhere: was a session changed, added or removed since?",
+    help="Compare with fingerprints kept elsewhere (a copy, or what proof made): what was changed or removed since?",
 )
 def verify(results: Path, fingerprints: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings."""
@@ -293,6 +296,47 @@ def verify(results: Path, fingerprints: Path | None) -> None:
     running = f", {found.running} running" if found.running else ""
     click.echo(f"{counted(found.sessions, 'session')}{running}: {'sound' if found.sound else 'not sound'}")
     end_if(not found.sound)
+
+
+@click.command()
+@takes_study
+@click.option("--to", type=Target(), metavar="FILE", help="Write the lines into this file; default: print them.")
+@click.option("--sign", is_flag=True, help="Sign them with the key of the lab, which the system's key store keeps.")
+@click.option("--server", metavar="URL", help="Let this server stamp them with the time (RFC 3161).")
+@click.option(
+    "--root",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="FILE",
+    help="Root certificate of the server (PEM), to verify its stamps; remembered.",
+)
+@click.option(
+    "--always",
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    metavar="DIR",
+    help="Write the proof into this folder at the end of every session, with --server; both are remembered.",
+)
+def proof(
+    results: Path, to: Path | None, *, sign: bool, server: str | None, root: Path | None, always: Path | None
+) -> None:
+    """Prove a study: a line for each session, withdrawal, reveal and exclusion, to print, scan or mail.
+
+    Keep the lines where people who can write to the results cannot; verify --fingerprints compares the study with them.
+    """
+    from study_app.store import workstation
+    from study_app.store.atomic import write_file
+    from study_app.store.folders import StudyFolder
+    from study_app.store.verification.proofs import proof_text
+
+    changes = {"proofs": always and str(always.absolute()), "stamp_root": root and str(root.absolute())}
+    changes |= {"stamps": server} if always is not None else {}
+    if given := {name: value for name, value in changes.items() if value is not None}:
+        workstation.save(workstation.MachineSettings(**(workstation.load().model_dump() | given)))
+    text = proof_text(StudyFolder(results), server=server or "", sign=sign or None)
+    if to is None:
+        click.echo(text, nl=False)
+    else:
+        write_file(to, text.encode())
+        click.echo(to)
 
 
 @click.command()

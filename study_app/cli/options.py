@@ -19,7 +19,7 @@ EXIT_USER_ERROR = 2
 EXIT_FOUND = 3
 GROUPS: Final = {
     "Study": "new edit check design power preregister run resume rehearse studies sessions workspace",
-    "Data": "export plot report unblind exclude include withdraw merge verify rebuild reproduce replay",
+    "Data": "export plot report unblind exclude include withdraw merge verify proof rebuild reproduce replay",
     "Model": "scene simulate identify estimate figures",
     "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds",
     "Devices": "devices outlets",

@@ -12,6 +12,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
+from typing import TypeAlias
 
 import study_app
 from study_app.errors import StoreError
@@ -29,7 +30,12 @@ from study_app.store.folders import REBUILT, SessionFolder, StudyFolder
 from study_app.store.journals.journal_events import Event, Recorded
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
-_FINGERPRINT = re.compile(r"([a-z2-7]{4}-[a-z2-7]{4}-[a-z2-7]{4})\s+(data/sub-[A-Za-z0-9]{1,32}/ses-[0-9]{2})\s*")
+_FINGERPRINT = re.compile(
+    r"([a-z2-7]{4}-[a-z2-7]{4}-[a-z2-7]{4})(?:-([a-z2-7]{2}))?\s+(data/sub-[A-Za-z0-9]{1,32}/ses-[0-9]{2}|"
+    r"(?:withdrawals\.jsonl|exclusions\.csv)/sub-[A-Za-z0-9]{1,32}|reveals\.jsonl)\s*"
+)
+Proofs: TypeAlias = tuple[tuple[str, str], ...]
+"""Fingerprints, and the sessions or records that they are of."""
 
 
 def write_checksums(session: SessionFolder) -> dict[str, str]:
@@ -147,8 +153,26 @@ def fingerprint(sums: Mapping[str, str], lines: Iterable[Event]) -> str:
         for name in (line.recording, line.recording_frames)
     }
     proved = {name: sums[name] for name in sums if not name.endswith("_data.csv") and name not in {REBUILT, *sealed}}
-    letters = base64.b32encode(hashlib.sha256(checksum_bytes(proved)).digest()).decode().lower()
+    return proof_of(checksum_bytes(proved).decode())
+
+
+def proof_of(text: str) -> str:
+    """Return the fingerprint of a text: 60 bits of its SHA-256 in base32."""
+    letters = _letters(text)
     return "-".join(letters[at : at + 4] for at in (0, 4, 8))
+
+
+def checked_line(proof: str, place: str) -> str:
+    """Return a line to print, scan or mail: with two characters that reveal one that was misread."""
+    return f"{proof}-{_check(proof, place)}  {place}"
+
+
+def _check(proof: str, place: str) -> str:
+    return _letters(f"{proof}  {place}".lower())[:2]
+
+
+def _letters(text: str) -> str:
+    return base64.b32encode(hashlib.sha256(text.encode()).digest()).decode().lower()
 
 
 def note_fingerprint(study: StudyFolder, session: SessionFolder, found: str, *, waits: bool = True) -> None:
@@ -161,32 +185,38 @@ def place_of(study: StudyFolder, session: SessionFolder) -> str:
     return session.path.relative_to(study.path).as_posix()
 
 
-def listed(path: Path) -> tuple[tuple[str, str], ...]:
+def listed(path: Path) -> Proofs:
     """Return fingerprint and session of every line of a list, none without a list; others are left out."""
-    return tuple((match[1], match[2]) for _, match in _matches(path) if match is not None)
+    return tuple((match[1], match[3]) for _, match in _matches(_text(path)) if match is not None)
 
 
 def unreadable(path: Path) -> tuple[int, ...]:
     """Return the numbers of the lines of a list that hold no fingerprint."""
-    return tuple(number for number, match in _matches(path) if match is None)
+    return tuple(number for number, match in _matches(_text(path)) if match is None)
 
 
-def read_copy(path: Path) -> tuple[tuple[str, str], ...]:
-    """Return fingerprint and session of every line of a copy, which holds nothing else."""
-    if not path.is_file():
-        raise StoreError(f"{path} is not a file: name a copy of a study's fingerprints.txt")
-    if wrong := unreadable(path):
-        raise StoreError(
-            f"{path}, line {wrong[0]} is not a fingerprint: a line must be such as "
-            "'k3vq-7m2p-xw4d  data/sub-P007/ses-01'; name a copy of a study's fingerprints.txt"
-        )
-    if not (found := listed(path)):
+def parsed(path: Path, text: str) -> Proofs:
+    """Return fingerprint and place of every line of a copy with this text, which holds nothing else."""
+    found: list[tuple[str, str]] = []
+    for number, match in _matches(text):
+        if match is None:
+            raise StoreError(
+                f"{path}, line {number} is not a fingerprint: a line must be such as "
+                "'k3vq-7m2p-xw4d  data/sub-P007/ses-01'; name a copy of a study's fingerprints.txt"
+            )
+        if match[2] not in (None, _check(match[1], match[3])):
+            raise StoreError(f"{path}, line {number} was misread: its last two characters are of another line")
+        found.append((match[1], match[3]))
+    if not found:
         raise StoreError(f"{path} has no fingerprint: name a copy of a study's fingerprints.txt")
-    return found
+    return tuple(found)
 
 
-def _matches(path: Path) -> Iterator[tuple[int, re.Match[str] | None]]:
-    text = (read_if_there(path) or b"").decode("utf-8-sig", "replace")
+def _text(path: Path) -> str:
+    return (read_if_there(path) or b"").decode("utf-8-sig", "replace")
+
+
+def _matches(text: str) -> Iterator[tuple[int, re.Match[str] | None]]:
     for number, line in enumerate(text.splitlines(), start=1):
         if line.strip():
             yield number, _FINGERPRINT.fullmatch(line.lower() if line.isupper() else line)

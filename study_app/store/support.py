@@ -20,7 +20,7 @@ from study_app.workspace import workspace
 NAME: Final = "liquid-study-support.zip"
 CRASHES: Final = 3
 _DRIVERS: Final = ("pyusb", "libusb-package", "hidapi")
-_PRIVATE: Final = frozenset({"operator", "firmware", "workspace", "recent", "camera"})
+_PRIVATE: Final = frozenset({"operator", "firmware", "workspace", "recent", "camera", "proofs", "stamps", "stamp_root"})
 """Initials, paths that may name a person, and an address that may contain a password."""
 _PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>)$')
 _HEADING: Final = re.compile(

@@ -30,7 +30,7 @@ from study_app.store.atomic import (
     sync_folder,
     write_file,
 )
-from study_app.store.checksums import fingerprint, place_of, read_checksums, sha256
+from study_app.store.checksums import fingerprint, place_of, proof_of, read_checksums, sha256
 from study_app.store.exclusions import exclusion_bytes, exclusions
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, readable
 from study_app.store.journals import journal
@@ -194,6 +194,11 @@ def describe_session(session: SessionFolder) -> ErasedSession:
 def add_tombstone(study: StudyFolder, tombstone: Tombstone) -> None:
     """Add a tombstone to the study's list."""
     append_line(study.withdrawals, json.dumps(asdict(tombstone), ensure_ascii=False).encode() + b"\n")
+
+
+def proof_of_withdrawal(tombstone: Tombstone) -> tuple[str, str]:
+    """Return the fingerprint of a withdrawal, and what lists of fingerprints call it."""
+    return proof_of(json.dumps(asdict(tombstone))), f"withdrawals.jsonl/sub-{tombstone.participant}"
 
 
 def _parsed(path: Path, number: int, line: bytes) -> Tombstone:

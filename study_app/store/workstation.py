@@ -96,7 +96,9 @@ class MachineSettings(_Strict):
     were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at; ``camera`` is the one
     that conditions show (see `video.sources`), "" for the usual one of the system; ``benches`` are the latest
     measurements of devices. ``lsl_markers``, ``lsl_samples`` and ``triggers`` (the address of a port, "": none)
-    are what sessions send to other programs. Whether ``device`` is known is for those to say who open it.
+    are what sessions send to other programs. ``proofs`` is the folder into which the proof of a study is written when
+    a session ends, ``stamps`` a server of time stamps (RFC 3161), ``stamp_root`` its root certificate (PEM). Whether
+    ``device`` is known is for those to say who open it.
     """
 
     screen: str = ""
@@ -116,6 +118,9 @@ class MachineSettings(_Strict):
     benches: Annotated[tuple[DeviceBench, ...], Field(strict=False)] = ()
     lsl_markers: bool = False
     lsl_samples: SampleChoice = "off"
+    proofs: Place | None = None
+    stamps: Annotated[str, Field(pattern=r"^(https?://\S+)?$")] = ""
+    stamp_root: Place | None = None
     triggers: Annotated[str, Field(pattern=TRIGGERS_PATTERN)] = ""
 
     @property

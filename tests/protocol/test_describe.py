@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.protocol.formats import newer_keys
+from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
 from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.streams import stream
@@ -80,5 +80,7 @@ def test_a_plan_of_format_1_keeps_its_bytes() -> None:
     plan = study(more="\n[analysis]\nalpha = 0.01\n").analysis
     assert plan is not None
     assert set(plan.model_dump(mode="json")).isdisjoint({"participants", "precision", "published"})
-    faults = newer_keys({"analysis": {"participants": 20, "published": [{"block": "a"}]}})
-    assert [fault.path for fault in faults] == [("analysis", "participants"), ("analysis", "published")]
+    with pytest.raises(ProtocolError) as refused:
+        parse(f"{SOUND}\n[analysis]\nparticipants = 20\nprecision = 0.1\n".encode(), "small")
+    later = [str(one) for one in refused.value.problems if "belongs to format 2" in str(one)]
+    assert ["participants" in later[0], "precision" in later[1]] == [True, True]

@@ -15,7 +15,6 @@ from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.source.files import source_bytes
-from study_app.protocol.table import Table, tidy
 from study_app.store.receipt import without_conditions
 from tests.protocol.sound import SOUND
 
@@ -39,7 +38,6 @@ def test_a_scene_holds_the_liquids_of_its_condition_in_order():
 
 
 def test_lines_of_the_file_do_not_matter_in_a_text():
-    assert tidy("\n  One\n two.\n\n\n \t\nThree. \n") == "One two.\n\nThree."
     body = load("rek2024").pages["part_1"].body
     first, second = SMALL.paragraphs(body, "en")
     assert first == "You will now feel three liquids, one after the other. We do not tell you which they are."
@@ -49,7 +47,7 @@ def test_lines_of_the_file_do_not_matter_in_a_text():
 THREADS = 8
 
 
-@pytest.mark.parametrize("base", [Table, Frozen])
+@pytest.mark.parametrize("base", [type(SMALL.limits), Frozen])
 def test_threads_that_use_a_model_first_build_its_validator_once(base: type[BaseModel]) -> None:
     begin = threading.Barrier(THREADS)
     builders: list[str] = []

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from study_app.store.blinded.blinding import opened, read_key, sealed
+from study_app.store.blinded.blinding import opened, opened_key, read_key, sealed
 from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import line_bytes, read
@@ -51,7 +51,7 @@ def cover_up(study: Path) -> None:
     for session in folder.sessions():
         lines = read(session.journal)
         name = lines[0].study
-        for path, content in table_files(Place(folder, session, name), lines, None):
+        for path, content in table_files(Place(folder, session, name), lines, opened_key(folder)):
             path.write_bytes(content)
         session.checksums.unlink(missing_ok=True)
         if lines[-1].event == "session_ended":

@@ -8,6 +8,7 @@ be resumed. Nothing is created on the disk before device and servo are ready.
 from __future__ import annotations
 
 import gc
+import logging
 import threading
 import traceback
 from collections.abc import Callable, Iterator
@@ -35,6 +36,7 @@ from study_app.session.preflight import Check, checks, refused
 from study_app.session.start import NewSession, Ready, check, measured, open_outlets, open_store, videos_of
 from study_app.store.journals import journal_events
 from study_app.store.study_versions import keep_content
+from study_app.store.verification.proofs import leave
 
 if TYPE_CHECKING:
     from study_app.app.session.bridge import SessionBridge
@@ -314,8 +316,10 @@ class LiveSession(QObject):
         """Close the session after its windows; keep the error that ended it for the caller."""
         assert self.bridge is not None  # noqa: S101 - it has just spoken
         self.theme = self.bridge.operator.theme
-        if self._progress is not None and (proof := self.bridge.parts.journal.fingerprint):
-            self._progress(f"fingerprint of the session, also in the study's fingerprints.txt: {proof}")
+        if (proof := self.bridge.parts.journal.fingerprint) and self._store is not None:
+            tell = self._progress or logging.getLogger(__name__).info
+            tell(f"fingerprint of the session, also in the study's fingerprints.txt: {proof}")
+            leave(self._store.place.study_folder, tell)
         if self._progress is not None and self._store is not None:
             status, folder = self.bridge.parts.journal.progress.ended, self._store.folder.path
             self._progress(f"session {status}: {folder}" if status else f"session not finished: {folder}")

@@ -276,7 +276,13 @@ def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[s
     if not isinstance(lines[-1], events.SessionEnded):
         expected |= {"status": receipt.UNFINISHED, "reason": "", "ended_at": None}
     found = [name for name, value in expected.items() if held.get(name) != value]
-    parts = {"device": ("name", start.device), "clock": ("origin_at", start.at)}
+    if start.version == study_app.__version__ and held.get("generator") != receipt.GENERATOR:
+        found.append("generator")
+    parts = {
+        "device": ("name", start.device),
+        "clock": ("origin_at", start.at),
+        "versions": ("liquid-study", start.version),
+    }
     found += [name for name, (part, value) in parts.items() if held.get(name, {}).get(part) != value]
     if not all(isinstance(entry, dict) and entry.get("at") in resumed for entry in held.get("resumed", ())):
         found.append("resumed")

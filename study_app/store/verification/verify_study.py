@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -23,7 +23,7 @@ from study_app.store.atomic import is_there, read_own, read_regular, temporaries
 from study_app.store.blinded import blinding
 from study_app.store.blinded.allocation import claims, entries_begun, group_in
 from study_app.store.blinded.blinding import Key, opened, sealed_hash, whole_protocol
-from study_app.store.checksums import listed, place_of, read_copy, unreadable
+from study_app.store.checksums import Proofs, checked_line, listed, place_of, unreadable
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.folder_lock import is_open
@@ -42,11 +42,11 @@ from study_app.store.tables.study_files import (
     table_bytes,
 )
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
+from study_app.store.verification.proofs import Proof, read_proof, records
 from study_app.store.verification.verify_session import CheckedSession, Findings, check_session, check_table
-from study_app.store.withdrawals import Tombstone, describe_session, tombstones
+from study_app.store.withdrawals import Tombstone, describe_session, proof_of_withdrawal, tombstones
 
 Sessions: TypeAlias = list[CheckedSession]
-Proofs: TypeAlias = Sequence[tuple[str, str]]  # fingerprint and session
 
 
 def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
@@ -57,8 +57,8 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     folder : Path
         The study folder.
     fingerprints : Path, optional
-        A copy of the ``fingerprints.txt`` of a study that is not merged, which was kept elsewhere: every session that
-        ended must be in it, and be the same.
+        A copy of the ``fingerprints.txt`` of a study that is not merged, or its proof (`proofs`), which was kept
+        elsewhere: every session that ended must be in it, and be the same, and every record in it must be there.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     merged = read_merged(folder)
     found = Findings(folder)
     if merged is None:
-        copy = None if fingerprints is None else (fingerprints, read_copy(fingerprints))
+        copy = None if fingerprints is None else (fingerprints, read_proof(fingerprints))
         sessions = _verify_study(folder, copy, found)
     elif fingerprints is None:
         _between(merged, found)
@@ -85,7 +85,7 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     return found
 
 
-def _verify_study(folder: Path, copy: tuple[Path, Proofs] | None, found: Findings) -> Sessions:
+def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, found: Findings) -> Sessions:
     study = StudyFolder(folder)
     name = described_study(study)
     if name is None:
@@ -104,8 +104,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proofs] | None, found: Finding
         found.warning(study.data, f"{many} of format 1, whose lines cannot show whether an earlier line was changed")
     _fingerprints(study, sessions, early, found)
     if copy is not None:
-        path, proofs = copy
-        _copy(study, sessions, [one for one in proofs if one not in _erased(study, withdrawn)], path, found)
+        _copy(study, sessions, withdrawn, *copy, found)
     _description(study, found)
     _exclusions(study, sessions, found)
     _reveals(study, key, found)
@@ -169,15 +168,6 @@ def _withdrawn(study: StudyFolder, found: Findings) -> dict[str, Tombstone]:
     return withdrawn
 
 
-def _erased(study: StudyFolder, withdrawn: Mapping[str, Tombstone]) -> set[tuple[str, str]]:
-    """Return fingerprint and place of the sessions that were erased."""
-    return {
-        (session.fingerprint, place_of(study, study.session(participant, session.session)))
-        for participant, tombstone in withdrawn.items()
-        for session in tombstone.sessions
-    }
-
-
 def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Findings) -> None:
     """Check the table of all sessions, where each session's journal could be read.
 
@@ -215,8 +205,35 @@ def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: 
             found.error(path, f"lacks {place_of(study, one.place.folder)}, which has ended; rebuild adds it")
 
 
-def _copy(study: StudyFolder, sessions: Sessions, copy: Proofs, path: Path, found: Findings) -> None:
-    """Compare the sessions with a list that was kept elsewhere."""
+def _copy(
+    study: StudyFolder,
+    sessions: Sessions,
+    withdrawn: Mapping[str, Tombstone],
+    path: Path,
+    proof: Proof,
+    found: Findings,
+) -> None:
+    """Compare sessions and records with what was kept elsewhere; a withdrawal must be in it, too."""
+    for told in proof.told:
+        found.warning(study.path, f"{path} {told}")
+    erased: set[tuple[str, str]] = set()
+    for participant, tombstone in withdrawn.items():
+        folders = [study.session(participant, one.session) for one in tombstone.sessions]
+        own = {(one.fingerprint, place_of(study, at)) for one, at in zip(tombstone.sessions, folders, strict=True)}
+        if own.isdisjoint(proof.lines):
+            continue
+        erased |= {*own, *(line for line in proof.lines if line[1] == f"{study.exclusions.name}/sub-{participant}")}
+        if (told_of := proof_of_withdrawal(tombstone)) not in proof.lines:
+            advice = f"if {participant} asked for it, add the line: {checked_line(*told_of)}"
+            found.error(study.withdrawals, f"the withdrawal of {participant} is not in {path}: {advice}")
+    copy = [line for line in proof.lines if line not in erased]
+    there: Proofs = ()
+    with contextlib.suppress(StoreError):  # said already
+        there = records(study)
+    for record, place in copy:
+        if not place.startswith("data/") and (record, place) not in there:
+            what = f"lacks what {path} lists as {record} ({place}): it was deleted or changed"
+            found.error(study.path / place.partition("/")[0], what)
     _compare(study, sessions, copy, str(path), found)
     known = {place for _, place in copy}
     for one in sessions:
@@ -225,9 +242,13 @@ def _copy(study: StudyFolder, sessions: Sessions, copy: Proofs, path: Path, foun
             found.error(one.place.folder.path, f"{lacks}: it was added, or ended, after that copy was made")
 
 
-def _compare(study: StudyFolder, sessions: Sessions, proofs: Proofs, name: str, found: Findings) -> None:
+def _compare(
+    study: StudyFolder, sessions: Sessions, proofs: Iterable[tuple[str, str]], name: str, found: Findings
+) -> None:
     there = {place_of(study, one.place.folder): one for one in sessions}
     for proof, place in proofs:
+        if not place.startswith("data/"):
+            continue
         one, path = there.get(place), study.path / place
         if one is None:
             found.error(path, f"is missing, but {name} lists it: it was deleted after it had ended")

@@ -19,13 +19,14 @@ from study_app.analysis.report.write_report import report
 from study_app.cli import commands, main
 from study_app.errors import StoreError
 from study_app.store.blinded.unblinding import unblind
+from study_app.store.checksums import checked_line
 from study_app.store.exclusions import exclude, include
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.begin import used_ids
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.sites.merge import merge
 from study_app.store.verification.verify_study import verify
-from study_app.store.withdrawals import Withdrawn, tombstones, withdraw
+from study_app.store.withdrawals import Withdrawn, proof_of_withdrawal, tombstones, withdraw
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
 from tests.studies import rehearsed
@@ -91,6 +92,8 @@ def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, resul
     shutil.copy(study / "fingerprints.txt", copy)
     done = erase(study)
     copy = copy.rename(results.parent / "fingerprints-kept.txt")
+    with copy.open("a") as kept:
+        kept.write(checked_line(*proof_of_withdrawal(done.tombstone)))
     assert done.left == ()
     assert done.elsewhere == ()
     for path, content in contents(results).items():

@@ -1,0 +1,359 @@
+"""Proofs that leave the room: which of twenty forgeries each of them tells, by the table of docs/files.md."""
+
+import json
+import re
+import shutil
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.errors import StoreError
+from study_app.store import receipt, workstation
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import exclude
+from study_app.store.folders import StudyFolder
+from study_app.store.verification.proofs import leave, proof_text, read_proof
+from study_app.store.verification.verify_study import verify
+from study_app.store.withdrawals import Tombstone, add_tombstone, describe_session, withdraw
+from tests.store.forging import Lines, cover_up, forge
+from tests.studies import once, rehearsed
+
+pytestmark = pytest.mark.slow
+
+P001 = "data/sub-P001/ses-01"
+Act = Callable[[Path], None]
+
+
+def made(folder: Path) -> None:
+    """Three sessions, one of which was withdrawn, an exclusion, and an opened key."""
+    study = rehearsed(folder)
+    exclude(study, "P002", 1, trial=2, by="AK", reason="the phone rang")
+    withdraw(study, "P003", by="AK", reason="asked by letter")
+    unblind(study, "AK", "closed")
+    (folder / "kept.txt").write_text(proof_text(StudyFolder(study)))
+
+
+@pytest.fixture
+def study(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    shutil.copytree(once(tmp_path_factory, "proved", made), tmp_path / "proved")
+    assert verify(tmp_path / "proved" / "demo").errors == ()
+    return tmp_path / "proved" / "demo"
+
+
+def forging(edit: Callable[[Lines], object], *, covered: bool = True, **of_the_receipt: object) -> Act:
+    def act(study: Path) -> None:
+        forge(study / P001 / "journal.jsonl", edit)
+        path = study / P001 / "receipt.json"
+        receipt.write(path, receipt.read(path) | of_the_receipt)
+        if covered:
+            cover_up(study)
+
+    return act
+
+
+def of_start(**changes: object) -> Callable[[Lines], object]:
+    return lambda lines: lines[0].update(changes)
+
+
+def without(event: str, *, last: bool = False) -> Callable[[Lines], object]:
+    def edit(lines: Lines) -> None:
+        found = [number for number, line in enumerate(lines) if line["event"] == event]
+        del lines[found[-1 if last else 0]]
+
+    return edit
+
+
+def other_answers(lines: Lines) -> None:
+    for line in lines:
+        for answer in [line] if line["event"] == "choice" else line.get("items") or ():
+            answer["value"] = 8 - answer["value"]
+
+
+def half(lines: Lines) -> None:
+    del lines[len(lines) // 2 :]
+
+
+LATER = "2030-01-01T00:00:00.000+00:00"
+
+
+def a_day_later(lines: Lines) -> None:
+    for line in lines[1:]:
+        line["at"] = LATER
+
+
+def edit_file(study: Path) -> None:
+    path = study / P001 / "journal.jsonl"
+    path.write_bytes(path.read_bytes().replace(b'"value":4', b'"value":5', 1))
+
+
+def edit_table(study: Path) -> None:
+    path = next((study / P001).glob("*responses_data.csv"))
+    path.write_bytes(path.read_bytes().replace(b",4,", b",5,", 1))
+
+
+def delete_session(study: Path) -> None:
+    shutil.rmtree(study / P001)
+
+
+def delete_person(study: Path) -> None:
+    shutil.rmtree(study / "data" / "sub-P001")
+    cover_up(study)
+
+
+def false_withdrawal(study: Path) -> None:
+    folder = StudyFolder(study)
+    erased = tuple(describe_session(one) for one in folder.sessions() if one.participant == "P001")
+    delete_person(study)
+    add_tombstone(folder, Tombstone("P001", "2026-03-02T09:30:00+01:00", "AK", "asked", erased))
+
+
+def exchange(study: Path) -> None:
+    """Give each participant the answers of the other."""
+    one, two = ((study / f"data/sub-P00{n}/ses-01/journal.jsonl") for n in (1, 2))
+    held = [map(json.loads, path.read_text().splitlines()) for path in (one, two)]
+    values = [[line["value"] for line in lines if line["event"] == "choice"] for lines in held]
+
+    def given(told: list[int]) -> Callable[[Lines], None]:
+        def edit(lines: Lines) -> None:
+            rest = iter(told)
+            held = {}
+            for line in lines:
+                if line["event"] == "choice":
+                    line["value"] = held[line["trial"], line["item"]] = next(rest)
+                elif line["event"] == "responses":
+                    for item in line["items"]:
+                        item["value"] = held[line["trial"], item["item"]]
+
+        return edit
+
+    forge(one, given(values[1]))
+    forge(two, given(values[0]))
+    cover_up(study)
+
+
+def add_session(study: Path) -> None:
+    shutil.copytree(study / P001, study / "data/sub-P001/ses-02")
+    path = study / "data/sub-P001/ses-02"
+    forge(path / "journal.jsonl", lambda lines: lines[0].update(session=2))
+    receipt.write(path / "receipt.json", receipt.read(path / "receipt.json") | {"session": 2})
+    for table in path.glob("*_data.csv"):
+        table.unlink()
+    cover_up(study)
+
+
+def delete(*names: str) -> Act:
+    def act(study: Path) -> None:
+        for name in names:
+            (study / name).unlink()
+        cover_up(study)
+
+    return act
+
+
+def other_reason(study: Path) -> None:
+    path = study / "exclusions.csv"
+    path.write_bytes(path.read_bytes().replace(b"the phone rang", b"too slow"))
+
+
+def status(lines: Lines) -> None:
+    lines[-1]["status"] = "withdrawn"
+
+
+FORGERIES: dict[str, tuple[Act, bool]] = {
+    "an answer changed in the journal": (edit_file, True),
+    "an answer changed in a table": (edit_table, True),
+    "a confirmation of answers removed": (forging(without("responses")), True),
+    "a choice removed": (forging(without("choice")), True),
+    "all answers of a participant inverted": (forging(other_answers), False),
+    "answers of two participants exchanged": (exchange, False),
+    "the last page removed": (forging(without("page_left", last=True)), False),
+    "all times moved": (forging(a_day_later), False),
+    "another seed": (forging(of_start(seed=12), seed=12), False),
+    "a simulated session marked as real": (forging(of_start(simulated=False), simulated=False), False),
+    "another operator": (forging(of_start(operator="BM"), operator="BM"), False),
+    "a completed session marked as withdrawn": (forging(status, status="withdrawn"), True),
+    "a session cut and marked as unfinished": (forging(half, status="unfinished", reason="", ended_at=None), False),
+    "a session's folder deleted": (delete_session, True),
+    "a participant deleted": (delete_person, False),
+    "a participant deleted, with a false withdrawal": (false_withdrawal, False),
+    "a session added": (add_session, False),
+    "an exclusion deleted": (delete("exclusions.csv"), False),
+    "the reason of an exclusion changed": (other_reason, False),
+    "the record of a withdrawal deleted": (delete("withdrawals.jsonl"), False),
+}
+"""How it is done, all else computed anew, and whether `verify` finds it without what was kept elsewhere."""
+
+
+@pytest.fixture
+def key_store(tmp_path: Path) -> Iterator[Path]:
+    """A file that the library of key stores uses."""
+    keyring = pytest.importorskip("keyring", reason="the optional extra proofs is not installed")
+    backend = pytest.importorskip("keyring.backend")
+    held = tmp_path / "keys.json"
+
+    class InFile(backend.KeyringBackend):  # type: ignore[misc, name-defined]
+        priority = 1
+
+        def get_password(self, service: str, username: str) -> str | None:
+            return json.loads(held.read_text()).get(f"{service}/{username}") if held.exists() else None
+
+        def set_password(self, service: str, username: str, password: str) -> None:
+            held.write_text(json.dumps({f"{service}/{username}": password}))
+
+    before = keyring.get_keyring()
+    keyring.set_keyring(InFile())
+    yield held
+    keyring.set_keyring(before)
+
+
+@pytest.mark.variants(20)
+@pytest.mark.parametrize(("act", "alone"), FORGERIES.values(), ids=FORGERIES)
+def test_every_forgery_is_told_by_a_line_that_was_kept_elsewhere(study: Path, act: Act, alone: bool) -> None:
+    act(study)
+    assert verify(study).sound != alone, verify(study).errors
+    found = verify(study, study.parent / "kept.txt")
+    assert [error for error in found.errors if alone or "kept.txt" in error.message]
+
+
+def test_the_page_lists_the_forgeries_and_what_tells_them() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "files.md").read_text(encoding="utf-8")
+    told, untold = (part.split("\n\n")[1].splitlines() for part in page.split("told by `verify` alone")[1:])
+    assert told == [f"- {name}" for name, (_, alone) in FORGERIES.items() if alone]
+    assert untold == [f"- {name}" for name, (_, alone) in FORGERIES.items() if not alone]
+
+
+def test_lines_of_records_are_compared_and_a_withdrawal_that_was_asked_for_adds_its_own(study: Path) -> None:
+    kept = study.parent / "kept.txt"
+    lines = [line.split()[1] for line in kept.read_text().splitlines()]
+    names = ["withdrawals.jsonl/sub-P003", "reveals.jsonl", "exclusions.csv/sub-P002"]
+    assert lines == [P001, P001.replace("1/", "2/"), *names]
+    found = verify(study, kept)
+    assert found.errors == ()
+    (study / "blinding" / "reveals.jsonl").write_bytes(b"")
+    assert "reveals.jsonl: lacks what" in "\n".join(map(str, verify(study, kept).errors))
+    words = ("withdraw", str(study), "--participant", "P002", "--by", "AK", "--reason", "asked")
+    said = CliRunner().invoke(commands, words).stdout.splitlines()
+    told = "\n".join(map(str, verify(study, kept).errors))
+    line = said[-1].partition(":  ")[2]
+    assert f"the withdrawal of P002 is not in {kept}: if P002 asked for it, add the line: {line}" in told
+    kept.write_text(f"{kept.read_text()}{line}\n")
+    assert "P002" not in "\n".join(map(str, verify(study, kept).errors))
+
+
+def test_a_misread_line_is_named(study: Path) -> None:
+    kept = study.parent / "kept.txt"
+    first, *rest = kept.read_text().splitlines()
+    other = ("b" if first[2] != "b" else "c").join((first[:2], first[3:]))
+    kept.write_text("\n".join([other, *rest]))
+    with pytest.raises(StoreError, match=r"kept.txt, line 1 was misread: its last two characters are of another line"):
+        verify(study, kept)
+
+
+def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store: Path) -> None:
+    kept = study.parent / "signed.txt"
+    done = CliRunner().invoke(commands, ["proof", str(study), "--sign", "--to", str(kept)])
+    assert (done.exit_code, done.stdout.strip()) == (0, str(kept)), done.output
+    found = verify(study, kept)
+    assert found.errors == ()
+    assert f"{kept} is signed with the key of this computer" in "\n".join(map(str, found.warnings))
+    whole = kept.read_text()
+    kept.write_text("".join(whole.splitlines(keepends=True)[1:]))
+    with pytest.raises(StoreError, match="is not what was signed: it was changed"):
+        verify(study, kept)
+    key_store.unlink()
+    kept.write_text(whole)
+    assert "compare it with your key" in "\n".join(read_proof(kept).told)
+    proof_text(StudyFolder(study), sign=True)
+    with pytest.raises(StoreError, match=r"signed with another key .* than this computer's: it was replaced"):
+        verify(study, kept)
+
+
+def wait_for_proofs() -> None:
+    for thread in threading.enumerate():
+        if thread.name == "proof":
+            thread.join()
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[str]:
+    """The URL of a server of time stamps, with a certificate of its own: ``root.pem``."""
+    pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
+    if shutil.which("openssl") is None:
+        pytest.skip("openssl stamps")
+    (tmp_path / "ts.cnf").write_text(
+        "[req]\ndistinguished_name=dn\nx509_extensions=v3\nprompt=no\n[dn]\nCN=lab\nO=lab\n"
+        "[v3]\nbasicConstraints=critical,CA:FALSE\nkeyUsage=critical,digitalSignature\n"
+        "extendedKeyUsage=critical,timeStamping\nsubjectKeyIdentifier=hash\nauthorityKeyIdentifier=keyid\n"
+        "[ca]\nbasicConstraints=critical,CA:TRUE\nkeyUsage=critical,keyCertSign\nsubjectKeyIdentifier=hash\n"
+        f"[tsa]\ndefault_tsa=t\n[t]\nserial={tmp_path}/serial\nsigner_cert={tmp_path}/tsa.pem\n"
+        f"signer_key={tmp_path}/tsa.key\nsigner_digest=sha256\ndefault_policy=1.2.3.4.1\ndigests=sha256,sha512\n"
+        "accuracy=secs:1\n"
+    )
+
+    def openssl(*words: str) -> None:
+        subprocess.run(("openssl", *words), cwd=tmp_path, check=True, capture_output=True)
+
+    new = ("-newkey", "rsa:2048", "-nodes", "-config", "ts.cnf", "-x509", "-days", "2")
+    openssl("req", *new, "-extensions", "ca", "-keyout", "root.key", "-out", "root.pem", "-subj", "/CN=root")
+    signed_by = ("-CA", "root.pem", "-CAkey", "root.key")
+    openssl("req", *new, *signed_by, "-extensions", "v3", "-keyout", "tsa.key", "-out", "tsa.pem", "-subj", "/CN=tsa")
+
+    class Stamps(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            (tmp_path / "asked").write_bytes(self.rfile.read(int(self.headers["Content-Length"])))
+            openssl("ts", "-reply", "-config", "ts.cnf", "-section", "t", "-queryfile", "asked", "-out", "answer")
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write((tmp_path / "answer").read_bytes())
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Stamps) as serving:
+        thread = threading.Thread(target=serving.serve_forever)
+        thread.start()
+        yield f"http://127.0.0.1:{serving.server_address[1]}"
+        serving.shutdown()
+        thread.join()
+
+
+def test_a_stamp_tells_when_the_study_was_so_and_leaves_by_itself(
+    study: Path, server: str, tmp_path: Path, key_store: Path
+) -> None:
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    words = ["proof", str(study), "--server", server, "--root", str(tmp_path / "root.pem"), "--always", str(outside)]
+    done = CliRunner().invoke(commands, [*words, "--sign"])
+    assert done.exit_code == 0, done.output
+    said: list[str] = []
+    leave(StudyFolder(study), said.append)
+    wait_for_proofs()
+    kept = outside / "demo-proof.txt"
+    assert said == [f"the proof of the study is in {kept}"]
+    found = verify(study, kept)
+    assert found.errors == ()
+    assert re.search(r"was stamped at 20\d\d-", "\n".join(map(str, found.warnings)))
+    whole = kept.read_text()
+    kept.write_text("".join(line for line in whole.splitlines(keepends=True)[1:] if not line.startswith("signature")))
+    with pytest.raises(StoreError, match=r"is not what was stamped, or by another server .*: it was changed"):
+        verify(study, kept)
+    workstation.save(workstation.load().model_copy(update={"stamp_root": None}))
+    kept.write_text(whole)
+    with pytest.raises(StoreError, match=r"is stamped: name the server's root certificate"):
+        verify(study, kept)
+
+
+def test_a_server_that_gives_no_stamp_is_named_and_the_program_goes_on(study: Path, tmp_path: Path) -> None:
+    pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
+    workstation.save(workstation.MachineSettings(proofs=str(tmp_path), stamps="http://127.0.0.1:9"))
+    said: list[str] = []
+    leave(StudyFolder(study), said.append)
+    wait_for_proofs()
+    (line,) = said
+    assert re.search(r"proof.txt: http://127.0.0.1:9 gave no time stamp \(.*refused.*\): try again later", line)
