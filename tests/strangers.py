@@ -11,6 +11,7 @@ from typing import Final, TypeAlias
 DRIP_S: Final = 0.02
 CLOSE: Final = None
 PATIENCE_S: Final = 3.0
+HTTP_OK: Final = b"HTTP/1.1 200 OK\r\nConnection: close\r\n"
 Parts: TypeAlias = Iterator[bytes | None]
 """What is sent over a connection; `CLOSE` ends it, and after the last part it stays open."""
 Answer: TypeAlias = Callable[[bytes, socket.socket], Parts]
@@ -33,6 +34,10 @@ def flooded(begin: bytes, again: bytes) -> Parts:
 
 def sent(*parts: bytes | None) -> Callable[..., Parts]:
     return lambda *_: iter(parts)
+
+
+def http_answer(body: bytes) -> Answer:
+    return sent(HTTP_OK + b"Content-Length: %d\r\n\r\n%b" % (len(body), body))
 
 
 @contextmanager

@@ -1,6 +1,5 @@
 """The driver over a real TCP connection to the emulated service, in real time."""
 
-import json
 import socket
 import threading
 import time
@@ -19,6 +18,7 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 from tests.compiled import needs_servo
 from tests.devices.inverse3.server import ServiceServer
+from tests.strangers import http_answer, serving
 
 pytestmark = [needs_servo, pytest.mark.slow]
 ENOUGH_S = 20.0
@@ -112,14 +112,14 @@ def test_without_a_service_the_probe_says_what_to_start() -> None:
 def test_a_force_scale_of_1_is_understood_in_each_shape(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")  # where nothing answers
     monkeypatch.setattr("urllib.request._opener", None)
-    with HttpAnswer(answer) as port:
+    with serving(http_answer(answer)) as port:
         assert check_force_scale(force_scale("127.0.0.1", (port,))) == 1.0
 
 
 HUGE = b"1" + b"0" * 400
 NOT_1 = (b"2.5", b'{"value": 2.5}', b'{"devices/force_scale": 2.5}', b"0", b"-1", b"NaN", b"Infinity", b"1e999", HUGE)
 UNKNOWN = (
-    *(None, b"", b"not json", b"null", b"true", b'"1"', b"[1]", b"{}", b'{"scale": 1}', b'{"value": true}'),
+    *(b"", b"not json", b"null", b"true", b'"1"', b"[1]", b"{}", b'{"scale": 1}', b'{"value": true}'),
     *(b'{"value": "1"}', b'{"value": null}', b'{"value": {"value": 1}}', b"9" * 5000, b"[" * 100_000),
     b'["' + b"many\\n" * 1000 + b'"]',
 )
@@ -129,8 +129,8 @@ UNKNOWN = (
     ("answer", "mode"),
     [*((answer, "settings") for answer in NOT_1), *((answer, "unknown-scale") for answer in UNKNOWN)],
 )
-def test_any_other_answer_about_the_force_scale_is_refused_in_a_line(answer: bytes | None, mode: str) -> None:
-    with HttpAnswer(answer) as port, pytest.raises(DeviceFailure) as refused:
+def test_any_other_answer_about_the_force_scale_is_refused_in_a_line(answer: bytes, mode: str) -> None:
+    with serving(http_answer(answer)) as port, pytest.raises(DeviceFailure) as refused:
         check_force_scale(force_scale("127.0.0.1", (port,)))
     assert refused.value.mode == mode
     assert "\n" not in str(refused.value)
@@ -150,34 +150,3 @@ def test_a_service_that_does_not_answer_about_its_force_scale_moves_nothing(
     late.set()
     assert service.state.pushes == 0
     assert until(lambda: service.state.ended == 1)
-
-
-class HttpAnswer:
-    """Answers one GET with a body; with None it only waits."""
-
-    def __init__(self, body: bytes | None) -> None:
-        self._body = body
-        self._socket = socket.create_server(("127.0.0.1", 0))
-
-    def __enter__(self) -> int:
-        threading.Thread(target=self._answer, daemon=True).start()
-        return int(self._socket.getsockname()[1])
-
-    def __exit__(self, *_error: object) -> None:
-        self._socket.close()
-
-    def _answer(self) -> None:
-        connection, _ = self._socket.accept()
-        with connection:
-            connection.recv(4096)
-            if self._body is None:
-                connection.recv(4096)
-                return
-            connection.sendall(
-                b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n%b" % (len(self._body), self._body)
-            )
-
-
-def test_an_http_server_that_is_no_websocket_is_refused() -> None:
-    with HttpAnswer(json.dumps({}).encode()) as port, pytest.raises(DeviceFailure, match="something else answers"):
-        Inverse3Device(f"127.0.0.1:{port}").open()

@@ -18,11 +18,10 @@ from study_app.devices.emulators.inverse3_service import config
 from study_app.devices.inverse3.opening import DEVICE_GLOBAL, SESSION_SCOPED
 from study_app.devices.inverse3.service import force_scale, probe
 from tests.compiled import needs_servo
-from tests.strangers import CLOSE, Parts, dripped, flooded, sent, serving
+from tests.strangers import CLOSE, HTTP_OK, Parts, dripped, flooded, http_answer, sent, serving
 
 pytestmark = [needs_servo, pytest.mark.slow]
 MOST_S: Final = 3.0
-HTTP_OK: Final = b"HTTP/1.1 200 OK\r\nConnection: close\r\n"
 CONFIG: Final = config() | DEVICE_GLOBAL | SESSION_SCOPED
 STATUS: Final = {"power_supply": True, "ready": True, "calibrated": True, "in_use": False}
 
@@ -67,7 +66,7 @@ def first(mode: str, message: Any) -> Kind:
 
 
 def http(body: bytes, mode: str = "unknown-scale") -> Kind:
-    return Kind(mode, http=sent(HTTP_OK + b"Content-Length: %d\r\n\r\n" % len(body) + body))
+    return Kind(mode, http=http_answer(body))
 
 
 HUGE: Final = b"\x81\x7f" + (1 << 62).to_bytes(8, "big")
