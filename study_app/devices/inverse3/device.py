@@ -67,6 +67,7 @@ class Inverse3Device(FramedDevice):
         return cls(request.argument, progress=request.progress, **request.limits)
 
     def _connect(self) -> service.Link:
+        Messages.compile()
         return service.SocketLink(self._host, self._port)
 
     def _prepare(self, connection: service.Link) -> dict[str, Any]:

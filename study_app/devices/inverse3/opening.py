@@ -112,6 +112,13 @@ class Session:
 class Messages:
     """Text messages over a link, for the time in which a device is opened."""
 
+    @staticmethod
+    def compile() -> None:
+        """Compile what messages need, or load it from the cache: before the time for opening begins."""
+        text = np.frombuffer(b"{}", np.uint8)
+        build_frame(np.zeros(16, np.uint8), TEXT, text, text.size, 0)
+        parse_header(text, 0, text.size, np.zeros(2, np.int64))
+
     def __init__(self, link: Link) -> None:
         self._link = link
         self._came = b""

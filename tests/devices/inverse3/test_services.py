@@ -15,7 +15,8 @@ import pytest
 
 from study_app.devices.driver import examine
 from study_app.devices.emulators.inverse3_service import config
-from study_app.devices.inverse3.opening import DEVICE_GLOBAL, SESSION_SCOPED
+from study_app.devices.inverse3.device import Inverse3Device
+from study_app.devices.inverse3.opening import DEVICE_GLOBAL, SESSION_SCOPED, Messages
 from study_app.devices.inverse3.service import force_scale, probe
 from tests.compiled import needs_servo
 from tests.strangers import CLOSE, HTTP_OK, Parts, dripped, flooded, http_answer, sent, serving
@@ -150,6 +151,14 @@ def answers(kind: Kind, head: bytes, connection: socket.socket) -> Parts:
         yield from kind.asked(number) if kind.asked else [frame(message_of())]
 
 
+@pytest.fixture(scope="module")
+def compiled() -> None:
+    """Compile the driver: the first start takes longer."""
+    Inverse3Device()
+    Messages.compile()
+
+
+@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize(
     "kind",
     [
