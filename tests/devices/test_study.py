@@ -296,7 +296,7 @@ def test_a_cable_pulled_in_a_trial_keeps_the_data_marks_the_trial_and_lets_it_go
     folder = StudyFolder(tmp_path / "demo")
     with monkeypatch.context() as patch:
         patch.setattr(RehearsedSession, "look", pull_the_cable)
-        with pytest.raises(SessionError, match="'falcon-emulated' stopped: it is no longer there"):
+        with pytest.raises(SessionError, match="'falcon-emulated' stopped: it was disconnected during use"):
             rehearsal.rehearse("demo", participants=1, seed=1, device="falcon-emulated", results=folder.path)
     (session,) = folder.sessions()
     rows = rows_of(session.table("demo", "trials"))
