@@ -82,7 +82,6 @@ def stability(
     """
     from study_app.evidence.stability import stability_report as found
     from study_app.evidence.stability.case_groups import groups, some, sweep
-    from study_app.evidence.stability.fidelity import fidelities
     from study_app.evidence.stability.stability_cases import parse
 
     parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity, "estimation": estimated}
@@ -125,7 +124,7 @@ def stability(
             lambda done, of: show(f"{done} of {of} verdicts", done / of),
         )
         show("comparing forces")
-        compared = fidelities(executor=executor) if only is None else ()
+        compared = found.fidelities(executor=executor) if only is None else ()
     shown = found.evidence(swept, compared)
     click.echo(shown.text, nl=False)
     if to is not None:

@@ -12,7 +12,6 @@ from study_app.cli.options import EXIT_FOUND
 from study_app.errors import StudyError
 from study_app.evidence.stability import stability_report as stability
 from study_app.evidence.stability.case_groups import Group, groups, some, sweep
-from study_app.evidence.stability.fidelity import LOOPS, fidelities
 from study_app.evidence.stability.stability_cases import Case, liquids, parse, scene_of
 from study_app.evidence.stability.verdict import judge
 from study_app.haptics.model.slope_limits import table
@@ -24,7 +23,7 @@ pytestmark = pytest.mark.slow
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 
 UNSTABLE = "liquid=physical_honey scale=10 rate_hz=1000 delay=4 hand=thrown speed_mps=0.6"
-STUDY_LOOPS = LOOPS[:2]
+STUDY_LOOPS = stability.LOOPS[:2]
 LIMITED = ("physical_tar", "dense", "damper")
 """No free handle is stable with what these ask for, 192 N·s/m and more: they feel as thick as the loop allows."""
 PRESETS = [name for name in liquids() if name not in LIMITED]
@@ -118,7 +117,7 @@ def test_a_line_that_is_no_case_is_told_in_one_sentence(line, said):
 @compiled
 @pytest.mark.parametrize("name", PRESETS)
 def test_in_a_studys_loop_a_held_liquid_is_felt_as_it_is(name):
-    for found in fidelities([name], STUDY_LOOPS):
+    for found in stability.fidelities([name], STUDY_LOOPS):
         assert found.within, found
         assert found.force_n > 0
         assert found.beyond < 0.03
@@ -127,7 +126,7 @@ def test_in_a_studys_loop_a_held_liquid_is_felt_as_it_is(name):
 @compiled
 @pytest.mark.parametrize("name", LIMITED)
 def test_what_no_handle_bears_is_said_to_be_limited(name):
-    (found,) = fidelities([name], STUDY_LOOPS[1:])
+    (found,) = stability.fidelities([name], STUDY_LOOPS[1:])
     assert not found.within
 
 
@@ -140,8 +139,8 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     judged = stability.judge(parse(UNSTABLE), safe=False)
     monkeypatch.setattr(stability, "judge", lambda case, safe: dataclasses.replace(judged, case=case, safe=safe))
     monkeypatch.setattr(stability, "judge_driven", lambda case: dataclasses.replace(judged, case=case, safe=True))
-    few = fidelities(["honey"], STUDY_LOOPS)
-    monkeypatch.setattr("study_app.evidence.stability.fidelity.fidelities", lambda **_: few)
+    few = stability.fidelities(["honey"], STUDY_LOOPS)
+    monkeypatch.setattr("study_app.evidence.stability.stability_report.fidelities", lambda **_: few)
     monkeypatch.setattr("study_app.cli.evidence.stability.executor_for", lambda _: ThreadPoolExecutor(1))
     ran = command("--cases", "2")
     assert ran.return_value == EXIT_FOUND
