@@ -44,6 +44,7 @@ class Transport(Protocol):
     @property
     def name(self) -> str:
         """The word by which `open_transport` opens it again."""
+        return self.serial or ""
 
     def control(self, request: int, value: int) -> None:
         """Send a control request (``constants.REQUEST_*``) with its value."""
@@ -146,10 +147,6 @@ class PyUsbTransport(Transport):
         self._device: Any = None
         self.serial = serial
         self.reopen()
-
-    @property
-    def name(self) -> str:
-        return self.serial or ""
 
     def reopen(self) -> None:
         self.close()
@@ -348,10 +345,6 @@ class FtdiTransport(Transport):
         self._memory: Any = None
         self.serial = serial
         self.reopen()
-
-    @property
-    def name(self) -> str:
-        return self.serial or ""
 
     def reopen(self) -> None:
         self.close()
