@@ -294,8 +294,9 @@ class LslForce:
                 continue
             inlet = self._lsl.StreamInlet(found, max_buflen=_BUFFER_S, recover=False)
             try:
-                labels = _labels(inlet.info(timeout=_OPENS_S))
-                if not set(LABELS) <= set(labels):
+                info = inlet.info(timeout=_OPENS_S)
+                labels = _labels(info)[: info.channel_count()]
+                if not set(LABELS) <= set(labels) or info.channel_format() == self._lsl.cf_string:
                     self._refused.add(found.uid())
                     continue
                 inlet.open_stream(timeout=_OPENS_S)
