@@ -413,6 +413,7 @@ class MainController(QObject):
         for saved in (self.designer.saving.saved, self.playing.kept):
             saved.connect(self._show_saved)
         self.designer.feeling.asked.connect(self._feel)
+        self.designer.place.form.foot.glossary.clicked.connect(lambda: self.show_help("glossary"))
         self.designer.editing.opened_other.connect(self._forget_study)
         self.designer.feeling.returned.connect(lambda: self.window.go("designer"))
         return self.designer.place
@@ -501,11 +502,13 @@ class MainController(QObject):
         self.help = HelpPlace()
         return self.help
 
-    def show_help(self) -> None:
+    def show_help(self, page: str = "") -> None:
         here = self.window.here
         self.window.place("help")
         assert self.help is not None  # noqa: S101 - made with its place
         self.help.open_from(here)
+        if page:
+            self.help.open_page(page)
         self.window.go("help")
 
     def _show_saved(self) -> None:

@@ -281,3 +281,14 @@ def test_an_exception_that_no_slot_catches_is_shown_once_and_printed(qtbot: Any,
     assert len(printed) == 2
     (sentence,) = seen
     assert sentence.startswith("NameError: name 'unsaved' is not defined. This is a bug")
+
+
+def test_each_form_leads_to_the_glossary_and_back(visit: MainController, qtbot: Any) -> None:
+    visit.open_designer("demo")
+    assert visit.designer is not None
+    qtbot.mouseClick(visit.designer.place.form.foot.glossary, Qt.MouseButton.LeftButton)
+    assert visit.help is not None
+    assert (visit.window.here, visit.help.reader.page) == ("help", "glossary")
+    visit.help.back.click()
+    visit.help.back.click()
+    assert visit.window.here == "designer"

@@ -67,6 +67,26 @@ def test_the_refusal_of_a_value_of_one_of_several_kinds_is_shown(designer: Any) 
     assert not row.wrong.isVisible()
 
 
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        (("liquids", "damper", "drag", "damping_nspm"), "Viscosity (damping)"),
+        (("stimuli", "damping", "vary"), "Varied quantity"),
+        (("blocks", "viscosity", "catch", "wrong_most"), "Most wrong catch trials"),
+        (("blocks", "viscosity", "setting_label"), "Neutral name of trials"),
+    ],
+)
+def test_a_field_has_the_name_of_the_field_of_study_and_a_sentence(
+    designer: Any, path: tuple[str, ...], words: str
+) -> None:
+    designer.controller.begin("template:viscosity-jnd", "thicker")
+    designer.go_to(*path[:2])
+    designer.place.form.focus(path)
+    row, foot = designer.form_row(*path), designer.place.form.foot
+    assert (row.words.text(), foot.title.text()) == (words, words)
+    assert foot.words.text().endswith(".")
+
+
 QUESTIONNAIRE = ("questionnaires", "liquid")
 ITEMS = (*QUESTIONNAIRE, "items")
 

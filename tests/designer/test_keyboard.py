@@ -244,3 +244,28 @@ def test_tab_goes_through_problems_questions_and_the_banner_which_are_made_later
     made = [*place.banner.buttons.values(), place.outline.tree, card.cancel, card.gaps, card.other, card.all, *lines]
     assert [part for part in seen if part in made] == made
     assert len(set(seen)) == len(seen)
+
+
+@pytest.mark.variants(2)
+@pytest.mark.parametrize("place", ["form", "outline", "measures", "nothing"])
+def test_letters_and_space_do_nothing_where_no_field_has_the_keyboard(qtbot: Any, designer: Any, place: str) -> None:
+    """A sentence typed next to a row neither leaves the designer nor opens or fills anything."""
+    designer.open("kitchen", *BLOCK)
+    parts = designer.place
+    parts.show_tab("measures")
+    row = designer.form_row(*BLOCK, "title")
+    beside = {
+        "form": row.words, "outline": parts.outline, "measures": parts.measures,
+        "nothing": parts,
+    }[place]  # fmt: skip
+    row.field.setFocus()
+    designer.click_on(beside, at=QPoint(3, 3))
+    if place == "nothing":
+        designer.keyboard.clearFocus()
+    text, selected = designer.text, designer.editing.selected
+    assert not isinstance(designer.keyboard, QLineEdit)
+    QTest.keyClicks(designer.keyboard or designer.window, "no plan s d n o v x 1 2")
+    QApplication.processEvents()
+    assert designer.place.isVisible()
+    assert (designer.text, designer.editing.selected) == (text, selected)
+    assert (parts.prompt, QApplication.activeModalWidget(), QApplication.activePopupWidget()) == (None, None, None)

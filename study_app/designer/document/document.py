@@ -64,7 +64,7 @@ class Document:
         self.draft = draft
         self.kept: datetime | None = None
         self.keeper = Keeper(file, base)
-        self._last: tuple[object, float] = (None, 0.0)
+        self.last: tuple[object, float] = (None, 0.0)
 
     # steps
 
@@ -83,21 +83,16 @@ class Document:
         self.selected = selected
         if not splices:
             return
-        last, then = self._last
+        last, then = self.last
         if key is not None and key == last and time.monotonic() - then < JOIN_S and self.done:
             joined = self.done.pop()
             splices, before = (*joined.splices, *splices), joined.before
-        self.study, self.undone, self._last = study, [], (key, time.monotonic())
+        self.study, self.undone, self.last = study, [], (key, time.monotonic())
         self.done = [*self.done, DoneStep(words, splices, before, selected)][-MOST_STEPS:]
-
-    @property
-    def last_key(self) -> object:
-        """The key of the last step, None where another step cannot continue it."""
-        return self._last[0]
 
     def rest(self) -> None:
         """Let the next edit be a step of its own."""
-        self._last = (None, 0.0)
+        self.last = (None, 0.0)
 
     def undo(self) -> None:
         if self.done:
@@ -118,7 +113,6 @@ class Document:
 
     @property
     def title(self) -> str:
-        """Its title in its first language; "" where it has none."""
         return study_title(self.study.document)
 
     @property
@@ -136,7 +130,6 @@ class Document:
 
     @property
     def edited(self) -> bool:
-        """Whether it differs from the file."""
         return self.study.text != self.saved
 
     def note_edit(self, now_s: float) -> None:
@@ -152,7 +145,6 @@ class Document:
         self.kept = None
 
     def write_draft(self, now_s: float | None = None) -> bool:
-        """Write the draft if it is due, without a time at once; return whether it was written."""
         written = self.keeper.write() if now_s is None else self.keeper.write_if_due(now_s)
         if written:
             self.kept = datetime.now().astimezone()
@@ -165,16 +157,13 @@ class Document:
         self._settle()
 
     def give_up(self) -> None:
-        """Delete the draft of a study that was never saved; nothing of it is left."""
         self.keeper.saved("")
         self.keeper.write()
 
     def changed_outside(self) -> bool:
-        """Return whether the file has another content than the one that is edited."""
         return content_hash(_content(self.file)) != self.base if self.file.exists() else bool(self.base)
 
     def take_outside(self) -> None:
-        """Take the file's content as one step."""
         content = _content(self.file)
         self.saved = read(content, self.file.parent).text
         self._rebase(content_hash(content))
@@ -182,7 +171,6 @@ class Document:
         self._settle()
 
     def keep_mine(self, now_s: float) -> None:
-        """Let the next saving replace what another program wrote."""
         content = _content(self.file) if self.file.exists() else b""
         self.saved = content.decode("utf-8", "replace")
         self._rebase(content_hash(content) if self.file.exists() else "")
@@ -221,7 +209,6 @@ class Document:
         return with_liquid_files(self.study.text.encode(), self.study.folder)
 
     def standing(self, known: tuple[Run, ...]) -> Standing:
-        """Return how the study stands to what was run."""
         if not any(run.sessions for run in known):
             return standing("", "", self.version, known)
         base = content_hash(with_liquid_files(self.saved.encode(), self.study.folder)) if self.base else ""

@@ -145,7 +145,10 @@ _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |
 LABELS: Final = {
     "between_s": "Between trials",
     "block_order": "Order of blocks",
+    "break_every": "Trials between breaks",
+    "code_prefix": "Letter of blind codes",
     "contrasts": "Hypotheses",
+    "damping_nspm": "Viscosity (damping)",
     "delay_ms": "Visual delay",
     "design": "Trial design",  # a study has a design, too
     "designs": "Trial designs",
@@ -154,6 +157,9 @@ LABELS: Final = {
     "obrien-fleming": "O’Brien–Fleming",
     "participants": "Participants planned",
     "sequence": "Session order",
+    "setting_label": "Neutral name of trials",
+    "vary": "Varied quantity",
+    "wrong_most": "Most wrong catch trials",
 }
 """Labels of keys and values whose names are unclear or ambiguous, without their unit."""
 

@@ -60,7 +60,6 @@ class Study:
 
     @property
     def protocol(self) -> Protocol | None:
-        """The protocol, None if there are faults."""
         return None if self.faults else self.formed
 
     @property
@@ -106,7 +105,6 @@ class Study:
         return found
 
     def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
-        """Return the study after some edits, one after the other, and their splices."""
         if not self.is_toml:
             raise Refused(_NOT_TOML)
         text, steps = self.text, list[Splices]()
@@ -116,7 +114,6 @@ class Study:
         return self._with(text), tuple(steps)
 
     def typed(self, text: str) -> tuple[Study, tuple[Splices, ...]]:
-        """Return the study with another text, and the one splice that makes it."""
         check_encodable(text)
         old = self.text
         first, last = common_ends(old, text)

@@ -315,11 +315,6 @@ def key_text(key: str) -> str:
     return key if _BARE.fullmatch(key) else str(tomlkit.key(key).as_string())
 
 
-def header_text(path: Iterable[str | int]) -> str:
-    """Return the path of a header as it is written; entries of arrays stand in it for themselves."""
-    return ".".join(key_text(key) for key in path if isinstance(key, str))
-
-
 def written(value: Any, like: str = "", newline: str = "\n", indent: str = "", column: int = 0) -> str:
     """Return a value, as ``tomllib`` reads it, as TOML.
 
@@ -353,7 +348,7 @@ def tables(path: tuple[str | int, ...], value: Mapping[str, Any], newline: str, 
 
     ``entry`` says that it is an entry of an array of tables.
     """
-    name = header_text(path)
+    name = ".".join(key_text(key) for key in path if isinstance(key, str))
     lines, inner = [f"[[{name}]]" if entry else f"[{name}]"], list[str]()
     for key, part in value.items():
         column = len(key_text(key)) + 3

@@ -161,7 +161,6 @@ class FormHead(QWidget):
             button.setEnabled(not read_only and len(form.path) > 1 and form.id is not None)
 
     def show_lock(self, path: object, why: str) -> None:
-        """Lock the id of the element at ``path``, or with "" unlock it."""
         self._lock = (path, why)
         self._apply_lock()
 
@@ -201,15 +200,15 @@ class FormHead(QWidget):
         if self.form is not None:
             self.id_typed.emit(self.form.path, name)
 
+    def _ask_to_feel(self) -> None:
+        if self.form is not None:
+            self.feel_asked.emit(self.form.path)
+
     def _take_free(self, name: str) -> None:
         """Take the id that is proposed; the keyboard goes from its button, which is gone then, to the id."""
         self.id.setFocus(Qt.FocusReason.OtherFocusReason)
         self.id.setText(name)
         self._rename(name)
-
-    def _ask_to_feel(self) -> None:
-        if self.form is not None:
-            self.feel_asked.emit(self.form.path)
 
     def _rename(self, name: str) -> None:
         if self.form is not None and self.form.id is not None:
@@ -237,7 +236,9 @@ class FormFoot(Themed, QWidget):
         self.words = label("", "small", "text2", wraps=True)
         self.words.setMinimumHeight(WORDS_PX)
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
-        vbox(hbox(self.title, (self.place, 1)), self.words, spacing=3, margins=(12, 8, 12, 8), parent=self)
+        self.glossary = small_button("info", "Glossary", role="plain", height=26)
+        above = hbox(self.title, (self.place, 1), self.glossary, spacing=8)
+        vbox(above, self.words, spacing=3, margins=(12, 4, 4, 8), parent=self)
 
     def show_help(self, title: str, place: str, words: str) -> None:
         self.title.setText(title)
@@ -309,7 +310,6 @@ class FormCard(Card):
 
     @property
     def others(self) -> list[QuestionRow]:
-        """The questions above and below the one that is edited."""
         return [*self.above.rows, *self.below.rows]
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
@@ -474,7 +474,6 @@ class FormCard(Card):
             self.area.ensureWidgetVisible(keyboard, 0, 40)
 
     def _row_of(self, path: Path) -> RowWidget | None:
-        """Return the row of a place, or the one that it is in."""
         around = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
         return max(around, key=lambda row: len(row.row.row.path), default=None)
 
@@ -527,7 +526,6 @@ class FormCard(Card):
             self.own.setVisible(True)
 
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
-        """Offer repairs at the rows that their problems are in."""
         self._known = {} if self.read_only else known
         for row in self.rows:
             row.show_repairs(self._known)

@@ -482,7 +482,6 @@ class PhaseButton(Themed, QAbstractButton):
             painter.drawText(QPointF(0, picture.bottom() + below), shown)
 
     def _interval(self, painter: QPainter, phase: Phase, picture: QRectF) -> None:
-        """Paint the ball on its way, and which interval it is."""
         t, way = self.theme, QPainterPath()
         middle = picture.center().y() - 5
         step = picture.width() / 4

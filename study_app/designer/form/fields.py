@@ -176,7 +176,6 @@ class ChoiceField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        """Show what is chosen; a value that cannot be chosen is shown, too, with its fault below."""
         row = self.row.row
         shown = row.default if row.value is None else row.value
         values = [(choice.value, self.words(choice)) for choice in row.choices]
@@ -339,7 +338,6 @@ class LanguagesField(Field):
 
     @property
     def some_missing(self) -> bool:
-        """Whether a language has a text and another one has none."""
         written = [bool(line.words().strip()) for line in self.lines.values()]
         return any(written) and not all(written)
 
@@ -355,7 +353,6 @@ class LanguagesField(Field):
             line.show_text(text if isinstance(text, str) else "")
 
     def take_keyboard(self) -> None:
-        """Give the keyboard to the first empty text."""
         first = next((line for line in self.lines.values() if not line.words()), self)
         first.setFocus(Qt.FocusReason.OtherFocusReason)
 

@@ -142,7 +142,11 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
             row.instead and _given(other[row.instead]) and not _given(row)
         ):
             continue
-        elif row.value is None and _optional(row) and not (row.required or faulty):
+        elif (
+            row.value is None
+            and not (row.required or faulty)
+            and (row.kind == "table" or (row.default in (None, [], {}) and row.kind not in {"kind", "switch"}))
+        ):
             absent.append(row)
         elif row.path[-1] != "id" or len(path) < 3:
             shown.append(_form_row(study, row, places))
@@ -171,11 +175,6 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
 
 def _given(row: Row) -> bool:
     return row.value not in (None, ())
-
-
-def _optional(row: Row) -> bool:
-    """Return whether a key that the file lacks is offered below its section, not shown with what counts without it."""
-    return row.kind == "table" or (row.default in (None, [], {}) and row.kind not in {"kind", "switch"})
 
 
 def _form_row(study: Study, row: Row, places: Places) -> FormRow:

@@ -71,7 +71,6 @@ class Compared:
     measures: tuple[tuple[str, str], ...]
 
     def others(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
-        """Return what it can be compared with."""
         alike = (one for one in every if one.key == self.key and one.name != self.name)
         return tuple(one for one in alike if one.measures == self.measures and self.key in {"blocks", one.within(self)})
 
@@ -224,7 +223,6 @@ class HypothesesField(Field):
         self.asked.emit(RemoveKey(path if len(self.lines) == 1 else (*path, at)))
 
     def _change(self, at: int, value: Mapping[str, Any]) -> None:
-        """Ask for what differs, as one step."""
         path, before = (*self.row.row.path, at), self.row.row.value[at]
         asked: list[Request] = [
             SetValue((*path, key), one)

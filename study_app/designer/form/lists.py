@@ -11,7 +11,6 @@ from PySide6.QtGui import QDropEvent, QFocusEvent, QGuiApplication, QKeyEvent, Q
 from PySide6.QtWidgets import QAbstractItemView, QBoxLayout, QFrame, QListWidget, QListWidgetItem, QWidget
 
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import Row
 from study_app.designer.document.steps import (
     AddElement,
     AddEntry,
@@ -54,11 +53,6 @@ class ConditionLine:
     note: str  # its liquid where it is named otherwise, and by how much the picture is late
     force: str  # its force with unit, "–" where it is not known
     clipped: bool = False  # whether a limit takes part of the force away
-
-
-def condition_lines(study: Study, row: Row) -> tuple[ConditionLine, ...]:
-    """Return a line for each condition that a block presents."""
-    return tuple(_line(study, name) for name in (row.value if isinstance(row.value, tuple) else ()))
 
 
 def _line(study: Study, name: Any) -> ConditionLine:
@@ -147,7 +141,6 @@ class EntryRow(QFrame):
         self.line = hbox(*parts, spacing=2, margins=(12, 0, 2, 0), parent=self)
 
     def add_button(self, icon: str, name: str, do: Callable[[], object], action: str = "") -> IconButton:
-        """Add a button; Tab passes one whose action has a key."""
         made = IconButton(icon, name, with_key(name, action) if action else "", size=FIELD_PX - 2, role="plain")
         if action:
             made.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
@@ -191,7 +184,6 @@ class EntryList(Field):
         return self.row.entries
 
     def fill(self) -> None:
-        """Add a row for each entry."""
         raise NotImplementedError
 
     def show_value(self) -> None:
@@ -227,21 +219,17 @@ class EntryList(Field):
 
     @property
     def chosen(self) -> tuple[int, ...]:
-        """The entries that are selected."""
         return tuple(sorted(index.row() for index in self.list.selectedIndexes()))
 
     def choose(self, indexes: Iterable[int]) -> None:
-        """Select entries together; the first gets the keyboard with the list."""
         self.list.clearSelection()
         for at in sorted(indexes, reverse=True):
             self.list.setCurrentRow(at, QItemSelectionModel.SelectionFlag.Select)
 
     def take_keyboard(self) -> None:
-        """Give the keyboard to the entries where some are selected, else to the editor."""
         (self.list if self.chosen else self).setFocus(Qt.FocusReason.OtherFocusReason)
 
     def place(self, at: int) -> tuple[str | int, ...]:
-        """Return the place of an entry in the study."""
         return self.row.entries[at].path if self.row.entries else (*self.row.row.path, at)
 
     def open(self, at: int) -> None:
@@ -270,7 +258,6 @@ class EntryList(Field):
             self._change(MoveTo(tuple(map(self.place, indexes)), to, stays=True), after)
 
     def remove(self, indexes: tuple[int, ...]) -> None:
-        """Ask to remove entries, the last first."""
         if not indexes:
             return
         gone: tuple[Request, ...] = tuple(RemoveKey(self.place(index)) for index in reversed(indexes))
@@ -362,7 +349,6 @@ class EntriesField(EntryList):
                 shown.add_button("cross", f"Remove {entry.title} from {label}", partial(self.remove, (at,)), "delete")
 
     def add_facts(self, shown: EntryRow, at: int) -> None:
-        """Show what is known of an entry after its title."""
         entry = self.row.entries[at]
         if entry.note and entry.note.replace("_", " ") != entry.title.lower():
             note = cut_text(entry.note, "small", "text2", right=True)
@@ -386,13 +372,11 @@ class ConditionsField(EntriesField):
         return self.row.entries, self.row.facts
 
     def _ask_for_series(self) -> None:
-        """Ask for a series of the selected condition, or of the last one."""
         path = self.row.entries[self.chosen[0] if len(self.chosen) == 1 else -1].target
         if path:
             self.asked.emit(Do("series", (path,)))
 
     def add_facts(self, shown: EntryRow, at: int) -> None:
-        """Show liquid and delay, force, and a button that opens the liquid."""
         line = self.row.facts[at]
         note, force = Elided("small", "text2"), figures(f"{line.force}, clipped" if line.clipped else line.force)
         note.show_text(line.note)
@@ -447,7 +431,6 @@ class LinesField(EntryList):
             self._change(Several(f"Paste into {self.row.row.label}", added), after)
 
     def _value(self, text: str) -> Any:
-        """Return the value that a line says; a ValueError says why it is not a point."""
         return text if self.row.row.kind == "texts" else [number for _, number in typed_numbers(text)]
 
     def _take(self, at: int, text: str) -> None:
@@ -496,4 +479,7 @@ class LanguageListField(EntryList):
         self.names.show_items((one.sentence, one.value) for one in row.row.choices if one.value not in codes)
 
 
-CONDITIONS: Final = SpecialEditor((("Block", "conditions"),), ConditionsField, wide=True, facts=condition_lines)
+CONDITIONS: Final = SpecialEditor(
+    (("Block", "conditions"),), ConditionsField, wide=True,
+    facts=lambda study, row: tuple(_line(study, name) for name in row.value if isinstance(row.value, tuple)),
+)  # fmt: skip

@@ -115,7 +115,6 @@ class FormRow:
 
     @property
     def removable(self) -> bool:
-        """Whether the file holds the key and would be complete without it."""
         path = self.row.path
         given = self.row.value is not None and isinstance(path[-1], str)
         section = (len(path) == 1 and self.row.kind == "tables") or path == STUDY_LANGUAGES
@@ -123,12 +122,10 @@ class FormRow:
 
     @property
     def bounds(self) -> str:
-        """What is permitted, in one line."""
         return ", ".join(self.row.bounds)
 
     @property
     def range(self) -> str:
-        """What numbers are permitted, as short as can be: "1 to 100"."""
         bounds = self.row.bounds
         if len(bounds) == 2 and bounds[0].startswith(LEAST) and bounds[1].startswith(MOST):
             return f"{bounds[0].removeprefix(LEAST)} to {bounds[1].removeprefix(MOST)}"

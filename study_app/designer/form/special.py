@@ -200,7 +200,6 @@ class QuestionRows(Themed, QWidget):
         self.hide()
 
     def show_lines(self, lines: tuple[QuestionLine, ...], languages: tuple[str, ...] = ()) -> None:
-        """Show questions, each in the languages, whose names are above them."""
         if self._shown == (lines, languages):
             return
         self._shown = (lines, languages)
@@ -356,7 +355,6 @@ class PointsField(Field):
                 line.show_text(text)
 
     def _written(self, code: str) -> int:
-        """Return how many points the file has in a language."""
         return len((self.row.row.value or {}).get(code, ()))
 
     def _take(self, at: int, code: str, text: str) -> None:
@@ -401,7 +399,7 @@ class KindField(ChoiceField):
         self.all: Segments | None = None
         super().__init__(row)
         self.all = Segments(row.row.label)
-        self.all.chosen.connect(self._choose_other)
+        self.all.chosen.connect(lambda kind: None if kind == self.row.row.value else self._choose(kind))
         self.box.addWidget(self.all)
         self.box.addStretch()
         self.show_value()
@@ -415,10 +413,6 @@ class KindField(ChoiceField):
         if self.all is not None:
             kinds = [(choice.value, self.words(choice)) for choice in self.row.row.choices]
             self.all.show_values(kinds, self.row.row.value)
-
-    def _choose_other(self, kind: Any) -> None:
-        if kind != self.row.row.value:
-            self._choose(kind)
 
     def _make_room(self) -> None:
         if self.all is not None and self.list is not None:

@@ -133,7 +133,6 @@ class NumberPart(Card):
         add_parts(self.column, self.title, across, below, self.more, STRETCH)
 
     def show_card(self, shown: NumberCard, waiting: str) -> None:
-        """Show a number; ``waiting`` is said of one that is simulated."""
         waiting = waiting if shown.simulated else ""
         if (shown, waiting) == self.shown:
             return

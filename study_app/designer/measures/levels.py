@@ -31,7 +31,6 @@ class LevelWords:
 
     @property
     def factor(self) -> float:
-        """What a level is multiplied by."""
         return 100.0 if self.stimulus.level_kind == "weber" else 1.0
 
     @property
@@ -40,7 +39,6 @@ class LevelWords:
 
     @property
     def value_unit(self) -> str:
-        """The unit of the varied number."""
         try:
             return quantity(self.stimulus.vary).unit
         except KeyError:
@@ -54,12 +52,10 @@ class LevelWords:
 
     @property
     def kind(self) -> str:
-        """What a level is."""
         return {"weber": "Weber fraction", "difference": "difference", "value": "value"}[self.stimulus.level_kind]
 
     @property
     def success(self) -> str:
-        """What a share of answers is of."""
         return success_name(self.design, self.stimulus)
 
     def number(self, level: float, digits: int = 3) -> str:

@@ -88,7 +88,6 @@ class MeasurePlot(Plot):
         self.add(made, 2)
 
     def zone(self, limit: Limit, first: float, last: float, *, upright: bool) -> None:
-        """Mark where a limit takes part of the force away."""
         colour = QColor(limit_colour(self.theme, limit))
         edge = colour.name()
         colour.setAlphaF(0.16)

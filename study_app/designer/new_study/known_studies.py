@@ -59,7 +59,6 @@ class KnownAnswer:
 
     @property
     def most(self) -> float:
-        """The end of an axis from 0."""
         return 10.0 * (1 + int(1.5 * max(self.planted, self.high)) // 10)
 
     @property

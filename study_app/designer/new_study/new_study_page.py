@@ -115,7 +115,6 @@ class TemplateButton(Themed, QAbstractButton):
 
     @property
     def picture(self) -> str:
-        """The name of its picture, "" where it has none."""
         name = self.choice.source.removeprefix("template:")
         return name if FOLDER.joinpath(f"{name}.svg").exists() and not self.choice.copy else ""
 
@@ -304,7 +303,6 @@ class Questions(Themed, QWidget):
         return shown
 
     def clear(self) -> None:
-        """Forget the answers for the study before."""
         self._choice = None
         self.title.clear()
         self.name.clear()
@@ -335,7 +333,6 @@ class Questions(Themed, QWidget):
             apply_theme_within(beside, self.theme)
 
     def _propose(self) -> None:
-        """Show the short name that counts where none is typed."""
         self.name.setPlaceholderText(self._proposed or NAME_HINT)
 
     def _show_first_texts(self) -> None:
@@ -512,17 +509,14 @@ class NewStudyPage(Themed, QWidget):
 
     @property
     def name(self) -> QLineEdit:
-        """The field of the short name."""
         return self.card.questions.name
 
     @property
     def make(self) -> ActionButton:
-        """The button that begins the study."""
         return self.card.make
 
     @property
     def refusal(self) -> NameRefusal:
-        """What is wrong."""
         return self.card.refusal
 
     def show_choices(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
@@ -566,7 +560,6 @@ class NewStudyPage(Themed, QWidget):
             self.area.ensureWidgetVisible(button)
 
     def _pass(self, button: TemplateButton, by: int) -> None:
-        """Choose the card after another one, or before it."""
         to = self.buttons.index(button) + by
         if 0 <= to < len(self.buttons):
             self.buttons[to].setChecked(True)

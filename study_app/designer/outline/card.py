@@ -331,7 +331,7 @@ class OutlineCard(Card):
         self.tree.clicked.connect(self._click)
         self.tree.expanded.connect(lambda index: None if self._finding else self._opened.add(self._key(index)))
         self.tree.collapsed.connect(lambda index: self._opened.discard(self._key(index)))
-        self.tree.entered_row.connect(self._enter_row)
+        self.tree.entered_row.connect(lambda: None if self._open_field() else self.form_asked.emit())
 
     def apply_theme(self, theme: Theme) -> None:
         super().apply_theme(theme)
@@ -344,7 +344,6 @@ class OutlineCard(Card):
         return tuple(sorted(found, key=lambda path: order.get(path, 0)))
 
     def select_several(self, paths: tuple[ElementPath, ...], *, selects: bool = True) -> None:
-        """Select elements together with the current one, or no longer."""
         flags = QItemSelectionModel.SelectionFlag
         flag = flags.Select if selects else flags.Deselect
         self._filling = True
@@ -457,10 +456,6 @@ class OutlineCard(Card):
             self.tree.expand(index)
             if not self._open_field():
                 self.element_clicked.emit()
-
-    def _enter_row(self) -> None:
-        if not self._open_field():
-            self.form_asked.emit()
 
     def _open_field(self) -> bool:
         """Go to the field of the current row that was found; return whether there is one."""

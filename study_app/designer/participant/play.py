@@ -38,7 +38,6 @@ class Notice:
 
     @property
     def only_offers_copy(self) -> bool:
-        """Whether it only says why the study is read-only."""
         return [action for action, _ in self.actions] == ["copy"]
 
 
@@ -69,7 +68,6 @@ class NoticeCard(Card):
         self.hide()
 
     def show_notice(self, notice: Notice | None) -> None:
-        """Show another line, None for none."""
         if notice == self.notice:
             return
         self.notice = notice
@@ -209,6 +207,3 @@ class PlayControls(QWidget):
     def show_playing(self, playing: bool) -> None:
         self.play.setEnabled(not playing)
         self.device.setEnabled(not playing)
-
-    def show_wide(self, wide: bool) -> None:
-        self.play.show_action("play", PLAY if wide else PLAY_NARROW)

@@ -62,7 +62,6 @@ class ParticipantView:
 
     @property
     def name(self) -> str:
-        """What the page is called for a screen reader."""
         return f"Participant's page, {language_name(self.language)}"
 
 

@@ -141,8 +141,12 @@ class LivePage(Themed, QGraphicsView):
         window = self.page_window
         if window is None or view.language != before.language or view.photodiode != before.photodiode:
             window = self._open(view)
-        elif _stays_in_tank(before.page, view.page):
-            window = window if isinstance(before.page, TaskPage) and before.page == view.page else self._open(view)
+        elif (
+            isinstance(before.page, TaskPage)
+            and isinstance(view.page, TaskPage)
+            and before.page.trial == view.page.trial
+        ):
+            window = window if before.page == view.page else self._open(view)
         elif _bare(view.page) == _bare(before.page) and not another:
             if view.focused != before.focused:
                 self._go_to(view.focused)
@@ -175,7 +179,6 @@ class LivePage(Themed, QGraphicsView):
         self._scale()
 
     def show_fitted(self, *, fits: bool) -> None:
-        """Show the whole page, or it at 100 %."""
         self._fits = fits
         self._scale()
         if not fits:
@@ -200,7 +203,6 @@ class LivePage(Themed, QGraphicsView):
         return min(self.width() / self._screen.width, self.height() / self._screen.height)
 
     def _open(self, view: ParticipantView) -> ParticipantWindow:
-        """Open another window in place of the present one."""
         self.close_page()
         made = ParticipantWindow(
             words(view.language),
@@ -264,7 +266,6 @@ class LivePage(Themed, QGraphicsView):
         self.setTransform(QTransform.fromScale(scale, scale))
 
     def _time_frames(self) -> None:
-        """Ask for frames only while a tank is seen."""
         seen = self.isVisible() and isinstance(self._view.page, TaskPage)
         if seen and not self._frames.isActive():
             self._frames.start()
@@ -351,11 +352,6 @@ def _close_pages() -> None:
 
 def _bare(page: Page | None) -> Page | None:
     return replace(page, chosen=()) if isinstance(page, QuestionnairePage) else page
-
-
-def _stays_in_tank(before: Page | None, page: Page) -> bool:
-    """Return whether a session would keep the tank between two pages, with the interval alone changed."""
-    return isinstance(before, TaskPage) and isinstance(page, TaskPage) and before.trial == page.trial
 
 
 NO_ANSWERS: Final[Mapping[str, Value]] = {}
@@ -480,7 +476,6 @@ class ParticipantPreview(Card):
             self.show_language(languages[(languages.index(self.view.language) + 1) % len(languages)])
 
     def show_language(self, language: str) -> None:
-        """Show the pages in another language, also when the study is opened again."""
         self._language = language
         if self.editing.opened is not None:
             keep_setting(self.editing.opened.file, "language", language)
@@ -507,7 +502,6 @@ class ParticipantPreview(Card):
         self.go(at - found.index)
 
     def show_moment(self, moment: Moment) -> None:
-        """Show another page of the step: its tank, or its questions."""
         self._moment = moment
         self._side = "tank" if moment.kind == "tank" else "questions"
         self._show()
@@ -526,7 +520,6 @@ class ParticipantPreview(Card):
             self._go_on()
 
     def _go_on(self) -> None:
-        """Show the next page of the step, or the next step from its beginning."""
         if (found := self._found) is None:
             return
         pages = moments(found.shown, found.index)
@@ -744,7 +737,6 @@ class ParticipantPreview(Card):
             self.place.pane.make_room()
 
     def _show_step(self, view: ParticipantView) -> None:
-        """Name the step; the number of a trial is a field."""
         before, _, after = view.step.rpartition(f" {view.trial} of ") if view.trials else (view.step, "", "")
         sides = Qt.AlignmentFlag.AlignVCenter
         self.step.setText(before)

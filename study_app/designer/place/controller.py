@@ -147,7 +147,6 @@ class DesignerController(QObject):
         self.saving.leave()
 
     def ask_for_new(self, source: str = "") -> None:
-        """Show the templates and the studies that can be copied, with one of them chosen."""
         self.place.message_over.emit()
         try:
             choices = new_choices(source)
@@ -173,7 +172,6 @@ class DesignerController(QObject):
             self.place.areas.focus_element()
 
     def _close(self) -> None:
-        """Close the study, of which nothing is left."""
         if (closed := self.editing.opened) is not None:
             self._others.pop(closed.file.resolve(), None)
         self.editing.open(None)
@@ -250,7 +248,6 @@ class DesignerController(QObject):
             self.place.adding.offer_fields(fields_to_go_to(opened.study, words, opened.selected))
 
     def _judge_id(self, path: Place, name: str) -> None:
-        """Say at once why an id cannot be taken, and which one could be."""
         opened, why, free = self.editing.writable, "", ""
         if opened is None:
             return

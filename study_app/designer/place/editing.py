@@ -39,7 +39,6 @@ class Editing(QObject):
 
     @property
     def writable(self) -> Document | None:
-        """The open study, None where there is none or it is read-only."""
         return None if self.opened is None or self.opened.read_only else self.opened
 
     @property
@@ -48,7 +47,6 @@ class Editing(QObject):
         return () if self.opened is None else self.opened.selected
 
     def open(self, opened: Document | None) -> None:
-        """Take another study from now on, None for none."""
         self.opened = opened
         if opened is not None:
             opened.rest()
@@ -70,12 +68,10 @@ class Editing(QObject):
         self.changed.emit()
 
     def go_back(self) -> None:
-        """Select what was selected before."""
         if self._back:
             self.select(self._back.pop(), back=True)
 
     def _keep_selection(self) -> None:
-        """Select the nearest element that exists."""
         if (opened := self.opened) is not None:
             opened.selected = there(opened.study.document, opened.selected)
 
@@ -113,7 +109,7 @@ class Editing(QObject):
         after = path if isinstance(path[-1], int) else (*path[:-1], wanted)
         edits = renamed(opened.study.document, path, wanted, recorded)
         select = with_path(opened.selected, path, after)
-        opened.edit(f"Rename to {wanted}", *edits, select=select, key=opened.last_key)
+        opened.edit(f"Rename to {wanted}", *edits, select=select, key=opened.last[0])
         self._note()
 
     def make(self, words: str, *edits: Edit, text: str | None = None, select: Place | None = None) -> None:
@@ -138,7 +134,6 @@ class Editing(QObject):
             self.announce()
 
     def announce(self) -> None:
-        """Let every view show the study as it is now."""
         self._keep_selection()
         self.changed.emit()
         self.edited.emit()

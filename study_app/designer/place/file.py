@@ -170,7 +170,6 @@ class FileEditor(Themed, QPlainTextEdit):
         self._catch_up()
 
     def _catch_up(self) -> None:
-        """Show the file that was given last, and go to the selected element where that was asked for."""
         if self._late is None:
             return
         scroll, self._late = self._late, None
@@ -182,7 +181,6 @@ class FileEditor(Themed, QPlainTextEdit):
             self.go_to(self.shown.selected[0][0])
 
     def go_to(self, line: int) -> None:
-        """Put the cursor on a line, from 0, and show it in the upper part."""
         self._catch_up()
         block = self.document().findBlockByNumber(line)
         if block.isValid():
@@ -219,7 +217,6 @@ class FileEditor(Themed, QPlainTextEdit):
         self._mark()
 
     def _mark(self) -> None:
-        """Repaint the marks, which are painted below the text."""
         self.viewport().update()
         self._gutter.update()
 
@@ -243,7 +240,6 @@ class FileEditor(Themed, QPlainTextEdit):
         return 34 + self.fontMetrics().horizontalAdvance("9") * max(3, len(str(self.blockCount())))
 
     def paint_gutter(self, painter: QPainter, _place: QRect) -> None:
-        """Paint the numbers of the lines in view, faulty ones with a sign."""
         painter.setFont(self.font())
         width = self._gutter.width()
         for line, top, height in visible_lines(self):

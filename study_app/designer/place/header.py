@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor, QFocusEvent, QFontMetrics, QKeyEvent, QPainter
 from PySide6.QtWidgets import QSizePolicy, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QWidget
 
 from study_app.designer.form.rows import Form
-from study_app.designer.participant.play import Notice, NoticeCard, PlayControls
+from study_app.designer.participant.play import PLAY, PLAY_NARROW, Notice, NoticeCard, PlayControls
 from study_app.designer.place.file import FileText
 from study_app.designer.problems.problems import ProblemRow
 from study_app.designer.versions.version_rows import VersionChip
@@ -117,7 +117,6 @@ class StudyLine(QStyledItemDelegate):
         return QSize(min(wanted.width(), self._studies.window().width() * 2 // 3), wanted.height())
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
-        """Paint the title, cut where it is too long, what follows it in another ink, and the mark at the right."""
         shown = QStyleOptionViewItem(option)
         self.initStyleOption(shown, index)
         style, words, title = self._studies.style(), index.data(), index.data(TITLE_ROLE)
@@ -331,7 +330,7 @@ class DesignerHeader(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.play.show_wide(self.width() >= WIDE_FROM)
+        self.play.play.show_action("play", PLAY if self.width() >= WIDE_FROM else PLAY_NARROW)
         self._make_room()
 
     def _choose(self, at: int) -> None:

@@ -239,13 +239,11 @@ class SeriesCard(Prompt):
         self.table.setCurrentCell(min(row + len(several), self.table.rowCount() - 1), 0)
 
     def _request(self) -> MakeSeries:
-        """Return what is asked for; a cell that is not a number is a `ValueError`."""
         cells = filter(None, map(self._cell, range(self.table.rowCount())))
         values = tuple(value for words in cells for _, value in typed_numbers(words))
         return MakeSeries(self.asked.path, self.asked.fields[self.number.currentIndex()][0], values)
 
     def _show(self) -> None:
-        """Show the titles of the copies, or why there can be none."""
         titles: tuple[str, ...] = ()
         why, filled = "", [row for row in range(self.table.rowCount()) if self._cell(row)]
         try:
@@ -327,7 +325,6 @@ class KeysCard(Card):
         self.hide()
 
     def make_room(self) -> None:
-        """Stand in the middle of the place."""
         around = self._place.rect()
         inner = self.area.widget().sizeHint().height() + self.sizeHint().height() - self.area.sizeHint().height()
         wide, high = (

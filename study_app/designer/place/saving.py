@@ -118,7 +118,6 @@ class Saving(QObject):
             self.look_again()
 
     def answer_banner(self, action: str) -> None:
-        """Carry out what a button of the banner asks for."""
         opened = self.editing.opened
         if opened is None:
             return
@@ -151,7 +150,6 @@ class Saving(QObject):
             self._try(opened, opened.discard_draft)
 
     def give_up(self) -> None:
-        """Discard the draft of a study that was never saved: nothing of it is left."""
         self.place.flush()
         opened = self.editing.opened
         if opened is None or opened.base:
@@ -166,7 +164,6 @@ class Saving(QObject):
     # saving
 
     def save(self) -> None:
-        """Write the file; ask where sessions were run with other content, or another program changed the file."""
         opened = self.editing.writable
         if opened is None or (opened.base and not opened.edited):
             return
@@ -182,7 +179,6 @@ class Saving(QObject):
             self._write(opened)
 
     def _ask(self, opened: Document, standing: Standing) -> None:
-        """Show what differs from what was run, and ask under which version or name the study is saved."""
         run = newest(self.runs.known)
         found = Comparison() if run is None else compare(version_of(opened, run), opened.study)
         problems = len(opened.study.faults)
@@ -209,7 +205,6 @@ class Saving(QObject):
         self._write(opened)
 
     def save_as_another(self, name: str) -> None:
-        """Save the study with its edits under another name; the file of this one stays as it is."""
         opened = self.editing.writable
         if opened is None:
             return
@@ -244,7 +239,6 @@ class Saving(QObject):
     # drafts
 
     def leave(self) -> None:
-        """Hand on what is being typed, and write the draft at once."""
         self.place.flush()
         self.write_draft(at_once=True)
 

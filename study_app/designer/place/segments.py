@@ -73,7 +73,6 @@ class Segments(Themed, QWidget):
         self._add_button()
 
     def show_values(self, values: Sequence[tuple[object, str]], chosen: object) -> None:
-        """Offer values with their words, of which one is chosen."""
         while len(self.buttons) > max(1, len(values)):
             remove_widget(self.buttons.pop())
         while len(self.buttons) < len(values):

@@ -88,7 +88,6 @@ class RightPane(QWidget):
         self.tabs.chosen.connect(lambda name: self.show_tab(str(name)))
 
     def add_page(self, page: PanePage, *, first: bool = False) -> None:
-        """Add a page as the last tab, or as the first one, which is then shown."""
         self.pages.insert(0 if first else len(self.pages), page)
         self._stack.addWidget(page.body)
         if page.aside is not None:
@@ -240,7 +239,6 @@ class Arrangement(QWidget):
         self.arrange(self._width)
 
     def arrange(self, width: int) -> None:
-        """Place the parts for so wide a place."""
         self._width = width
         one, drawer = width < ONE_PANE_BELOW, width < DRAWER_BELOW
         if drawer != self.drawer:
@@ -266,7 +264,6 @@ class Arrangement(QWidget):
         self.pane.make_room()
 
     def focus_outline(self) -> None:
-        """Give the keyboard to the outline; a drawer opens."""
         if self.drawer:
             self._place_drawer()
             self.outline.show()
@@ -274,7 +271,6 @@ class Arrangement(QWidget):
         self.outline.tree.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def focus_find(self) -> None:
-        """Give the keyboard to the field that finds; a drawer opens."""
         self.focus_outline()
         self.outline.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
@@ -300,7 +296,6 @@ class Arrangement(QWidget):
             self._hide_drawer()
 
     def _hide_drawer(self) -> None:
-        """Hide the drawer; it lists every element when it opens again."""
         self.outline.hide()
         self.outline.words.clear()
 
@@ -360,14 +355,8 @@ class FocusAreas:
             field.selectAll()
 
     def focus_row(self, path: ElementPath) -> bool:
-        """Go to a field of the form; return whether it has a row."""
         self._parts.show_side("form")
         return self._parts.form.focus(path)
-
-    def leave_drawer(self) -> None:
-        """Go to the form where the outline is a drawer."""
-        if self._parts.drawer:
-            self.focus_form()
 
     def focus_element(self) -> None:
         """Go to the selected element: to its row, or to its form where the outline is a drawer."""
@@ -424,7 +413,6 @@ class FocusAreas:
             self._parts.form.focus_first()
 
     def cycle(self, by: int) -> None:
-        """Go to the next part, or to the one before."""
         stops: list[tuple[QWidget, Callable[[], None]]] = [
             (self._header, self.focus_header),
             (self._parts.outline, self._parts.focus_outline),
@@ -489,7 +477,6 @@ class ProblemSteps(QObject):
             self._open_repair(coming[0])
 
     def _open_repair(self, row: ProblemRow) -> None:
-        """Go to the repair of a problem; where there is none, to its field."""
         self._card.open(row)
         self._ask("repairs", row)
         for button in (self._form.repairs_of(row) or self._card.repairs_of(row))[:1]:
@@ -503,7 +490,6 @@ class ProblemSteps(QObject):
         return bool(self._repairs.get(row))
 
     def _open(self, row: ProblemRow) -> None:
-        """Go to the field of a problem; where there is none, to its line in the file."""
         self._card.show()
         if row.element:
             self._ask("select", row.element)
@@ -581,7 +567,7 @@ class DesignerPlace(Place):
         outline.find_changed.connect(partial(self.ask, "find"))
         outline.field_asked.connect(self.areas.focus_field)
         outline.form_asked.connect(self.areas.focus_form)
-        outline.element_clicked.connect(self.areas.leave_drawer)
+        outline.element_clicked.connect(lambda: self.areas.focus_form() if self.parts.drawer else None)
         outline.tree.dropped.connect(self._drop)
         outline.several_changed.connect(lambda: form.show_selected(outline.selected))
         self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
@@ -719,7 +705,6 @@ class DesignerPlace(Place):
             self.areas.focus_element()
 
     def show_prompt(self, prompt: Prompt, first: QWidget) -> None:
-        """Show a question in the place; ``first`` takes the keyboard."""
         self.close_prompt()
         self.prompt = prompt
         prompt.answered.connect(lambda _answer: self.close_prompt())
@@ -808,7 +793,6 @@ class DesignerPlace(Place):
         self.entered.emit()
 
     def leave(self) -> None:
-        """Hand on what is being typed; the draft is written at once."""
         self.flush()
         self.left.emit()
 

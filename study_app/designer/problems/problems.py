@@ -133,7 +133,6 @@ class RepairSearch(QObject):
         self._timer.timeout.connect(self._find)
 
     def begin(self, study: Study, problems: tuple[ProblemRow, ...]) -> None:
-        """Search for the repairs of a study's problems, anew where the study changed."""
         if study is self._study:
             return
         self._study, self._known, self._problems = study, {}, problems
@@ -149,7 +148,6 @@ class RepairSearch(QObject):
         return next((one for one in self._known.get(row, ()) if one.words == words), None)
 
     def show(self, row: ProblemRow) -> None:
-        """Look for the repairs of a problem at once."""
         self._look(row)
         if row in self._known:
             self.found.emit(row, tuple(one.words for one in self._known[row]))
@@ -358,7 +356,6 @@ class ProblemsCard(Card):
 
     @property
     def rows(self) -> tuple[ProblemRow, ...]:
-        """The problems, then the warnings."""
         return (*self._problems, *self._warnings)
 
     def _show(self) -> None:

@@ -75,7 +75,6 @@ class FileWatch(QObject):
             application.applicationStateChanged.connect(self._come_back)
 
     def watch(self) -> None:
-        """Watch the file of the open study; one that was replaced is another file to the system."""
         watched = [*self._watcher.files(), *self._watcher.directories()]
         opened = self.editing.opened
         file = None if opened is None else opened.file.resolve()
@@ -120,13 +119,11 @@ class KnownRuns(QObject):
             self._reader.run(partial(_read, self.editing.results, opened.name, opened.file))
 
     def read(self) -> tuple[Run, ...]:
-        """Read at once which sessions there are, as before saving."""
         if (opened := self.editing.opened) is not None:
             self.known = runs(self.editing.results, opened.name)
         return self.known
 
     def standing(self) -> Standing | None:
-        """Return how the open study stands to what was run."""
         return None if self.editing.opened is None else self.editing.opened.standing(self.known)
 
     def _begin(self) -> None:
@@ -346,7 +343,6 @@ class Version(NamedTuple):
 
     @property
     def text(self) -> str | None:
-        """The text of the study's own file."""
         return None if self.source is None else unbundled(self.source.encode())[0].decode()
 
 
@@ -433,7 +429,6 @@ class Changes(Card):
         self.restore.clicked.connect(self._restore)
 
     def compare_with(self, key: str) -> None:
-        """Show the tab with a version by its hash, the file ("file"), by default that of the last session."""
         self._wanted = key or self._wanted
         self.place.show_tab(TAB)
         self.compare_now()
@@ -538,7 +533,6 @@ class Renaming(QObject):
         place.form.head.comments_asked.connect(self._list_comments)
 
     def _id(self, path: Place) -> str:
-        """Return the id of an element, "" where it has none."""
         opened = self.editing.opened
         value = None if opened is None else value_at(opened.study.document, path)
         if not isinstance(value, dict):
@@ -546,7 +540,6 @@ class Renaming(QObject):
         return str(value.get("id", path[-1]))
 
     def _why(self, path: Place) -> str:
-        """Return why an id is locked, "" where it is not."""
         if len(path) != 4 or path[2] != "items" or path == self._unlocked:
             return ""
         sessions = self.runs.items.get((str(path[1]), self._id(path)), 0)

@@ -47,7 +47,7 @@ class Comparison:
 def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     """Return the chip of a study that stands so to what was run."""
     known = tuple(known)
-    tip = run_words(known)
+    tip = "\n".join(f"Version {run.version}: {counts(run)}" for run in known)
     save = f"Save {standing.version} …" if standing.asks else "Save"
     if not standing.was:
         words = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not run yet"
@@ -56,11 +56,6 @@ def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
         words = f"{standing.version}, run by {standing.sessions}"
         return VersionChip("ok", "check", words, tip, save)
     return VersionChip("accent", "pen", f"{standing.version}, was {standing.was}", tip, save)
-
-
-def run_words(known: Iterable[Run]) -> str:
-    """Return how many sessions, pilots and rehearsals there were with each version, one line per version."""
-    return "\n".join(f"Version {run.version}: {counts(run)}" for run in known)
 
 
 def counts(run: Run) -> str:

@@ -61,7 +61,7 @@ def make_two_interval(user: User) -> None:
     """Make a study of delays by two-interval forced choice, with two levels."""
     begin(user, "Empty study", "Which was late")
     user.add("Stimulus")
-    user.write("Vary", "delay_ms")
+    user.write("Varied quantity", "delay_ms")
     user.write("Levels", "50 200")
     user.add("Trial design")
     user.choose("Kind", "2ifc")
