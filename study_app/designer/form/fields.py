@@ -67,9 +67,11 @@ class Field(Themed, QWidget):
 class LineField(Field):
     """A plain text, one number, or numbers side by side, in one line."""
 
+    typed_in: Callable[[str], Any] = TypedLine
+
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
-        self.line = TypedLine(row.row.label)
+        self.line = self.typed_in(row.row.label)
         if row.row.kind in {"number", "whole number"}:
             self.line.setFixedWidth(NUMBER_PX + (48 if self.placeholder() else 0))
             self.line.setAlignment(Qt.AlignmentFlag.AlignRight)

@@ -114,8 +114,8 @@ class Hypothesis(QWidget):
         self.known: tuple[Compared, ...] = ()
         self.others: tuple[Compared, ...] = ()
         self.value: Mapping[str, Any] = {}
-        self.measure, self.first, self.relation, self.second = (Choice() for _ in range(4))
-        for box, part in zip(self.boxes, ("measure", "of what", "relation", "than what"), strict=True):
+        boxes = self.measure, self.first, self.relation, self.second = [Choice() for _ in range(4)]
+        for box, part in zip(boxes, ("measure", "of what", "relation", "than what"), strict=True):
             box.setAccessibleName(f"{name}, {part}")
             box.setProperty("dense", "true")
             box.setFont(font("label", weight=400))
@@ -132,10 +132,6 @@ class Hypothesis(QWidget):
         below = hbox((self.relation, 2), (self.second, 3), self.within, self.bound, spacing=8)
         below.addSpacing(FIELD_PX + 8)
         vbox(above, below, spacing=4, margins=(0, 0, 0, 6), parent=self)
-
-    @property
-    def boxes(self) -> tuple[Choice, ...]:
-        return self.measure, self.first, self.relation, self.second
 
     def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
         self.value, self.known = value, known

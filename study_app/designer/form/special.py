@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, Literal
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
@@ -12,7 +13,7 @@ from study_app.designer.document.fields import Row
 from study_app.designer.document.names import languages_of
 from study_app.designer.document.steps import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
-from study_app.designer.form.fields import ChoiceField, Field, LanguagesField, SpecialEditor, add_button
+from study_app.designer.form.fields import ChoiceField, Field, LanguagesField, LineField, SpecialEditor, add_button
 from study_app.designer.form.rows import (
     STATEMENT,
     FormRow,
@@ -233,21 +234,10 @@ class Panel(Themed, QWidget):
         QPainter(self).fillRect(QRectF(0, 2, 3, self.height() - 4), QColor(self.theme.accent))
 
 
-class DescriptionField(Field):
+class DescriptionField(LineField):
     """A plain text; what is longer than three lines scrolls."""
 
-    def __init__(self, row: FormRow) -> None:
-        super().__init__(row)
-        self.line = TypedSentence(row.row.label, most_lines=3)
-        self.line.typed.connect(lambda text: self.set_value(text, typing=True))
-        self.line.came.connect(self.came)
-        self.box.addWidget(self.line)
-        self.setFocusProxy(self.line)
-        self.show_value()
-
-    def show_value(self) -> None:
-        value = self.row.row.value
-        self.line.show_text(value if isinstance(value, str) else "")
+    typed_in = staticmethod(partial(TypedSentence, most_lines=3))
 
 
 DESCRIPTION: Final = SpecialEditor((("StudyHead", "description"),), DescriptionField)

@@ -501,23 +501,12 @@ class NewStudyPage(Themed, QWidget):
         head = hbox(*parts, spacing=12, margins=(SHADOW, 0, SHADOW, 0))
         self.area = scrolled(QWidget())
         self.card = ChosenCard()
+        self.name, self.make, self.refusal = self.card.questions.name, self.card.make, self.card.refusal
         vbox(head, (hbox((self.area, 1), self.card, spacing=12), 1), spacing=12, margins=0, parent=self)
         self.card.make.clicked.connect(self._begin)
         self.card.questions.entered.connect(self._begin)
         self.card.refusal.chosen.connect(self._take_name)
         self._group.buttonToggled.connect(lambda _button, on: self._show_choice() if on else None)
-
-    @property
-    def name(self) -> QLineEdit:
-        return self.card.questions.name
-
-    @property
-    def make(self) -> ActionButton:
-        return self.card.make
-
-    @property
-    def refusal(self) -> NameRefusal:
-        return self.card.refusal
 
     def show_choices(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
         self._choices = choices
