@@ -174,6 +174,17 @@ def fit(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid
     _, log_success, log_failure = tables(
         replace(grid, width_prior=None, session_sd=(0.0, 0.0)), tuple(np.asarray(levels, float).tolist())
     )
+    return posterior(grid, successes, failures, log_success, log_failure)
+
+
+def posterior(
+    grid: Grid,
+    successes: ArrayLike,
+    failures: ArrayLike,
+    log_success: NDArray[np.float64],
+    log_failure: NDArray[np.float64],
+) -> Posterior:
+    """Return the posterior from counts of answers, shape (k,), and log ψ and log(1 − ψ) in each cell, (k, …)."""
     log_likelihood = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
     log_likelihood += np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure)
     weights = grid.prior * np.exp(log_likelihood - log_likelihood.max())

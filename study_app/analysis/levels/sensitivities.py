@@ -63,7 +63,7 @@ class SensitivityEstimate:
 
 
 BIASED: Final = 0.2
-"""A criterion of two intervals beyond which thresholds are biased by more than a few percent."""
+"""A criterion of two intervals beyond which a preference is named."""
 
 
 def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
@@ -210,7 +210,7 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
             people = listed([f"{person} ({number(criterion)})" for person, criterion in biased.items()])
             yield (
                 f"{self.found.title}: one interval is preferred by {people}: the criterion c is further from 0 than "
-                f"{BIASED:g} and than twice its standard error. Their thresholds are estimated too high."
+                f"{BIASED:g} and than twice its standard error. The fits of their thresholds allow for it."
             )
 
     def explained(self) -> str:

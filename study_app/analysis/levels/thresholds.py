@@ -38,6 +38,7 @@ from study_app.analysis.levels.tracks import TRACK, answers_of, setting_of
 from study_app.analysis.results import LevelsResult, counted, listed, number
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.thresholds import (
+    BEYOND_CHANCE,
     CHANGE_PRIOR,
     CHANGED,
     FEWEST,
@@ -45,13 +46,16 @@ from study_app.analysis.statistics.thresholds import (
     WORST,
     change_score,
     drift,
+    fit_preferring,
     group_mean,
     p_of_fit,
+    preferences,
+    preferred,
 )
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
-from study_app.psychophysics.grid import Posterior, fit
+from study_app.psychophysics.grid import Grid, Posterior
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
@@ -61,6 +65,12 @@ SHIFT: Final = 0.1
 FEW_ANSWERS: Final = 40
 """The fewest answers for which the coverage of the intervals was tested."""
 MOST_NAMED: Final = 6
+PASSES: Final = 2
+"""Fits after which preferences are estimated: the first threshold is too high."""
+REMOVED: Final = (
+    "A preference for an interval or for the previous answer, by probit regression, {} removed where it {} more than "
+    f"{BEYOND_CHANCE:g} standard errors."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,20 +117,31 @@ class ThresholdEstimate:
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Answers of one participant at one standard, by level in u: shape (k,) each.
+    """Answers of one participant at one standard, by level in u and by how far preferences move the decision.
 
-    ``places``, shape (n,), are the levels of the rows.
+    All have the shape (k,); ``places``, shape (n,), are those of the rows.
     """
 
     levels: Array
     successes: Array
     failures: Array
+    shifts: Array
     places: NDArray[np.int64]
 
+    def fit(self, grid: Grid) -> Posterior:
+        """Return what they say about the person."""
+        return fit_preferring(self.levels, self.successes, self.failures, self.shifts, grid)
 
-def counts_of(stimulus: Stimulus, rows: pd.DataFrame) -> Counts:
-    """Return counts by level from rows of tracks, each at the mean of its delivered levels."""
-    asked, places = np.unique(rows["level"].to_numpy(dtype=float), return_inverse=True)
+    def expected(self, found: Posterior) -> Array:
+        """Return the share of successes that the function through all medians expects."""
+        return preferred(found.success(self.levels), found.others[2], self.shifts)
+
+
+def counts_of(stimulus: Stimulus, rows: pd.DataFrame, moved: ArrayLike = 0.0) -> Counts:
+    """Return counts from rows of tracks, each at the mean of its delivered levels; preferences ``moved`` decisions."""
+    shifts = np.broadcast_to(np.asarray(moved, float), len(rows))
+    cells, places = np.unique(np.column_stack([rows["level"], shifts]).astype(float), axis=0, return_inverse=True)
+    asked = cells[:, 0]
     each = rows["level_delivered"].astype("Float64").to_numpy(dtype=float, na_value=math.nan)
     known, k = np.isfinite(each), len(asked)
     measured = np.bincount(places[known], minlength=k)
@@ -132,7 +153,19 @@ def counts_of(stimulus: Stimulus, rows: pd.DataFrame) -> Counts:
         levels=np.array([stimulus.coordinate(float(level)) for level in placed]),
         successes=successes,
         failures=np.asarray(np.bincount(places, minlength=k) - successes, float),
+        shifts=cells[:, 1],
         places=np.asarray(places, np.int64),
+    )
+
+
+def _answered(block: LevelBlock, opened: pd.DataFrame) -> pd.DataFrame:
+    """Return the answers in the order of the trials, with which interval is correct and the answer before, as ±1."""
+    rows = opened[(opened["block"] == block.id) & opened["success"].notna()]
+    rows = rows.sort_values(["participant", "session", "trial"])
+    towards = np.where(rows["arrangement"].str.startswith("C"), 1.0, -1.0)
+    said = pd.Series(np.where(rows["success"].to_numpy(dtype=bool), towards, -towards), rows.index)
+    return rows.assign(
+        towards=towards, before=said.groupby([rows["participant"], rows["session"]]).shift(fill_value=0.0)
     )
 
 
@@ -141,8 +174,7 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
         return
-    all_rows = opened[(opened["block"] == block.id) & opened["success"].notna()].sort_values(["session", "trial"])
-    for standard, at_standard in all_rows.groupby("standard", dropna=False, sort=True):
+    for standard, at_standard in _answered(block, opened).groupby("standard", dropna=False, sort=True):
         own = [
             _own(block, stimulus, assumed, standard, person, one)
             for person, one in at_standard.groupby("participant")
@@ -173,12 +205,19 @@ def _fitted(
     """Return a participant's answers, what they say about the person, and the change of the threshold [decades].
 
     A threshold that changed is uncertain by the standard deviation of one that changes evenly, in addition to how far
-    it is from one session to the next.
+    it is from one session to the next. A preference for one of two intervals is removed: it makes answers worse.
     """
     counts, session_sd = (counts_of(stimulus, rows), SESSION_SD / math.sqrt(rows["session"].nunique()))
-    grid = analysis_grid(stimulus, block.design, assumed, session_sd)
-    found = fit(counts.levels, counts.successes, counts.failures, grid)
-    score, information = change_score(rows["success"].to_numpy(dtype=bool), counts.levels[counts.places], found)
+    grid, successes = analysis_grid(stimulus, block.design, assumed, session_sd), rows["success"].to_numpy(dtype=bool)
+    found = counts.fit(grid)
+    for _ in range(PASSES if block.design.kind == "2ifc" and block.has_correct_answer else 0):
+        given = (rows["towards"].to_numpy(), successes, rows["before"].to_numpy())
+        counts = counts_of(stimulus, rows, preferences(*given, found, counts.levels[counts.places]))
+        if not counts.shifts.any():
+            break
+        found = counts.fit(grid)
+    at = counts.places
+    score, information = change_score(successes, counts.levels[at], found, counts.shifts[at])
     if score**2 <= CHANGED**2 * information:
         return counts, found, 0.0
     decade = 1.0 if stimulus.spacing == "log" else abs(found.threshold) * math.log(10)
@@ -193,11 +232,11 @@ def _own(
     """Return a participant's threshold; of the rows those that are analysed enter the fit."""
     rows = heard[heard["analysed"]]
     counts, found, change = _fitted(block, stimulus, assumed, rows)
-    grid, answers = found.grid, (counts.levels, counts.successes, counts.failures)
-    flat = fit(*answers, replace(grid, width_prior=None))
+    grid = found.grid
+    flat = counts.fit(replace(grid, width_prior=None))
     level_of, threshold, (low, high) = stimulus.level_of, found.threshold, found.interval
     width, guess, lapse = found.others
-    psi, shown = found.success(counts.levels), counts.levels[np.isfinite(counts.levels)]
+    psi, shown = counts.expected(found), counts.levels[np.isfinite(counts.levels)]
     percent, compared = compared_percent(block.published), math.nan
     if percent is not None:
         compared = level_at(grid.family, percent, threshold, *found.others)
@@ -264,10 +303,9 @@ def psychometric_bands(
     if assumed is None or stimulus is None:
         return {}
     u = np.linspace(*ends, PLACES)
-    rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["success"].notna()]
-    found = {}
-    for person, own in rows[rows["participant"].isin(people)].groupby("participant"):
-        _, posterior, _ = _fitted(block, stimulus, assumed, own.sort_values(["session", "trial"]))
+    rows, found = _answered(block, opened), {}
+    for person, own in rows[rows["analysed"] & rows["participant"].isin(people)].groupby("participant"):
+        _, posterior, _ = _fitted(block, stimulus, assumed, own)
         found[str(person)] = np.array([u, *posterior.band(u)])
     return found
 
@@ -302,16 +340,16 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
     if assumed is None or stimulus is None:
         return
     grid = analysis_grid(stimulus, block.design, assumed)
-    rows = opened[(opened["block"] == block.id) & opened["analysed"] & opened["success"].notna()]
-    rows = rows.sort_values(["participant", "session", "trial"])
-    for _, own in list(rows.groupby(["participant", "standard"], dropna=False))[:most]:
+    rows = _answered(block, opened)
+    for _, own in list(rows[rows["analysed"]].groupby(["participant", "standard"], dropna=False))[:most]:
         standard = own["standard"].iloc[0]
-        counts = counts_of(stimulus, own)
+        counts, _, _ = _fitted(block, stimulus, assumed, own)
         successes, ends = own["success"].to_numpy(dtype=bool), []
         so_far = np.zeros((2, len(counts.levels)))
         for place, right in zip(counts.places, successes, strict=True):
             so_far[0 if right else 1, place] += 1
-            ends.append([stimulus.level_of(end) for end in fit(counts.levels, so_far[0], so_far[1], grid).interval])
+            interval = replace(counts, successes=so_far[0], failures=so_far[1]).fit(grid).interval
+            ends.append([stimulus.level_of(end) for end in interval])
         low, high = np.array(ends).T
         yield TrackCourse(
             participant=str(own["participant"].iloc[0]),
@@ -415,6 +453,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of "
             f"trial number and deviance residual, with “!” where the threshold changes over the trials by more than "
             f"{CHANGED:g} standard errors. n counts answers{catch}."
+            + (f" {REMOVED.format('is', 'is')}" if found.design == "2ifc" else "")
         )
 
     def compares(self, measure: str) -> bool:
@@ -507,6 +546,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"{'decades' if log else 'units of the level'}, factor {factor:.3g}) and lapse rates up to "
             f"{100 * max(ANALYSIS_LAPSES):.0f} %."
         )
+        if block.design.kind == "2ifc":
+            yield REMOVED.format("was", "was")
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 from study_app import __version__
 from study_app.analysis.data.blocks import SPENDINGS, TRENDS, decisions, spoken
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.levels.thresholds import FAMILIES
+from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
 from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.report.html_page import bullets, heading, paragraph
 from study_app.analysis.results import counted, least, listed
@@ -159,6 +159,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
                 f"posterior median of the threshold ({family} function) with its "
                 "equal-tailed 95 % interval, at the delivered levels; the median under a flat prior of the width is "
                 "reported, too; goodness of fit by 999 simulated sets of answers, drift over trials."
+                + (f" {REMOVED.format('is', 'is')}" if design.kind == "2ifc" else "")
             )
             yield (
                 f"Block {block.id}, group: random-effects mean of logarithmic thresholds (Paule–Mandel) with the "

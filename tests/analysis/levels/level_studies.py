@@ -146,4 +146,10 @@ def rows(people: dict[str, float], trials: int = 400) -> pd.DataFrame:
             level = LEVELS[number % len(LEVELS)]
             right = bool(draw.random() < success("weibull", math.log10(level), math.log10(threshold), 1.4, 0.5, 0.01))
             found.append((person, "01", number + 1, "b", 8.0, level, level, True, right))
-    return pd.DataFrame(found, columns=NAMES).astype({"level_delivered": "Float64", "success": "boolean"})
+    return arranged(pd.DataFrame(found, columns=NAMES))
+
+
+def arranged(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return rows of tracks with the comparison in either interval, in no order."""
+    arrangement = np.where(np.random.default_rng(6).random(len(frame)) < 0.5, "CS", "SC")
+    return frame.assign(arrangement=arrangement).astype({"level_delivered": "Float64", "success": "boolean"})

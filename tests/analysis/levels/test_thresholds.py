@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import norm
 
 from study_app.analysis.levels.thresholds import counts_of, thresholds
 from study_app.analysis.statistics.thresholds import group_mean, p_of_fit
@@ -13,9 +14,9 @@ from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.methods import QuestPlus, TrackSetting, TrialResult, UpDown
 from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, assumed_for
-from study_app.psychophysics.families import success
+from study_app.psychophysics.families import rise, success
 from study_app.psychophysics.grid import fit
-from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, block, rows
+from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, arranged, block, rows
 
 
 def test_planted_thresholds_are_found_per_participant_and_for_the_group() -> None:
@@ -82,8 +83,8 @@ def test_levels_that_are_evenly_spaced_have_widths_and_thresholds_in_their_unit(
             for number in range(40)
         ],
         columns=["participant", "block", "standard", "level", "level_delivered", "analysed", "success"],
-    ).astype({"level_delivered": "Float64", "success": "boolean"})
-    frame = frame.assign(session="01", trial=range(1, len(frame) + 1))
+    )
+    frame = arranged(frame.assign(session="01", trial=range(1, len(frame) + 1)))
     _, one = thresholds(block(stimulus=stimulus), frame)
     assert one.beyond == beyond
     assert one.threshold == pytest.approx(planted, rel=0.03)
@@ -119,8 +120,7 @@ def test_noise_trials_determine_the_guess_rate_of_yes_no() -> None:
                 bool(draw.random() < success("normal", u, -0.7, 1, 0.2, 0)),
             )
         )  # fmt: skip
-    frame = pd.DataFrame(found, columns=NAMES).astype({"level_delivered": "Float64", "success": "boolean"})
-    _, one = thresholds(block("yesno"), frame)
+    _, one = thresholds(block("yesno"), arranged(pd.DataFrame(found, columns=NAMES)))
     assert one.guess == pytest.approx(0.2, abs=0.06)
     assert one.threshold == pytest.approx(0.2, rel=0.25)
 
@@ -192,6 +192,23 @@ def test_a_threshold_that_changes_is_named_with_its_size_and_widens_the_interval
     assert one.change == pytest.approx(-0.75, abs=0.15)
     assert (other.drifts, other.change) == (False, 0.0)
     assert math.log(one.high / one.low) > 1.3 * math.log(other.high / other.low)
+
+
+@pytest.mark.parametrize(("criterion", "repeats"), [(0.0, 0.0), (0.6, 0.0), (0.0, 0.6)])
+def test_a_preference_for_an_interval_or_for_the_answer_before_moves_no_threshold(
+    criterion: float, repeats: float
+) -> None:
+    frame, draw = rows({f"P{number}": 0.2 for number in range(8)}, trials=200), np.random.default_rng(8)
+    right = []
+    for _, own in frame.groupby("participant"):
+        share, last = 0.5 + 0.5 * rise("weibull", np.log10(own["level"]), math.log10(0.2), 1.4), 0.0
+        for sensed, comparison_first in zip(norm.ppf(share), own["arrangement"] == "CS", strict=True):
+            evidence = (sensed if comparison_first else -sensed) + criterion + repeats * last + draw.normal()
+            said_first = evidence > 0 if draw.random() > 0.02 else draw.random() < 0.5
+            last = 1.0 if said_first else -1.0
+            right.append(said_first == comparison_first)
+    group, *_ = thresholds(block(), frame.assign(success=pd.array(right, dtype="boolean")))
+    assert group.threshold == pytest.approx(0.2, rel=0.06)
 
 
 def test_answers_of_two_sessions_tell_more_about_a_person_than_those_of_one() -> None:

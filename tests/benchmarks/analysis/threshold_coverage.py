@@ -4,23 +4,26 @@ Run it by itself: ``python tests/benchmarks/analysis/threshold_coverage.py [OBSE
 two-interval forced choice and differ by a factor of 1.2. Those that the analysis assumes have a d′ proportional to the
 level and answer 2 % of trials at random; the others of `KINDS` differ from them in one respect each. Of a threshold
 that changes, the mean over the trials is the true one; ten observers are a group. Exit code 3 if, of those assumed,
-the coverage of a 95 % interval is not within 93 to 99 %, or the mean error is above 5 %; of the others nothing is
-required.
+less than 93 % of 95 % intervals hold, which allow for sessions that differ, or the mean error is above 5 %; of the
+others nothing is required.
 """
 
 import math
 import sys
+from collections.abc import Iterator
 from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.special import ndtr
 
-from study_app.analysis.statistics.thresholds import group_mean
+from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.levels.thresholds import ThresholdEstimate, thresholds
 from study_app.protocol.trials.designs import default_design
-from study_app.protocol.trials.stimuli import LAPSES, Stimulus, analysis_grid, assumed_for, running_grid
+from study_app.protocol.trials.methods import default_method
+from study_app.protocol.trials.stimuli import LAPSES, Stimulus, assumed_for, running_grid
 from study_app.psychophysics.adaptive import Search
-from study_app.psychophysics.grid import fit
 
 TRIALS = (40, 80, 160)
 STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
@@ -28,7 +31,7 @@ DESIGN = default_design("2ifc")
 MEDIAN_75 = 0.2
 BETWEEN = 1.2
 PEOPLE = 10
-COVERAGE = (0.93, 0.99)
+LEAST_HELD = 0.93
 MOST_ERROR = 0.05
 
 
@@ -57,7 +60,7 @@ KINDS = {
 
 
 def answered(kind: Kind, planted: np.ndarray, search: Search, draw: np.random.Generator) -> tuple[np.ndarray, ...]:
-    """Return the places of the levels presented, (observers, trials), and whether the answers were right."""
+    """Return the places of the levels presented, whether answers were right, and the first interval was (n, trials)."""
     psi = search.psi.reshape(len(search.levels), len(search.grid.thresholds), -1)
     posterior = np.tile(search.grid.prior.reshape(1, *psi.shape[1:]), (len(planted), 1, 1))
     places, rights, last = [], [], np.zeros(len(planted))
@@ -74,37 +77,46 @@ def answered(kind: Kind, planted: np.ndarray, search: Search, draw: np.random.Ge
         posterior *= np.where(right[:, None, None], psi[place], 1.0 - psi[place])
         places.append(place)
         rights.append(right)
-    return np.array(places).T, np.array(rights).T
+    return np.array(places).T, np.array(rights).T, firsts
+
+
+def studies(places: np.ndarray, rights: np.ndarray, firsts: np.ndarray) -> Iterator[tuple[ThresholdEstimate, ...]]:
+    """Yield what the report estimates of each `PEOPLE` observers, of the group first."""
+    block = LevelBlock("b", "b", "main", DESIGN, STIMULUS, (), default_method("questplus"))
+    for start in range(0, len(places), PEOPLE):
+        own = slice(start, start + PEOPLE)
+        shape = places[own].shape
+        levels = np.array(STIMULUS.grid)[places[own]].ravel()
+        frame = pd.DataFrame({"level": levels, "level_delivered": levels, "success": rights[own].ravel()})
+        frame["arrangement"] = np.where(firsts[own].ravel(), "CS", "SC")
+        frame["participant"], frame["trial"] = (one.ravel() for one in np.indices(shape))
+        frame = frame.astype({"level_delivered": "Float64", "success": "boolean"})
+        yield tuple(thresholds(block, frame.assign(block="b", standard=8.0, session=1, analysed=True, track="8/1")))
 
 
 def main(observers: str = "1000", seed: str = "1") -> int:
     """Print a row for each kind and number of trials; return the exit code."""
-    assumed = assumed_for(STIMULUS, DESIGN)
-    grid = analysis_grid(STIMULUS, DESIGN, assumed)
     coordinates = tuple(STIMULUS.coordinate(level) for level in STIMULUS.grid)
-    search = Search(running_grid(STIMULUS, DESIGN, assumed, LAPSES), coordinates, "threshold")
+    search = Search(running_grid(STIMULUS, DESIGN, assumed_for(STIMULUS, DESIGN), LAPSES), coordinates, "threshold")
     failed = False
     print(f"{observers} observers, 2IFC, 75 % at {MEDIAN_75} (factor {BETWEEN}), QUEST+, seed {seed}")
     print("                   trials  held %   error %    SD %   groups held %  half of a group's interval %")
     for name, kind in KINDS.items():
         draw = np.random.default_rng(int(seed))
         planted = MEDIAN_75 * BETWEEN ** draw.normal(size=int(observers))
-        places, rights = answered(kind, planted, search, draw)
+        presented = answered(kind, planted, search, draw)
         for trials in TRIALS:
-            counts = np.zeros((2, len(planted), len(coordinates)))
-            np.add.at(counts, (1 - rights[:, :trials], np.arange(len(planted))[:, None], places[:, :trials]), 1.0)
-            fits = [fit(coordinates, right, wrong, grid) for right, wrong in counts.transpose(1, 0, 2)]
-            threshold, low, high, variance = np.array([(it.threshold, *it.interval, it.variance) for it in fits]).T
             moved = math.log10(kind.change) * ((trials - 1) / (max(TRIALS) - 1) - 1) / 2  # the mean of these trials
             truth, true_mean = np.log10(planted) + moved, math.log10(MEDIAN_75) + moved
+            found = list(studies(*(one[:, :trials] for one in presented)))
+            threshold, low, high = np.log10([(it.threshold, it.low, it.high) for _, *own in found for it in own]).T
+            ends = np.log10([(group.low, group.high) for group, *_ in found])
             held, error = float(((low <= truth) & (truth <= high)).mean()), 10 ** float((threshold - truth).mean()) - 1
             spread = 10 ** float((threshold - truth).std(ddof=1)) - 1
-            tens = zip(threshold.reshape(-1, PEOPLE).tolist(), variance.reshape(-1, PEOPLE).tolist(), strict=True)
-            ends = np.array([(one.low, one.high) for one in (group_mean(*ten) for ten in tens)], float)
             of_groups = float(((ends[:, 0] <= true_mean) & (true_mean <= ends[:, 1])).mean())
             half = 10 ** float(np.median(np.diff(ends, axis=1)) / 2) - 1
             if name == "as assumed":
-                failed |= not (COVERAGE[0] <= held <= COVERAGE[1]) or abs(error) > MOST_ERROR
+                failed |= held < LEAST_HELD or abs(error) > MOST_ERROR
             print(
                 f"{name:19s}{trials:6d}{100 * held:8.1f}{100 * error:+10.1f}{100 * spread:8.0f}"
                 f"{100 * of_groups:16.1f}{100 * half:30.0f}",
