@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from PySide6.QtWidgets import QTableWidgetItem
 
 from study_app.designer.outline.card import ROW_ROLE
 
@@ -95,3 +96,39 @@ def test_two_blocks_of_levels_are_compared_by_their_thresholds(designer: Any) ->
     assert dict(designer.value(*CONTRASTS)[0]) == wanted
     (row,) = [one for one in designer.place.outline.indexes() if one.data(ROW_ROLE).path == ("sequence",)]
     assert row.data(ROW_ROLE).faults == 0
+
+
+def test_the_guide_of_two_conditions_makes_a_study_without_problems(designer: Any) -> None:
+    """The steps of docs/two-conditions.md, by clicks and typed words."""
+    designer.controller.begin("template:viscosity-jnd", "thicker")
+    head = designer.place.form.head
+    designer.go_to("conditions", "damper")
+    designer.click_on(designer.form_row("conditions", "damper", "ball").remove)
+    designer.click_on(head.series)
+    card = designer.place.prompt
+    choose(card.number, "Visual delay")
+    card.table.setCurrentCell(0, 0)
+    card.table.setItem(0, 0, QTableWidgetItem("60"))
+    designer.click_on(card.make)
+    designer.go_to("stimuli", "damping")
+    designer.click_on(head.copy)
+    choose(designer.field("stimuli", "damping_2", "condition").list, "damper_60")
+    designer.go_to("blocks", "viscosity")
+    designer.click_on(head.copy)
+    choose(designer.field("blocks", "viscosity_2", "stimulus").list, "damping_2")
+    (title,) = designer.field("blocks", "viscosity_2", "title").lines.values()
+    designer.fill(title, "Viscosity, late")
+    designer.go_to("sequence")
+    designer.click_on(designer.field(*ORDER).segments.buttons[1])
+    designer.click_on(designer.field(*CONTRASTS).add)
+    choose(designer.field(*CONTRASTS).lines[0].relation, "is different from")
+    designer.hit("Insert")
+    designer.type("nasa")
+    designer.hit("Return")
+    next(one for one in head.asks.actions() if one.text().startswith("After each block")).trigger()
+    steps = ("welcome", "training", "ready", "viscosity", "nasa_tlx", "viscosity_2", "nasa_tlx", "thanks")
+    assert designer.value("sequence") == steps
+    contrast = {"measure": "threshold", "blocks": ("viscosity", "viscosity_2")}
+    assert tuple(map(dict, designer.value(*CONTRASTS))) == (contrast,)
+    assert designer.study.protocol is not None
+    assert designer.study.protocol.study.block_order == "balanced"

@@ -117,7 +117,7 @@ class FormRow:
     def removable(self) -> bool:
         path = self.row.path
         given = self.row.value is not None and isinstance(path[-1], str)
-        section = (len(path) == 1 and self.row.kind == "tables") or path == STUDY_LANGUAGES
+        section = len(path) == 1 or path == STUDY_LANGUAGES
         return given and not (self.row.required or self.instead or section)
 
     @property
