@@ -8,7 +8,7 @@ from functools import partial
 from traceback import clear_frames
 from typing import Any, Final, Literal
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QGraphicsItem, QMainWindow, QWidget
 
@@ -250,11 +250,12 @@ class OperatorWindow(QMainWindow):
         return next((self._panels[panel] for panel in here if isinstance(error, Exception)), "")
 
     def tell_of_failure(self, name: str, error: BaseException) -> None:
-        """Disable a panel that failed, and say so once; one that fails again, as it is painted, is painted no more."""
+        """Disable a panel that failed, and say so once; one that fails again, as it is painted, is hidden."""
         clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
         panel = next(panel for panel, known in self._panels.items() if known == name)
         if name in self._failed:
             panel.setUpdatesEnabled(False)
+            QTimer.singleShot(0, panel, panel.hide)  # not now, while it is painted
         else:
             self._failed.add(name)
             panel.setEnabled(False)

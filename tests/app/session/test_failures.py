@@ -148,7 +148,7 @@ def test_a_panel_that_fails_is_told_once_and_disabled_and_the_session_goes_on(
     for _ in range(9):
         do(bridge)
         bridge.show_tiles()
-        QApplication.processEvents()
+        qtbot.wait(5)  # in Qt's loop, as it is in the program
     said = [one.text() for notice in bridge.operator.findChildren(Question) for one in notice.findChildren(QLabel)]
     assert said.count(f"{name}: this panel failed. The session continues.") == 1
     assert not attrgetter(panel)(bridge.operator).isEnabled()
