@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from PySide6.QtWidgets import QTableWidgetItem
 
+from study_app.designer.document.steps import RetypeFile
 from study_app.designer.outline.card import ROW_ROLE
 
 pytestmark = pytest.mark.slow
@@ -81,6 +82,15 @@ def test_a_hypothesis_is_a_sentence_with_choices(planned: Any) -> None:
     planned.click_on(planned.field(*CONTRASTS).lines[0].away)
     assert planned.value(*CONTRASTS) is None
     assert planned.undo_all() == before
+
+
+@pytest.mark.parametrize("written", ["3", "[3]", "[{ blocks = 4, measure = 5, expected = 6, bound = 'x' }]"])
+def test_hypotheses_that_cannot_be_read_are_shown_with_their_fault(planned: Any, written: str) -> None:
+    planned.editing.ask(RetypeFile(planned.text.replace("participants = 11", f"contrasts = {written}")))
+    planned.go_to("sequence")
+    assert planned.form_row(*CONTRASTS).wrong.isVisible()
+    for line in planned.field(*CONTRASTS).lines:
+        assert line.first.currentIndex() == -1
 
 
 def test_two_blocks_of_levels_are_compared_by_their_thresholds(designer: Any) -> None:

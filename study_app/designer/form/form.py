@@ -25,6 +25,7 @@ from study_app.designer.form.rows import NO_QUESTIONS, STUDY_LANGUAGES, Entry, F
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language
 from study_app.designer.outline.outline_rows import icon_of
 from study_app.number_text import capitalised
+from study_app.protocol.formats import is_second
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, Places, names, places_of, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name
@@ -87,21 +88,20 @@ def asking(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Reque
         return
     steps = [((*place, at), str(step)) for place, listed in sequences_in(document) for at, step in enumerate(listed)]
     blocks = [step for step in steps if step[1] in names(document, "blocks")]
-    main = [step for step in blocks if value_at(document, ("blocks", step[1], "phase")) in {None, "main"}]
-    firsts = {place[:-1]: place for place, _ in reversed(blocks)}
-    yield "Before the first block\tonce", AddToSession(path, tuple(firsts.values()))
     for name in dict.fromkeys(step for _, step in blocks):
         title, block = title_of(document, ("blocks", name)), value_at(document, ("blocks", name))
         if isinstance(block, Mapping) and "design" not in block and block.get("questionnaire") != path[1]:
             asked = SetValue(("blocks", name, "questionnaire"), path[1])
             yield f"After each trial of {title}\tabout that trial", asked
+    main = [step for step in blocks if value_at(document, ("blocks", step[1], "phase")) in {None, "main"}]
     ends = {name: _after(place for place, step in main if step == name) for name in dict.fromkeys(s for _, s in main)}
-    for name, after in ends.items():
-        yield f"After {title_of(document, ('blocks', name))}\tonce, about the block", AddToSession(path, after)
-    if len(ends) > 1:
-        yield f"After each block\t{len(ends)} times, compared", AddToSession(path, _after(place for place, _ in main))
     lasts = {place[:-1]: place if step in names(document, "pages") else _after([place])[0] for place, step in steps}
-    yield "At the end\tonce, about the session", AddToSession(path, tuple(lasts.values()))
+    places = {f"After {title_of(document, ('blocks', name))}\tonce, about the block": at for name, at in ends.items()}
+    if len(ends) > 1:
+        places[f"After each block\t{len(ends)} times, compared"] = _after(place for place, _ in main)
+    places["Before the first block\tonce"] = tuple({place[:-1]: place for place, _ in reversed(blocks)}.values())
+    places["At the end\tonce, about the session"] = tuple(lasts.values())
+    yield from ((words, AddToSession(path, at)) for words, at in places.items() if at and is_second(document))
 
 
 def _after(places: Iterable[Path]) -> tuple[Path, ...]:

@@ -136,7 +136,7 @@ class Hypothesis(QWidget):
     def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
         self.value, self.known = value, known
         key = next((key for key in ("conditions", "groups") if value.get(key)), "blocks")
-        blocks, named = (tuple(map(str, value.get(one) or ())) for one in ("blocks", key))
+        blocks, named = (tuple(map(str, _tuple(value.get(one)))) for one in ("blocks", key))
         at = [(key, name if key == "blocks" else next(iter(blocks), ""), name) for name in named]
         found = [next((one for one in known if (one.key, one.block, one.name) == place), None) for place in at]
         first, second = (*found, None, None)[:2]
@@ -147,7 +147,7 @@ class Hypothesis(QWidget):
         self._fill(self.relation, RELATIONS, relation)
         self._fill(self.first, tuple((one, one.words) for one in known), first)
         self._fill(self.second, tuple((one, one.words) for one in self.others), second)
-        self.bound.show_text("" if (bound := value.get("bound")) is None else f"{bound:g}")
+        self.bound.show_text("" if (bound := value.get("bound")) is None else str(bound))
         for part in (self.within, self.bound):
             part.setVisible(bound is not None)
 
@@ -172,6 +172,11 @@ class Hypothesis(QWidget):
         self.changed.emit(_table(first, second, measure, relation, bound))
 
 
+def _tuple(value: Any) -> tuple[Any, ...]:
+    """Return a list of a file, which may have something else in its place."""
+    return value if isinstance(value, tuple) else ()
+
+
 def _table(first: Compared, second: Compared, measure: str, relation: Any, bound: float | None) -> dict[str, Any]:
     """Return the table of a hypothesis as the file has it."""
     pair = [first.name, second.name]
@@ -191,7 +196,7 @@ class HypothesesField(Field):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        count = len(row.row.value or ())
+        count = len(_tuple(row.row.value))
         self.lines = [Hypothesis(f"Hypothesis {at + 1}") for at in range(count)]
         for at, line in enumerate(self.lines):
             line.changed.connect(lambda value, at=at: self._change(at, value))
@@ -204,7 +209,7 @@ class HypothesesField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        for line, value in zip(self.lines, self.row.row.value or (), strict=False):
+        for line, value in zip(self.lines, _tuple(self.row.row.value), strict=False):
             line.show_value(value if isinstance(value, Mapping) else {}, self.row.facts)
         self.add.setEnabled(bool(self.row.facts))
         self.why.setText("" if self.row.facts else NOTHING_TO_COMPARE)
@@ -220,6 +225,7 @@ class HypothesesField(Field):
 
     def _change(self, at: int, value: Mapping[str, Any]) -> None:
         path, before = (*self.row.row.path, at), self.row.row.value[at]
+        before = before if isinstance(before, Mapping) else {}
         asked: list[Request] = [
             SetValue((*path, key), one)
             for key, one in value.items()
@@ -231,6 +237,6 @@ class HypothesesField(Field):
 
 
 HYPOTHESES: Final = SpecialEditor(
-    (("Analysis", "contrasts"),), HypothesesField, wide=True, structure=lambda row: len(row.row.value or ()),
+    (("Analysis", "contrasts"),), HypothesesField, wide=True, structure=lambda row: len(_tuple(row.row.value)),
     facts=compared,
 )  # fmt: skip
