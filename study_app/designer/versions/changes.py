@@ -36,8 +36,8 @@ from study_app.errors import StoreError
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.background import Background, delayed
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Card, Icon, scrolled
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
+from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
 from study_app.number_text import counted
@@ -290,41 +290,6 @@ def _field(name: str, text: str, width: int) -> QLineEdit:
     return made
 
 
-class CommentsCard(Prompt):
-    """Comments that mention a name that is no longer there; ``line_asked`` carries a line, from 1."""
-
-    line_asked = Signal(int)
-
-    def __init__(self, name: str, comments: Sequence[tuple[int, str]]) -> None:
-        super().__init__(
-            title_of(name, comments), "Renaming does not change comments. Correct them in the file where needed."
-        )
-        inside = QWidget()
-        column = vbox(spacing=2, margins=0, parent=inside)
-        self.lines: list[ActionButton] = []
-        for line, text in comments:
-            cut = text if len(text) <= 90 else f"{text[:89].rstrip()}…"
-            made = small_button("", f"Line {line}:  {cut}", role="plain", height=34)
-            made.setAccessibleName(f"Go to line {line}: {text}")
-            made.setToolTip(text)
-            made.clicked.connect(lambda _checked=False, line=line: self.line_asked.emit(line))
-            column.addWidget(made, 0, Qt.AlignmentFlag.AlignLeft)
-            self.lines.append(made)
-        column.addStretch()
-        area = scrolled(inside)
-        area.setMinimumHeight(min(160, 38 * len(comments) + 6))
-        self.column.addWidget(area, 1)
-        self.cancel.setText("Close")
-        add_layout(self.column, self.buttons)
-        self.first: QWidget = self.cancel
-
-
-def title_of(name: str, comments: Sequence[tuple[int, str]]) -> str:
-    """Return how many comments mention a name."""
-    count = "1 comment mentions" if len(comments) == 1 else f"{len(comments)} comments mention"
-    return f"{count} “{name}”"
-
-
 TAB: Final = "changes"
 REST_MS: Final = 200
 NO_COPY: Final = (
@@ -522,7 +487,7 @@ class Renaming(QObject):
         self.editing, self.place, self.runs = editing, place, runs
         self._unlocked: Place = ()
         self._renamed: tuple[str, int] | None = None
-        self._listed: tuple[Place, str, tuple[Comment, ...]] = ((), "", ())
+        self._listed: tuple[Place, tuple[Comment, ...]] = ((), ())
         editing.recorded = self._recorded
         place.asked.connect(self._note)
         editing.changed.connect(self._lock)
@@ -530,7 +495,7 @@ class Renaming(QObject):
         editing.refused.connect(self._forget)
         runs.changed.connect(self._lock)
         place.form.head.unlock_asked.connect(self._explain)
-        place.form.head.comments_asked.connect(self._list_comments)
+        place.form.head.comments_asked.connect(self._go_to_comment)
 
     def _id(self, path: Place) -> str:
         opened = self.editing.opened
@@ -555,7 +520,7 @@ class Renaming(QObject):
         if path != self._unlocked:
             self._unlocked = ()
         if path != self._listed[0]:
-            self._listed = ((), "", ())
+            self._listed = ((), ())
             self.place.form.head.show_comments("")
             self.place.form.head.show_followed("")
         self.place.form.head.show_lock(path, self._why(path))
@@ -592,14 +557,13 @@ class Renaming(QObject):
         head.show_followed(f"{counted(references, 'place')} updated" if references else "")
         found = comments_naming(opened.study.text, name)
         if found:
-            self._listed = (self.editing.selected, name, found)
-            head.show_comments(title_of(name, found))
+            self._listed = (self.editing.selected, found)
+            mention = "comment mentions" if len(found) == 1 else "comments mention"
+            head.show_comments(f"{len(found)} {mention} “{name}”")
 
-    def _list_comments(self) -> None:
-        card = CommentsCard(*self._listed[1:])
-        card.line_asked.connect(self._go_to)
-        self.place.show_prompt(card, card.first)
-
-    def _go_to(self, line: int) -> None:
+    def _go_to_comment(self) -> None:
+        """Show the next of these comments in the file."""
+        path, (first, *others) = self._listed
+        self._listed = (path, (*others, first))
         self.place.show_tab("file")
-        self.place.file.editor.go_to(line - 1)
+        self.place.file.editor.go_to(first.line - 1)
