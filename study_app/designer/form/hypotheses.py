@@ -71,12 +71,9 @@ class Compared:
     measures: tuple[tuple[str, str], ...]
 
     def others(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
-        alike = (one for one in every if one.key == self.key and one.name != self.name)
-        return tuple(one for one in alike if one.measures == self.measures and self.key in {"blocks", one.within(self)})
-
-    def within(self, other: "Compared") -> str:
-        """Return the key where both are in one block."""
-        return self.key if self.block == other.block else ""
+        """Return what it can be compared with: other blocks with these measures, or what is in the same block."""
+        alike = (one for one in every if (one.key, one.measures) == (self.key, self.measures) and one.name != self.name)
+        return tuple(one for one in alike if self.key == "blocks" or one.block == self.block)
 
 
 def compared(study: Study, _row: Row) -> tuple[Compared, ...]:
