@@ -18,6 +18,7 @@ from typing import Concatenate, ParamSpec, Protocol, TypeVar
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, SignalInstance
 from PySide6.QtGui import QGuiApplication, QSessionManager
 
+from study_app.app.session.timing import end_at_once
 from study_app.errors import SessionError
 from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
 
@@ -181,12 +182,14 @@ def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
     def hear(number: int, _frame: object) -> None:
         if not heard:
             heard.append(number)
+            end_at_once()
             QTimer.singleShot(0, lambda: end(number))
 
     def log_off(manager: QSessionManager) -> None:
         manager.setRestartHint(QSessionManager.RestartHint.RestartNever)
         if not heard:
             heard.append(HANG_UP)
+            end_at_once()
             end(HANG_UP)
 
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")

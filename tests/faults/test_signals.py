@@ -1,7 +1,11 @@
 """The real program in a real window, ended from outside in a trial: zero force, unfinished, and it can be resumed."""
 
+import os
 import signal
+import sys
+import time
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -31,6 +35,12 @@ def display() -> Iterator[str]:
         yield number
 
 
+def cpu_s(pid: int) -> float:
+    """Return how long a process has computed so far."""
+    user, system = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_in_a_trial_leaves_a_session_that_can_be_resumed(
     number: signal.Signals, display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -47,14 +57,22 @@ def test_a_signal_in_a_trial_leaves_a_session_that_can_be_resumed(
         program.key(study, "Return")  # agrees
         while not program.events("trial_started"):
             program.key(study, "space")
+        used_s, sent_s = cpu_s(program.process.pid), time.time()
         program.process.send_signal(number)
-        assert program.process.wait(30) == 128 + number
+        _, status, usage = os.wait4(program.process.pid, 0)
+        assert os.waitstatus_to_exitcode(status) == 128 + number
+        ended_s, busy_s = time.time() - sent_s, usage.ru_utime + usage.ru_stime - used_s
     finally:
         program.close()
     (session,) = StudyFolder(tmp_path / "results" / "demo-scripted").sessions()
     assert [one["outcome"] for one in program.events("trial_ended")] == ["interrupted"]
     assert [one["by"] for one in program.events("paused")] == ["program"]
     assert program.events("session_ended") == []
+    zero_s = datetime.fromisoformat(program.events("trial_ended")[0]["at"]).timestamp() - sent_s
+    ended = f"zero force after {zero_s:.2f} s, the end after {ended_s:.2f} s, of which {busy_s:.2f} s of CPU"
+    sys.stdout.write(f"{number.name}: {ended}\n")
+    assert zero_s < 1
+    assert busy_s < 0.5, "on a computer without other programs it ends in this time"
     assert verify(tmp_path / "results" / "demo-scripted").errors == ()
     source = source_bytes(str(protocol))
     check_can_go_on(session.path, parse(source, "demo"), source)

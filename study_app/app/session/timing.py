@@ -1,5 +1,6 @@
 """What keeps frames on time: the rest of a frame for drawing, collection in one thread, the thread's priority."""
 
+import atexit
 import ctypes
 import gc
 import os
@@ -110,10 +111,20 @@ def unfreeze_garbage() -> None:
     gc.unfreeze()
 
 
+_ends_at_once = threading.Event()
+
+
+def end_at_once() -> None:
+    """Collect nothing more, for the program is ended from outside: to look at everything takes seconds under load."""
+    _ends_at_once.set()
+    atexit.register(gc.freeze)
+
+
 @contextmanager
 def collecting_here() -> Iterator[None]:
     """Collect in this thread, which runs Qt's event loop, and in no other."""
     before = gc.isenabled()
+    _ends_at_once.clear()
     gc.disable()
     timer = QTimer()
     timer.timeout.connect(_collect)
@@ -124,7 +135,8 @@ def collecting_here() -> Iterator[None]:
         timer.stop()
         unfreeze_garbage()
         if before:
-            gc.collect()
+            if not _ends_at_once.is_set():
+                gc.collect()
             gc.enable()
 
 
