@@ -13,6 +13,7 @@ Where the disk takes nothing, the session stalls: zero force, a calm page, and w
 again until it is done, in order and once. Then the session is paused, and goes on when the operator resumes it.
 """
 
+import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -36,6 +37,7 @@ from study_app.session.trial import Recording, RunningTrial, TankView, ball_is_b
 from study_app.store.delivered import broken_limits, delivered, undelivered
 from study_app.store.journals.journal_events import TargetReached
 
+STOOD_STILL_S = 3.0  # between two trials, until it is noted; within one, `trial.FROZEN_S` interrupts it [choice]
 RETRY_S = 1.0  # a disk that took nothing is tried again so often
 
 
@@ -67,6 +69,7 @@ class Runner:
         self._waiting: deque[events.Event] = deque()
         self._busy = False
         self._retry_s = 0.0  # when a disk that took nothing is tried again
+        self._polled_s = math.inf
         self._ending: tuple[events.Finish, float] | None = None
         self._cause = ""
         self._listeners: list[Callable[[SessionState], None]] = []
@@ -137,6 +140,7 @@ class Runner:
                 self._tell()
             return
         now_s = self._ports.clock()
+        still_s, self._polled_s = now_s - self._polled_s, now_s
         if self._state.stall is not None:
             if now_s >= self._retry_s:
                 self.post(events.WriteRetried(now_s))
@@ -151,6 +155,8 @@ class Runner:
                 self.post(event)
             self._follow(samples)
         running = self._running
+        if running is None and still_s > STOOD_STILL_S and self._state.phase not in {Phase.OPENING, *FINAL}:
+            self.post(events.Note(now_s, "note", f"the program stood still for {still_s:.1f} s"))
         if running is not None and running.frozen:
             self.post(events.PauseRequested(self._ports.clock(), "program"))
         elif running is not None and (outcome := running.outcome()) is not None:

@@ -79,7 +79,7 @@ def stamped(lines: str, server: str) -> str:
         server, asked.as_bytes(), {"Content-Type": "application/timestamp-query"}
     )
     try:
-        with urllib.request.urlopen(request, timeout=WAITS_S) as answer:  # noqa: S310  # nosec B310
+        with urllib.request.urlopen(request, timeout=WAITS_S) as answer:  # noqa: S310
             content = answer.read(LONGEST)
         client.decode_timestamp_response(content)
     except (OSError, ValueError) as error:

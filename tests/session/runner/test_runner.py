@@ -293,6 +293,16 @@ def test_lines_that_cannot_be_flushed_in_the_background_stall_the_session_until_
     assert practising.journal.of("trial_ended")[-1]["outcome"] == "interrupted"
 
 
+def test_a_program_that_stands_still_between_two_trials_says_so() -> None:
+    world = at_block("feeling")
+    world.run(3.2)
+    assert world.state.phase is Phase.ANSWERING
+    for seconds in (0.02, 2.9, 0.02, 5.0, 0.02):
+        world.run(seconds)
+    (note,) = world.journal.of("note")
+    assert (note["kind"], note["text"]) == ("note", "the program stood still for 5.0 s")
+
+
 def test_when_the_disk_takes_data_again_all_is_kept_in_order_and_once_and_the_session_is_paused() -> None:
     undisturbed, world = at_block("feeling"), at_block("feeling")
     for each in (undisturbed, world):
