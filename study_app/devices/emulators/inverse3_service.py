@@ -338,7 +338,8 @@ class Service(HandOrders):
         if self.version == "http" or fields.get("upgrade", "").lower() != "websocket":
             self._send_raw(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n")
             return
-        digest = hashlib.sha1((fields["sec-websocket-key"] + _GUID).encode(), usedforsecurity=False).digest()  # RFC 6455
+        key = (fields["sec-websocket-key"] + _GUID).encode()
+        digest = hashlib.sha1(key, usedforsecurity=False).digest()  # RFC 6455
         accept = base64.b64encode(digest).decode()
         self._send_raw(
             b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
