@@ -199,23 +199,31 @@ def thresholds_of(trials: pd.DataFrame, stimulus: Stimulus, design: Design) -> I
     )
 
 
+def fit_answers(stimulus: Stimulus, rows: pd.DataFrame, grid: Grid, *, two_intervals: bool) -> tuple[Counts, Posterior]:
+    """Return answers and what they say; a preference for one of two intervals is removed: it makes answers worse."""
+    counts = counts_of(stimulus, rows)
+    found = counts.fit(grid)
+    for _ in range(PASSES if two_intervals else 0):
+        given = (rows["towards"].to_numpy(), rows["success"].to_numpy(dtype=bool), rows["before"].to_numpy())
+        counts = counts_of(stimulus, rows, preferences(*given, found, counts.levels[counts.places]))
+        if not counts.shifts.any():
+            break
+        found = counts.fit(grid)
+    return counts, found
+
+
 def _fitted(
     block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.DataFrame
 ) -> tuple[Counts, Posterior, float]:
     """Return a participant's answers, what they say about the person, and the change of the threshold [decades].
 
     A threshold that changed is uncertain by the standard deviation of one that changes evenly, in addition to how far
-    it is from one session to the next. A preference for one of two intervals is removed: it makes answers worse.
+    it is from one session to the next.
     """
-    counts, session_sd = (counts_of(stimulus, rows), SESSION_SD / math.sqrt(rows["session"].nunique()))
-    grid, successes = analysis_grid(stimulus, block.design, assumed, session_sd), rows["success"].to_numpy(dtype=bool)
-    found = counts.fit(grid)
-    for _ in range(PASSES if block.design.kind == "2ifc" and block.has_correct_answer else 0):
-        given = (rows["towards"].to_numpy(), successes, rows["before"].to_numpy())
-        counts = counts_of(stimulus, rows, preferences(*given, found, counts.levels[counts.places]))
-        if not counts.shifts.any():
-            break
-        found = counts.fit(grid)
+    session_sd, successes = SESSION_SD / math.sqrt(rows["session"].nunique()), rows["success"].to_numpy(dtype=bool)
+    grid = analysis_grid(stimulus, block.design, assumed, session_sd)
+    two = block.design.kind == "2ifc" and block.has_correct_answer
+    counts, found = fit_answers(stimulus, rows, grid, two_intervals=two)
     at = counts.places
     score, information = change_score(successes, counts.levels[at], found, counts.shifts[at])
     if score**2 <= CHANGED**2 * information:

@@ -19,10 +19,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from study_app.analysis.levels.thresholds import fit_answers
 from study_app.analysis.planning.power_curves import interval
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, assumed_for
-from study_app.psychophysics.grid import Grid, Posterior, fit
+from study_app.psychophysics.grid import Grid, Posterior
 
 DATA = Path(__file__).parents[2] / "data" / "serial_decision.csv.gz"
 PIECE = 200
@@ -53,11 +54,13 @@ def difference(first: Posterior, second: Posterior) -> tuple[float, float]:
     return middle - below, middle + math.hypot(other_high - second.threshold, first.threshold - low)
 
 
-def fitted(levels: np.ndarray, correct: np.ndarray, grid: Grid) -> Posterior:
-    """Return the posterior of answers to levels."""
-    places, at = np.unique(levels, return_inverse=True)
-    right, n = np.bincount(at, correct), np.bincount(at)
-    return fit(np.log10(places), right, n - right, grid)
+def fitted(own: pd.DataFrame, correct: np.ndarray, stimulus: Stimulus, grid: Grid) -> Posterior:
+    """Return the posterior of answers, without a preference for an interval or for the previous answer."""
+    towards = np.where(own["target"] == 0, 1.0, -1.0)
+    rows = pd.DataFrame({"level": own["stimulus"], "success": correct, "towards": towards})
+    before = np.concatenate(([0.0], np.where(correct, towards, -towards)[:-1]))
+    rows = rows.assign(level_delivered=rows["level"], before=before)
+    return fit_answers(stimulus, rows, grid, two_intervals=True)[1]
 
 
 def pairs(trials: pd.DataFrame, size: int, draw: np.random.Generator | None = None) -> Iterator[Pair]:
@@ -68,9 +71,9 @@ def pairs(trials: pd.DataFrame, size: int, draw: np.random.Generator | None = No
         stimulus = Stimulus(vary="damping_nspm", levels=(levels.min(), levels.max()), standards=(1.0,))
         grid = analysis_grid(stimulus, DESIGN, assumed_for(stimulus, DESIGN))
         if draw is not None:
-            correct = draw.random(len(levels)) < fitted(levels, correct, grid).success(np.log10(levels))
+            correct = draw.random(len(levels)) < fitted(own, correct, stimulus, grid).success(np.log10(levels))
         pieces = [slice(first, first + size) for first in range(0, len(levels) - size + 1, size)]
-        fits = [fitted(levels[piece], correct[piece], grid) for piece in pieces]
+        fits = [fitted(own.iloc[piece], correct[piece], stimulus, grid) for piece in pieces]
         alone = [replace(one, grid=replace(grid, session_sd=(0.0, 0.0))) for one in fits]
         for place in range(len(fits) - 1):
             low, high = difference(*fits[place : place + 2])
