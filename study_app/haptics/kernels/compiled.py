@@ -264,22 +264,23 @@ class _Cache(FunctionCache):
 class _Kernel(CPUDispatcher):
     """A compiled function. What a call from Python needs is compiled only if Python calls it."""
 
-    _cache: Any
+    _cache: Any  # where nothing can be kept, numba's own without ``of_step``
     _compiler: Any
+    _of_step = False
 
     def enable_caching(self) -> None:
         """Use the cache on disk."""
         self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
 
     def _choose(self, of_step: bool) -> None:
-        self._cache.of_step = of_step
+        self._of_step = self._cache.of_step = of_step
         self.targetoptions["no_cpython_wrapper"] = of_step
         self._compiler.pipeline_class = _StepCompiler if of_step else Compiler
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Compile it for a compiled function that calls it."""
         with global_compiler_lock:
-            before = self._cache.of_step
+            before = self._of_step
             self._choose(True)
             try:
                 return super().get_call_template(args, kws)
@@ -290,7 +291,7 @@ class _Kernel(CPUDispatcher):
         """Compile it. What was compiled for compiled callers alone is compiled again for Python."""
         with global_compiler_lock:
             arguments = tuple(normalize_signature(sig)[0])  # type: ignore[no-untyped-call]
-            if not self._cache.of_step and arguments in self.overloads and not _is_callable(self.overloads[arguments]):
+            if not self._of_step and arguments in self.overloads and not _is_callable(self.overloads[arguments]):
                 del self.overloads[arguments]
             return super().compile(sig)
 
