@@ -4,6 +4,7 @@ import threading
 import time
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from typing import Any
 
@@ -91,7 +92,8 @@ class Background(QObject):
                 found = error
                 raise
             finally:
-                self._ends.came.emit((self, job, whole, found))
+                with suppress(RuntimeError):  # Qt has gone meanwhile: nobody waits for it
+                    self._ends.came.emit((self, job, whole, found))
 
         self._thread = threading.Thread(target=work, name="background", daemon=True)
         _threads.add(self._thread)

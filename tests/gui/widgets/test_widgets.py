@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shiboken6
 from PySide6.QtCore import QObject
 from PySide6.QtGui import QAccessible
 from PySide6.QtTest import QTest
@@ -58,6 +59,19 @@ def test_the_end_of_the_program_waits_for_jobs_but_not_for_ever() -> None:
     go_on.set()
     wait_for_jobs(10)
     assert ended == [True]
+
+
+def test_a_job_that_outlives_qt_ends_without_a_word(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[Any] = []
+    monkeypatch.setattr(threading, "excepthook", told.append)
+    parent, go_on = QObject(), threading.Event()
+    background = Background(parent)
+    monkeypatch.setattr(background, "_ends", type(background._ends)())
+    background.run(lambda: go_on.wait(10))
+    shiboken6.delete(background._ends)
+    go_on.set()
+    assert background.wait(10)
+    assert told == []
 
 
 @pytest.mark.slow
