@@ -104,6 +104,9 @@ def test_two_blocks_of_levels_are_compared_by_their_thresholds(designer: Any) ->
     first, second = (one for one in designer.value("blocks") if one.startswith("viscosity"))
     wanted = {"measure": "threshold", "blocks": (first, second), "expected": "higher"}
     assert dict(designer.value(*CONTRASTS)[0]) == wanted
+    line = designer.field(*CONTRASTS).lines[0]
+    shown = line.first.currentText(), line.second.currentText()
+    assert shown == ("Viscosity (viscosity)", "Viscosity (viscosity_2)")
     (row,) = [one for one in designer.place.outline.indexes() if one.data(ROW_ROLE).path == ("sequence",)]
     assert row.data(ROW_ROLE).faults == 0
 

@@ -1,7 +1,8 @@
 """Editors of what is decided about the main blocks together: their order, and hypotheses as sentences with choices."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from PySide6.QtCore import Signal
@@ -77,8 +78,10 @@ class Compared:
 
 
 def compared(study: Study, _row: Row) -> tuple[Compared, ...]:
-    """Return what hypotheses can compare, in the order of the file."""
+    """Return what hypotheses can compare, in the order of the file; blocks of one title are told apart by their ids."""
     every = tuple(_compared(study.document))
+    times = Counter(one.words for one in every)
+    every = tuple(replace(one, words=f"{one.words} ({one.block})") if times[one.words] > 1 else one for one in every)
     return tuple(one for one in every if one.others(every))
 
 
