@@ -319,11 +319,12 @@ def preferences(
 
     Parameters
     ----------
-    towards, before : (n,) array
-        1 where the first interval is the correct one, and where it was the answer before; otherwise −1, and 0 where
-        there was none before.
+    towards : (n,) array
+        1 where the first interval is the correct one, otherwise −1.
     successes : (n,) array
         Whether answers are correct.
+    before : (n,) array
+        1 where the first interval was the answer before, otherwise −1; 0 where there was none before.
     found : Posterior
         Of these answers.
     levels : (n,) array
