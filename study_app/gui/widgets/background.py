@@ -1,10 +1,10 @@
 """Jobs outside the window's thread: neither a slow disk nor a long computation freezes a window."""
 
+import atexit
 import threading
 import time
 import weakref
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cache
 from typing import Any
 
@@ -12,6 +12,14 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from shiboken6 import isValid
 
 _threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
+_telling, _program_ends = threading.Lock(), threading.Event()
+
+
+@atexit.register
+def _end() -> None:
+    """Let no job that is still at work speak to Qt, which Python takes down next: that ended in a fault of memory."""
+    with _telling:
+        _program_ends.set()
 
 
 def wait_for_jobs(seconds: float) -> None:
@@ -92,8 +100,9 @@ class Background(QObject):
                 found = error
                 raise
             finally:
-                with suppress(RuntimeError):  # Qt has gone meanwhile: nobody waits for it
-                    self._ends.came.emit((self, job, whole, found))
+                with _telling:
+                    if not _program_ends.is_set():
+                        self._ends.came.emit((self, job, whole, found))
 
         self._thread = threading.Thread(target=work, name="background", daemon=True)
         _threads.add(self._thread)

@@ -69,6 +69,9 @@ def test_a_job_that_outlives_qt_ends_without_a_word(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(background, "_ends", type(background._ends)())
     background.run(lambda: go_on.wait(10))
     shiboken6.delete(background._ends)
+    ended = threading.Event()
+    ended.set()
+    monkeypatch.setattr("study_app.gui.widgets.background._program_ends", ended)
     go_on.set()
     assert background.wait(10)
     assert told == []
