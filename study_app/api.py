@@ -1,17 +1,20 @@
 """The stable Python interface: load studies, compute forces, simulate, fit, read results, run sessions, drive a device.
 
 Only this module is covered by semantic versioning; docs/api.md has examples. Importing it is quick: what a function
-needs is imported when it is called. Every error is a `study_app.errors.StudyError` with one line that says what to do.
+needs is imported when it is called. A wrong value is a `StudyError` that says what to do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from study_app.errors import AnalysisError, StudyError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,14 +23,19 @@ if TYPE_CHECKING:
 
     from study_app.devices.rig import Rig
     from study_app.haptics.model.scene import Scene
+    from study_app.haptics.runtime.servo import Servo
     from study_app.protocol.model import Protocol
+    from study_app.protocol.simulated import TrialFeatures
     from study_app.session.pages import Page
-    from study_app.session.simulated.rehearsal import Answer, RehearsedSession
+    from study_app.session.simulated.rehearsal import Answer, Question
     from study_app.store.sessions.open_session import SessionStore
 
 __all__ = [
     "ForceLoop",
+    "Question",
     "Session",
+    "StudyError",
+    "TrialFeatures",
     "fit",
     "load",
     "open_force",
@@ -37,7 +45,19 @@ __all__ = [
     "report",
     "simulate_force",
     "simulate_study",
+    "unblind",
 ]
+_ELSEWHERE: Final = {
+    "Question": "study_app.session.simulated.rehearsal",
+    "TrialFeatures": "study_app.protocol.simulated",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Return a class that is in another module, which is imported now."""
+    if name not in _ELSEWHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_ELSEWHERE[name]), name)
 
 
 def load(study: str | Path) -> Protocol:
@@ -95,14 +115,20 @@ def simulate_force(
     return offline.simulate(chosen, motions.read(Path(motion)))
 
 
-def simulate_study(study: str | Path, people: int, *, seed: int) -> dict[str, pd.DataFrame]:
-    """Answer a study as simulated participants do, without a servo; return its tables, unblinded, as `read` does."""
+def simulate_study(
+    study: str | Path, people: int, *, seed: int, progress: Callable[[str], object] | None = None
+) -> dict[str, pd.DataFrame]:
+    """Answer a study as simulated participants do; return its tables, unblinded, as `read` does.
+
+    Four sessions are rehearsed with the servo first, which tells what each condition feels like; ``progress`` is called
+    with a line now and then.
+    """
     from study_app.session.simulated.answers_only import rehearse_answers
-    from study_app.store.blinded.unblinding import unblind_folder
 
     with TemporaryDirectory(prefix="liquid-study-") as folder:
-        results = rehearse_answers(study, participants=people, seed=seed, results=Path(folder) / "results")
-        unblind_folder(results, by="simulate_study", reason="simulated")
+        results = Path(folder) / "results"
+        rehearse_answers(study, participants=_count(people), seed=seed, results=results, progress=progress)
+        unblind(results, by="simulate_study", reason="simulated")
         return read(results)
 
 
@@ -119,12 +145,12 @@ def fit(
     Parameters
     ----------
     trials : DataFrame
-        Columns ``level`` and ``success`` (bool) in the order of the trials; perhaps ``participant``, ``session`` and
-        ``standard``.
+        Columns ``level`` and ``success`` (bool) in the order of the trials; perhaps ``participant``, ``session``,
+        ``standard`` and ``arrangement`` (``"CS"``: the comparison came first).
     levels : tuple of float
         The smallest and the largest level that could be presented.
     design : str
-        Kind of the design, such as ``"2ifc"``, ``"yesno"``: it gives the guess rate.
+        Kind of the design, such as ``"2ifc"`` or ``"yesno"``: it gives the guess rate.
     spacing : str
         Whether levels are evenly spaced in their logarithm or in themselves.
     distances : bool
@@ -133,22 +159,38 @@ def fit(
     Returns
     -------
     DataFrame
-        One row of the group (``participant`` is None) and one of each participant, per standard: ``threshold``,
+        One row of the group (``participant`` is missing) and one of each participant, per standard: ``threshold``,
         ``low``, ``high``, ``n``, ``width``, ``lapse``, ``fit_p``, ``change`` …
+
+    Raises
+    ------
+    AnalysisError
+        A column is missing or has other values, the design has no threshold, or the levels are not possible.
     """
     from dataclasses import asdict
 
     import pandas as pd
+    from pydantic import ValidationError
 
     from study_app.analysis.levels.thresholds import thresholds_of
-    from study_app.errors import AnalysisError
-    from study_app.protocol.trials.designs import default_design
+    from study_app.protocol.trials.designs import KINDS, default_design
     from study_app.protocol.trials.stimuli import Stimulus
 
     if missing := {"level", "success"} - set(trials.columns):
         raise AnalysisError(f"trials have no column {', '.join(sorted(missing))}: each row needs level and success")
+    kinds = [name for name, kind in KINDS.items() if kind.adaptive]
+    if design not in kinds:
+        raise AnalysisError(f"design {design!r} has no threshold that can be fitted: give one of {', '.join(kinds)}")
+    given = trials["level"]
+    if not (pd.api.types.is_numeric_dtype(given) and given.between(0.0, float("inf"), inclusive="left").all()):
+        raise AnalysisError("column level holds what is no level: give finite numbers from 0 on")
+    if trials.empty or not trials["success"].isin([True, False]).all():
+        raise AnalysisError("column success holds what is neither true nor false, or no trial: give at least one")
     kind = "difference" if distances else "value"
-    stimulus = Stimulus(vary="level", level=kind, levels=levels, spacing=spacing)
+    try:
+        stimulus = Stimulus(vary="level", level=kind, levels=levels, spacing=spacing)
+    except ValidationError as error:
+        raise AnalysisError(f"levels {levels} with spacing {spacing!r}: {error.errors()[0]['msg']}") from error
     return pd.DataFrame([asdict(one) for one in thresholds_of(trials, stimulus, default_design(design))])
 
 
@@ -161,6 +203,13 @@ def read(results: str | Path) -> dict[str, pd.DataFrame]:
     from study_app.analysis.export.tables import deliver
 
     return {table.name: table.frame for table in deliver(load_study(Path(results)))}
+
+
+def unblind(results: str | Path, *, by: str, reason: str) -> None:
+    """Open the sealed key of a study folder: `read` and `report` name conditions then; name and reason are recorded."""
+    from study_app.store.blinded.unblinding import unblind_folder
+
+    unblind_folder(Path(results), by=by, reason=reason)
 
 
 def report(results: str | Path, to: str | Path) -> Path:
@@ -180,7 +229,13 @@ def rehearse(
     from study_app.session.simulated import rehearsal
 
     folder = None if results is None else Path(results)
-    return rehearsal.rehearse(study, participants=people, seed=seed, results=folder, recordings=recordings)
+    return rehearsal.rehearse(study, participants=_count(people), seed=seed, results=folder, recordings=recordings)
+
+
+def _count(people: int) -> int:
+    if people < 1:
+        raise StudyError(f"{people} people: give at least 1")
+    return people
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,15 +249,16 @@ class Session:
     """
 
     folder: Path
-    _rehearsed: RehearsedSession
+    _pages: Iterator[Page]
     _store: SessionStore
 
     def __iter__(self) -> Iterator[Page]:
-        return self._rehearsed.pages()
+        return self._pages
 
     def run(self) -> None:
         """Go on to the last page."""
-        self._rehearsed.run()
+        for _ in self._pages:
+            pass
 
     @property
     def fingerprint(self) -> str:
@@ -225,7 +281,7 @@ def open_session(
     """Open a session without windows, on simulated time; one that was left before its end is resumed.
 
     It is stored as a session with windows is, marked as simulated. Whatever ends the block, the force ends at zero, and
-    every answer given is on the disk.
+    every answer given is on the disk. A resumed session keeps its seed, device and recordings.
 
     Parameters
     ----------
@@ -242,15 +298,16 @@ def open_session(
     device : str
         A device that moves by itself.
     answer : callable, optional
-        An observer: called with a `Question` (``page``; ``felt``, one ``TrialFeatures`` per interval), it returns the
-        answer, answers by item id, or None for those of the built-in simulated participant.
+        An observer: called with a `Question`, it returns the answer, answers by item id, or None for those of the
+        built-in simulated participant. It is not called for levels that are adjusted, which have no page of questions.
     recordings : bool
         Whether every tick of the servo is stored.
 
     Raises
     ------
     StudyError
-        The study, the id or the folder cannot be used; the session was completed; or an answer is not permitted.
+        The study, the id or the folder cannot be used, the session was completed or is a participant's, or an answer
+        is not permitted.
     """
     from study_app.protocol.load import parse, source_bytes
     from study_app.session.simulated import rehearsal
@@ -273,19 +330,35 @@ def open_session(
             answer=answer,
         )
     with opening as (rehearsed, store):
-        yield Session(folder.path, rehearsed, store)
+        yield Session(folder.path, rehearsed.pages(), store)
 
 
 class ForceLoop:
-    """A device whose force a liquid computes at 1 kHz in a thread of its own, for another program's loop."""
+    """A device whose force a liquid computes at 1 kHz in a thread of its own, for another program's loop.
+
+    After its block every call is a `StudyError`.
+    """
 
     def __init__(self, rig: Rig, scenes: Mapping[str, Scene]) -> None:
-        self._rig = rig
+        self._rig: Rig | None = rig
         self._scenes = scenes
         self._reader = rig.servo.telemetry.reader()
 
+    @property
+    def _servo(self) -> Servo:
+        if self._rig is None:
+            raise StudyError("the force loop has ended: open it again")
+        return self._rig.servo
+
+    @property
+    def dropped(self) -> int:
+        """Samples that `read` was called too late for."""
+        return self._reader.dropped
+
     def set_liquid(self, liquid: str, **parameters: object) -> None:
         """Change the liquid, or only numbers of it; the force changes within the slew limit, or fades in.
+
+        ``parameters`` differ from the file's; those of an earlier call are not kept.
 
         Raises
         ------
@@ -293,7 +366,7 @@ class ForceLoop:
             The liquid or a parameter is unknown, a value is out of range, or the servo has stopped.
         """
         scene = _changed(self._scenes, liquid, parameters)
-        servo = self._rig.servo
+        servo = self._servo
         if servo.may_adjust(scene):
             servo.adjust(scene)
         else:
@@ -307,17 +380,20 @@ class ForceLoop:
         ServoFault, DeviceLost
             The servo has stopped itself; the force is zero.
         """
-        self._rig.servo.check()
+        self._servo.check()
         samples: np.recarray[Any, Any] = self._reader.read()
         return samples
 
     def stop(self) -> None:
         """Send zero force from the next tick on, without a fade, until `fade_in`."""
-        self._rig.servo.stop_force()
+        self._servo.stop_force()
 
     def fade_in(self) -> None:
         """Fade the force in after `stop`."""
-        self._rig.servo.fade_in()
+        self._servo.fade_in()
+
+    def _end(self) -> None:
+        self._rig = None
 
 
 @contextmanager
@@ -330,7 +406,7 @@ def open_force(
 ) -> Iterator[ForceLoop]:
     """Open a device with the servo and its safety layer, at zero force until `ForceLoop.set_liquid`.
 
-    Whatever ends the block, the last force is zero.
+    Whatever ends the block, the last force is zero; open it in the main thread, where signals end the block.
 
     Parameters
     ----------
@@ -339,7 +415,7 @@ def open_force(
     device : str
         Such as ``"falcon"``; by default a simulated hand.
     force_limit_n : float, optional
-        The greatest force [N]; it can only lower that of the file.
+        The greatest force [N], above 0 and at most that of the file.
     options : mapping, optional
         The device's options, by name.
 
@@ -356,16 +432,25 @@ def open_force(
 
     scenes = load_scenes(scene)
     first = next(iter(scenes.values()))
+    if force_limit_n is not None and not 0 < force_limit_n <= first.force_limit_n:
+        raise StudyError(
+            f"force_limit_n = {force_limit_n:g} is not possible: give more than 0 and at most that of the file, "
+            f"{first.force_limit_n:g} N"
+        )
     settings = RigSettings(
         workspace_m=WORKSPACE_M,
-        force_limit_n=first.force_limit_n if force_limit_n is None else min(force_limit_n, first.force_limit_n),
+        force_limit_n=first.force_limit_n if force_limit_n is None else force_limit_n,
         rate_hz=first.rate_hz,
         elements=max(elements_needed(one) for one in scenes.values()),
         random=stream(1, "force/tremor"),
         options=options or {},
     )
     with open_rig(device, settings) as rig:
-        yield ForceLoop(rig, scenes)
+        loop = ForceLoop(rig, scenes)
+        try:
+            yield loop
+        finally:
+            loop._end()  # noqa: SLF001 - it is of this module
 
 
 def _scene(file: str | Path, liquid: str, parameters: Mapping[str, object]) -> Scene:
@@ -375,7 +460,6 @@ def _scene(file: str | Path, liquid: str, parameters: Mapping[str, object]) -> S
 
 
 def _changed(scenes: Mapping[str, Scene], liquid: str, parameters: Mapping[str, object]) -> Scene:
-    from study_app.errors import StudyError
     from study_app.haptics.model.overrides import override_all
 
     if liquid not in scenes:

@@ -1,16 +1,19 @@
 """The stable interface: its signatures, what importing it loads, and that each function is what the program does."""
 
 import inspect
+import json
+import math
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from study_app import api
-from study_app.errors import SessionError, StudyError
+from study_app.errors import ProtocolError, SessionError, StudyError
 from study_app.haptics.runtime import offline
 from study_app.protocol.load import load_scene
 from study_app.store.verification.verify_study import verify
@@ -28,6 +31,8 @@ def signatures() -> list[str]:
     for name in api.__all__:
         thing = getattr(api, name)
         if inspect.isclass(thing):
+            fields = [one for one in vars(thing).get("__annotations__", {}).items() if not one[0].startswith("_")]
+            lines += [f"{name}.{key}: {kind}" for key, kind in fields]
             methods = {key: one for key, one in vars(thing).items() if not key.startswith("_")}
             shown = {key: one.fget if isinstance(one, property) else one for key, one in methods.items()}
             lines += [f"{name}.{key}{inspect.signature(one)}" for key, one in shown.items() if callable(one)]
@@ -61,6 +66,14 @@ def test_forces_are_those_of_the_servo() -> None:
     assert len(api.simulate_force("rek2024", "water", "circle")) > 1000
 
 
+TRIALS = pd.DataFrame({"level": [0.05, 0.1, 0.4, 0.4], "success": [False, True, True, True]})
+
+
+def opened(**options: Any) -> None:
+    with api.open_force("rek2024", **options):
+        pytest.fail("it was opened")
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
@@ -70,12 +83,22 @@ def test_forces_are_those_of_the_servo() -> None:
         ),
         (lambda: api.load("nothing"), "nothing"),
         (lambda: api.read("nowhere"), "nowhere"),
+        (lambda: api.rehearse("demo", 0, seed=1), "0 people: give at least 1"),
+        (lambda: opened(force_limit_n=-50.0), "= -50 is not possible"),
+        (lambda: opened(force_limit_n=math.nan), "is not possible"),
+        (lambda: opened(force_limit_n=9.0), "at most that of the file, 8 N"),
+        (lambda: api.fit(TRIALS.drop(columns="success"), levels=(0.02, 1.0)), "no column success"),
+        (lambda: api.fit(TRIALS, levels=(1.0, 0.02)), "levels"),
+        (lambda: api.fit(TRIALS, levels=(0.02, 1.0), design="magnitude"), "no threshold .* give one of abx, 2ifc"),
+        (lambda: api.fit(TRIALS.assign(level=math.nan), levels=(0.02, 1.0)), "what is no level"),
+        (lambda: api.fit(TRIALS.assign(success=0.5), levels=(0.02, 1.0)), "neither true nor false"),
+        (lambda: api.fit(TRIALS[:0], levels=(0.02, 1.0)), "no trial"),
     ],
 )
 def test_what_cannot_be_used_is_one_line(call: Any, words: str) -> None:
     with pytest.raises(StudyError, match=words) as raised:
         call()
-    assert "Traceback" not in str(raised.value)
+    assert "\n" not in str(raised.value).strip() or isinstance(raised.value, ProtocolError)
 
 
 @pytest.mark.slow
@@ -122,9 +145,14 @@ def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_
     assert asked
     with api.open_session(short, "P001", results=parted, seed=5, answer=observer, recordings=False) as session:
         for page in session:
+            if getattr(page, "trial", None) == trials[-1] // 3:
+                break
+        for page in session:  # goes on
             if getattr(page, "trial", None) == trials[-1] // 2:
                 break
     assert not session.fingerprint
+    assert verify(parted).errors == ()
+    assert not [one for one in verify(parted).warnings if "subject-P001" in one.place]
     with api.open_session(short, "P001", results=parted, seed=99, answer=observer, recordings=False) as session:
         session.run()
     tables = [api.read(folder)["responses"] for folder in (whole, parted)]
@@ -137,10 +165,28 @@ def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_
 
 @pytest.mark.slow
 @needs_servo
-def test_an_answer_that_is_not_permitted_ends_the_block_and_loses_nothing(short: Path, tmp_path: Path) -> None:
+def test_a_session_of_a_participant_is_not_completed_by_simulated_answers(short: Path, tmp_path: Path) -> None:
+    with api.open_session(short, "P001", results=tmp_path / "r", seed=5, recordings=False) as session:
+        next(iter(session))
+    held = json.loads((session.folder / "receipt.json").read_text(encoding="utf-8"))
+    held["screens"] = {"participant": {"name": "DP-1"}}
+    (session.folder / "receipt.json").write_text(json.dumps(held), encoding="utf-8")
     with (
-        pytest.raises(SessionError, match="third"),
-        api.open_session(short, "P001", results=tmp_path / "r", seed=1, answer=lambda _: "third") as session,
+        pytest.raises(SessionError, match="is a participant's session"),
+        api.open_session(short, "P001", results=tmp_path / "r", seed=5),
+    ):
+        pass
+
+
+@pytest.mark.slow
+@needs_servo
+@pytest.mark.parametrize(("given", "words"), [("third", "third"), ({"which": "first"}, "'which' is not asked")])
+def test_an_answer_that_is_not_permitted_ends_the_block_and_loses_nothing(
+    short: Path, tmp_path: Path, given: Any, words: str
+) -> None:
+    with (
+        pytest.raises(SessionError, match=words),
+        api.open_session(short, "P001", results=tmp_path / "r", seed=1, answer=lambda _: given) as session,
     ):
         session.run()
     with api.open_session(short, "P001", results=tmp_path / "r", seed=1, answer=by_resistance) as session:
@@ -154,7 +200,9 @@ def test_an_answer_that_is_not_permitted_ends_the_block_and_loses_nothing(short:
 def test_every_way_out_of_a_force_loop_ends_at_zero_force(device: str) -> None:
     def used_by_a_program_that_fails(hands: list[Any]) -> None:
         with api.open_force("rek2024", device=device, force_limit_n=1.0) as loop:
+            loops.append(loop)
             loop.set_liquid("water")
+            assert loop._rig is not None
             hands.append(getattr(loop._rig.device, "hand", loop._rig.device))
             hands[0].reach_to(0.04, 0.0, 0.0, duration_s=0.4)
             felt_n = samples(loop, 700)
@@ -176,9 +224,12 @@ def test_every_way_out_of_a_force_loop_ends_at_zero_force(device: str) -> None:
         return found
 
     hands: list[Any] = []
+    loops: list[api.ForceLoop] = []
     with pytest.raises(ZeroDivisionError):
         used_by_a_program_that_fails(hands)
     assert not np.any(hands[0].force_n)
+    with pytest.raises(StudyError, match="has ended"):
+        loops[0].fade_in()
 
 
 @pytest.mark.slow
@@ -187,10 +238,11 @@ def test_a_fit_of_own_trials_is_that_of_the_report(short: Path) -> None:
     tables = api.simulate_study(short, 2, seed=3)
     tracks, reported = tables["tracks"], tables["thresholds"]
     levels = api.load(short).stimuli["viscosity"].levels
-    trials = tracks.rename(columns={"level_asked": "level", "right": "success"})
+    columns = {"level_asked": "level", "right": "success"}
+    trials = tracks.rename(columns=columns)[[*columns.values(), "participant", "session", "standard", "arrangement"]]
     fitted = api.fit(trials, levels=levels)
     columns = ["standard", "threshold", "low", "high", "n", "fit_p"]
     own = fitted.loc[fitted["participant"].notna(), columns].to_numpy(dtype=float)
     assert own == pytest.approx(reported[columns].to_numpy(dtype=float), rel=1e-9)
-    with pytest.raises(StudyError, match="no column success"):
-        api.fit(tracks[["participant"]].assign(level=1.0), levels=levels)
+    alone = api.fit(trials[["level", "success"]], levels=levels)
+    assert list(alone["n"]) == [1, len(trials)]

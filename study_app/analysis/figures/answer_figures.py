@@ -93,7 +93,7 @@ def draw_answers(
             low, high = int(counts.min()), int(counts.max())
             words = f"n {low}" if low == high else f"n {low}–{high}"
             where: Style = {"transform": axes.transAxes, "ha": "right", "va": "bottom"}
-            axes.text(1, 1.0, words, fontproperties=sheet.font(5.8), color=style.TEXT_SOFT, **where)
+            axes.text(1, 1.0, words, fontproperties=sheet.font(SMALL), color=style.TEXT_SOFT, **where)
     sheet.text(MARGIN_PT + scale_pt, sheet.height_pt - 6, foot, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 

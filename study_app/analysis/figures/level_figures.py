@@ -89,7 +89,7 @@ def panels(
         axes = sheet.axes(x, y, width, PANEL_PT)
         draw(axes, place, column == 0)
         for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
-            label.set_fontproperties(sheet.font(6.5))
+            label.set_fontproperties(sheet.font(SMALL))
     sheet.text(LEFT_PT, sheet.height_pt - 10, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
@@ -576,7 +576,7 @@ def _draw_fractions(found: LevelsResult, look: Look) -> Sheet:
         if low is not None and high is not None:
             axes.plot([x, x], [low, high], color=style.ACCENT, linewidth=1.2, zorder=3)
     for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
-        label.set_fontproperties(sheet.font(6.5))
+        label.set_fontproperties(sheet.font(SMALL))
     below = f"Standard of {found.quantity}" + (f" [{found.unit}]" if found.unit else "")
     sheet.text(WEBER_LEFT_PT, sheet.height_pt - 8, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet

@@ -125,7 +125,7 @@ def draw_options(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sh
     for place, (_, count, n) in enumerate(bars):
         axes.barh(place, n, height=0.56, color=style.GROUND)
         axes.barh(place, count, height=0.56, color=style.ACCENT, gid=f"bar-{place}")
-        axes.text(count + 0.01 * most, place, str(count), va="center", fontproperties=sheet.font(6.5))
+        axes.text(count + 0.01 * most, place, str(count), va="center", fontproperties=sheet.font(SMALL))
     return sheet
 
 
@@ -164,7 +164,7 @@ def draw_ratings(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sh
             axes.barh(place, share, left=left, height=2 * HALF, color=colour, gid=f"{group.code}")
             if share > NARROW:
                 look_of_count: Style = {"ha": "center", "va": "center", "color": _ink(colour)}
-                axes.text(left + share / 2, place, str(count), fontproperties=sheet.font(6.5), **look_of_count)
+                axes.text(left + share / 2, place, str(count), fontproperties=sheet.font(SMALL), **look_of_count)
             left += share
     _legend(sheet, list(asked.levels.values()), inks)
     return sheet

@@ -162,7 +162,8 @@ def _answered(block: LevelBlock, opened: pd.DataFrame) -> pd.DataFrame:
     """Return the answers in the order of the trials, with which interval is correct and the answer before, as ±1."""
     rows = opened[(opened["block"] == block.id) & opened["success"].notna()]
     rows = rows.sort_values(["participant", "session", "trial"])
-    towards = np.where(rows["arrangement"].str.startswith("C"), 1.0, -1.0)
+    letters = rows["arrangement"].astype("string")
+    towards = np.select([letters.str.startswith("C"), letters == ""], [1.0, 0.0], -1.0)
     said = pd.Series(np.where(rows["success"].to_numpy(dtype=bool), towards, -towards), rows.index)
     return rows.assign(
         towards=towards, before=said.groupby([rows["participant"], rows["session"]]).shift(fill_value=0.0)
@@ -188,10 +189,10 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
 def thresholds_of(trials: pd.DataFrame, stimulus: Stimulus, design: Design) -> Iterator[ThresholdEstimate]:
     """Yield thresholds as `thresholds` does, from trials (n rows) of one's own in their order.
 
-    Columns are ``level`` and ``success``; perhaps ``participant``, ``session`` and ``standard``.
+    Columns are ``level`` and ``success``; perhaps ``participant``, ``session``, ``standard`` and ``arrangement``.
     """
     block = LevelBlock("trials", "", "main", design, stimulus, ())
-    assumed: dict[str, Any] = {"participant": "P001", "session": 1, "standard": math.nan}
+    assumed: dict[str, Any] = {"participant": "P001", "session": 1, "standard": math.nan, "arrangement": ""}
     about = {name: value for name, value in assumed.items() if name not in trials}
     numbers = np.arange(len(trials))
     return thresholds(

@@ -23,7 +23,7 @@ from study_app import __version__
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import TRENDS
 from study_app.analysis.data.measures import Array
-from study_app.analysis.figures.page_layout import Style
+from study_app.analysis.figures.page_layout import SMALL, Style
 from study_app.analysis.planning.simulated_studies import (
     EFFECTS,
     FULL,
@@ -381,7 +381,8 @@ def detectable(n: int, second: int | None = None, *, tail: float) -> tuple[float
     if second is not None:
         root, freedom = math.sqrt(n * second / (n + second)), n + second - 2
     critical = float(student.isf(tail, freedom))
-    least = float(brentq(lambda size: nct.sf(critical, freedom, size * root) - WANTED, 0.0, 30.0))
+    most = (2 * critical + 10) / root  # of so large a difference more than 80 % show it
+    least = float(brentq(lambda size: nct.sf(critical, freedom, size * root) - WANTED, 0.0, most))
     return float(student.ppf(0.975, freedom)) / root, least
 
 
@@ -488,9 +489,9 @@ def draw_power(found: Powers, block: Planned) -> Figure:
             axes.yaxis.set_major_formatter(PercentFormatter(1.0))
             axes.set_yticks((0.0, 0.5, WANTED, 1.0))
             axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
-            axes.tick_params(labelleft=column == 0, labelsize=6.5)
+            axes.tick_params(labelleft=column == 0, labelsize=SMALL)
             if column == 0:
-                axes.set_ylabel(HEADS[question], fontsize=6.5)
+                axes.set_ylabel(HEADS[question], fontsize=SMALL)
             _draw_curves(axes, found, curves)
     delays = {str(line.get_label()): line for axes in figure.axes for line in axes.lines if line.get_gid() == "delay"}
     if delays:

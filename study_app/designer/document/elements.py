@@ -294,8 +294,11 @@ def _fields(study: Study) -> tuple[tuple[Path, Row, str], ...]:
     shown = outline(study)
     parts = [one.path for one in (*shown.session, *shown.parts) if len(one.path) > 1]
     elements = dict.fromkeys((*parts, *(one.path for one in shown.study)))
-    of_blocks = rows_of_blocks(study.document)  # not again elsewhere
-    found: dict[Path, tuple[Path, Row, str]] = {row.path: (SEQUENCE, row, row.label) for row in of_blocks}
+    blocks = entries(study.document, "blocks.*")
+    main = (path for path, block in blocks if isinstance(block, Mapping) and block.get("phase", "main") == "main")
+    whose = SEQUENCE if value_at(study.document, SEQUENCE) else next(main, None)  # groups have their own sequences
+    of_blocks = () if whose is None else rows_of_blocks(study.document)  # not again elsewhere
+    found: dict[Path, tuple[Path, Row, str]] = {row.path: (whose or FIRST, row, row.label) for row in of_blocks}
     for element in elements:
         for row, label in _of_table(study, element, ""):
             found.setdefault(row.path, (element, row, label))

@@ -24,6 +24,7 @@ from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Edit, Insert, Move, Set, Unset
 from study_app.designer.document.toml_text import Refused, retyped
 from study_app.ids import free_id
+from study_app.protocol.formats import is_second
 from study_app.protocol.questionnaires import written_out
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import language_name
@@ -361,6 +362,8 @@ class AddToSession(Request):
     places: tuple[Path, ...]
 
     def step(self, at: Situation) -> Step:
+        if not is_second(at.study.document):
+            raise Refused("a questionnaire on its own belongs to format 2: write format = 2 in the tab File")
         title, places = title_of(at.study.document, self.path), sorted(self.places, key=index_of, reverse=True)
         said = f"{title}, now step {index_of(places[-1]) + 1}"
         return Step(f"Add {title} to the session", tuple(Insert(place, self.path[1]) for place in places), said=said)

@@ -131,7 +131,9 @@ class FormHead(QWidget):
         self.ask.setVisible(bool(form.asks) and not read_only)
         self.asks.clear()
         for words, asked in form.asks:
-            self.asks.addAction(words).triggered.connect(lambda _on=False, asked=asked: self.asked.emit(asked))
+            self.asks.addAction(words.replace("&", "&&")).triggered.connect(
+                lambda _on=False, asked=asked: self.asked.emit(asked)
+            )
         self.id_line.setVisible(form.id is not None)
         self._read_only = read_only
         self._apply_lock()

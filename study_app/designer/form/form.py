@@ -32,8 +32,8 @@ from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 ENTRIES: Final = "Entries"
 DEEPEST: Final = 3
-KINDS: Final[Mapping[Path, str]] = {SEQUENCE: "Pages, blocks and questionnaires"}
 """So many tables within each other are shown in one form."""
+KINDS: Final[Mapping[Path, str]] = {SEQUENCE: "Pages, blocks and questionnaires"}
 UNREADABLE: Final = "Correct the text in the tab File"
 WITH_LIQUIDS = ("liquids", "conditions", "blocks")
 """Sections whose elements the lab opens."""
@@ -53,7 +53,7 @@ def form(study: Study, path: Path) -> Form:
         sections: tuple[Section, ...] = (Section(path, "", (_form_row(study, own_row, places),)),)
     else:
         sections = tuple(_sections(study, path, places, 0))
-        main = path[:1] == ("blocks",) and value_at(document, (*path, "phase")) in {None, "main"}
+        main = path[:1] == ("blocks",) and value_at(document, (*path, "phase")) in (None, "main")
         if (path == SEQUENCE or main) and (of_blocks := rows_of_blocks(document)):
             together = tuple(_form_row(study, row, places) for row in of_blocks)
             sections = (*sections, Section(path, "The main blocks together", together))
@@ -83,25 +83,35 @@ def form(study: Study, path: Path) -> Form:
 
 
 def asking(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Request]]:
-    """Yield when a questionnaire can be asked and is not yet, in words, with the request that does it."""
+    """Yield when a questionnaire can be asked, in words, with the request that does it."""
     if len(path) != 2 or path[0] != "questionnaires":
         return
     steps = [((*place, at), str(step)) for place, listed in sequences_in(document) for at, step in enumerate(listed)]
     blocks = [step for step in steps if step[1] in names(document, "blocks")]
+    main = [step for step in blocks if value_at(document, ("blocks", step[1], "phase")) in (None, "main")]
+    there = {place for place, step in steps if step == path[1]}
+    there |= set(_after(there))  # it cannot be asked twice in a row
+
+    def as_step(words: str, places: Iterable[Path]) -> Iterator[tuple[str, Request]]:
+        new = tuple(place for place in places if place not in there)
+        if new and is_second(document):
+            yield words, AddToSession(path, new)
+
+    firsts = {place[:-1]: place for place, _ in reversed(blocks)}
+    yield from as_step("Before the first block\tonce", firsts.values())
     for name in dict.fromkeys(step for _, step in blocks):
         title, block = title_of(document, ("blocks", name)), value_at(document, ("blocks", name))
-        if isinstance(block, Mapping) and "design" not in block and block.get("questionnaire") != path[1]:
+        if isinstance(block, Mapping) and "design" not in block and (other := block.get("questionnaire")) != path[1]:
+            instead = "" if other is None else f", instead of {title_of(document, (path[0], str(other)))}"
             asked = SetValue(("blocks", name, "questionnaire"), path[1])
-            yield f"After each trial of {title}\tabout that trial", asked
-    main = [step for step in blocks if value_at(document, ("blocks", step[1], "phase")) in {None, "main"}]
+            yield f"After each trial of {title}\tabout that trial{instead}", asked
     ends = {name: _after(place for place, step in main if step == name) for name in dict.fromkeys(s for _, s in main)}
-    lasts = {place[:-1]: place if step in names(document, "pages") else _after([place])[0] for place, step in steps}
-    places = {f"After {title_of(document, ('blocks', name))}\tonce, about the block": at for name, at in ends.items()}
+    for name, after in ends.items():
+        yield from as_step(f"After {title_of(document, ('blocks', name))}\tonce, about the block", after)
     if len(ends) > 1:
-        places[f"After each block\t{len(ends)} times, compared"] = _after(place for place, _ in main)
-    places["Before the first block\tonce"] = tuple({place[:-1]: place for place, _ in reversed(blocks)}.values())
-    places["At the end\tonce, about the session"] = tuple(lasts.values())
-    yield from ((words, AddToSession(path, at)) for words, at in places.items() if at and is_second(document))
+        yield from as_step(f"After each block\t{len(ends)} times, compared", _after(place for place, _ in main))
+    lasts = {place[:-1]: place if step in names(document, "pages") else _after([place])[0] for place, step in steps}
+    yield from as_step("At the end\tonce, about the session", lasts.values())
 
 
 def _after(places: Iterable[Path]) -> tuple[Path, ...]:

@@ -12,7 +12,7 @@ from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import Row
 from study_app.designer.document.steps import AddEntry, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
-from study_app.designer.form.fields import ChoiceField, Field, SpecialEditor, add_button
+from study_app.designer.form.fields import ChoiceField, Field, SpecialEditor, add_button, kept, written
 from study_app.designer.form.rows import FormRow
 from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.designer.measures.study_facts import valid_part
@@ -72,9 +72,13 @@ class Compared:
     measures: tuple[tuple[str, str], ...]
 
     def others(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
-        """Return what it can be compared with: other blocks with these measures, or what is in the same block."""
-        alike = (one for one in every if (one.key, one.measures) == (self.key, self.measures) and one.name != self.name)
-        return tuple(one for one in alike if self.key == "blocks" or one.block == self.block)
+        """Return what it can be compared with: other blocks with a measure of its own, or what is in the same block."""
+        alike = (one for one in every if one.key == self.key and one.name != self.name)
+        return tuple(one for one in alike if self.shared(one) and (self.key == "blocks" or one.block == self.block))
+
+    def shared(self, other: "Compared") -> tuple[tuple[str, str], ...]:
+        """Return the measures that both have."""
+        return tuple(one for one in self.measures if one in other.measures)
 
 
 def compared(study: Study, _row: Row) -> tuple[Compared, ...]:
@@ -108,9 +112,11 @@ class Hypothesis(QWidget):
     """One hypothesis; ``changed`` carries its table as it is chosen."""
 
     changed = Signal(object)
+    refused = Signal(str)  # why the bound that was typed is none; "" where it is one
 
     def __init__(self, name: str) -> None:
         super().__init__()
+        self.measures = MEASURES
         self.known: tuple[Compared, ...] = ()
         self.others: tuple[Compared, ...] = ()
         self.value: Mapping[str, Any] = {}
@@ -126,7 +132,7 @@ class Hypothesis(QWidget):
         self.within = label("within", "label")
         self.bound = TypedLine(f"{name}, largest difference that would not matter")
         self.bound.setFixedWidth(64)
-        self.bound.typed.connect(lambda _text: self._take())
+        self.bound.typed.connect(self._take_bound)
         self.away = IconButton("cross", f"Remove {name}", size=FIELD_PX, role="plain")
         above = hbox((self.measure, 2), label("of", "label"), (self.first, 3), self.away, spacing=8)
         below = hbox((self.relation, 2), (self.second, 3), self.within, self.bound, spacing=8)
@@ -136,18 +142,22 @@ class Hypothesis(QWidget):
     def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
         self.value, self.known = value, known
         key = next((key for key in ("conditions", "groups") if value.get(key)), "blocks")
-        blocks, named = (tuple(map(str, _tuple(value.get(one)))) for one in ("blocks", key))
+        listed = (value.get(one) for one in ("blocks", key))
+        blocks, named = (tuple(map(str, one)) if isinstance(one, tuple) else () for one in listed)
         at = [(key, name if key == "blocks" else next(iter(blocks), ""), name) for name in named]
         found = [next((one for one in known if (one.key, one.block, one.name) == place), None) for place in at]
         first, second = (*found, None, None)[:2]
         self.others = () if first is None else first.others(known)
-        measures = MEASURES if first is None else first.measures
+        self.measures = MEASURES if first is None else first.measures if second is None else first.shared(second)
         measure, relation = value.get("measure", "threshold"), _relation(value)
-        self._fill(self.measure, measures, measure)
+        one, two = (*named, "", "")[:2]
+        for box, word in ((self.measure, measure), (self.first, one), (self.second, two)):
+            box.setPlaceholderText(str(word))  # shown where it is not among the choices
+        self._fill(self.measure, self.measures, measure)
         self._fill(self.relation, RELATIONS, relation)
         self._fill(self.first, tuple((one, one.words) for one in known), first)
         self._fill(self.second, tuple((one, one.words) for one in self.others), second)
-        self.bound.show_text("" if (bound := value.get("bound")) is None else str(bound))
+        self.bound.show_text("" if (bound := value.get("bound")) is None else written(bound))
         for part in (self.within, self.bound):
             part.setVisible(bound is not None)
 
@@ -161,29 +171,44 @@ class Hypothesis(QWidget):
 
     def _take(self) -> None:
         """Say the hypothesis as it is chosen; what does not fit the first of the two any more is chosen anew."""
-        first, others, at = self.known[max(0, self.first.currentIndex())], self.others, self.second.currentIndex()
+        relation = RELATIONS[max(0, self.relation.currentIndex())][0]
+        if not self.known or self.first.currentIndex() < 0:  # what it compares is not among the choices
+            keys = ("measure", "blocks", "conditions", "groups")
+            table = {key: self.value[key] for key in keys if key in self.value}
+            self.changed.emit(table | _related(relation, self._bound(relation, str(self.value.get("measure")))))
+            return
+        first, others, at = self.known[self.first.currentIndex()], self.others, self.second.currentIndex()
         fitting = first.others(self.known)
         second = others[at] if 0 <= at < len(others) and others[at] in fitting else fitting[0]
-        measure = first.measures[max(0, self.measure.currentIndex()) % len(first.measures)][0]
-        relation = RELATIONS[self.relation.currentIndex()][0]
-        ratio, typed = measure in {"threshold", "pse"}, number_of(self.bound.text())
-        keeps = self.value.get("bound") is not None and (relation == "equal" or _relation(self.value) != "equal")
-        bound = (RATIO if ratio else BOUND) if not keeps and relation == "equal" else typed if keeps else None
-        self.changed.emit(_table(first, second, measure, relation, bound))
+        chosen, shared = self.measures[max(0, self.measure.currentIndex())], first.shared(second)
+        measure = (chosen if chosen in shared else shared[0])[0]
+        self.changed.emit(_table(first, second, measure) | _related(relation, self._bound(relation, measure)))
+
+    def _bound(self, relation: Any, measure: str) -> Any:
+        """Return the bound that stays, the usual one of a new equality, or None."""
+        before = self.value.get("bound")
+        if relation == "equal" and before is None:
+            return RATIO if measure in {"threshold", "pse"} else BOUND
+        return before if relation == "equal" or _relation(self.value) != "equal" else None
+
+    def _take_bound(self, text: str) -> None:
+        bound = number_of(text)
+        self.refused.emit("" if bound is not None else f"“{text}” is not a number. {kept(self.value.get('bound'))}")
+        if bound is not None:
+            self.changed.emit({**self.value, "bound": bound})
 
 
-def _tuple(value: Any) -> tuple[Any, ...]:
-    """Return a list of a file, which may have something else in its place."""
-    return value if isinstance(value, tuple) else ()
+def _related(relation: Any, bound: Any) -> dict[str, Any]:
+    """Return the keys of a hypothesis that say its relation."""
+    table = {} if relation in {None, "equal"} else {"expected": relation}
+    return table if bound is None else {**table, "bound": bound}
 
 
-def _table(first: Compared, second: Compared, measure: str, relation: Any, bound: float | None) -> dict[str, Any]:
-    """Return the table of a hypothesis as the file has it."""
+def _table(first: Compared, second: Compared, measure: str) -> dict[str, Any]:
+    """Return the keys of a hypothesis that say what it compares."""
     pair = [first.name, second.name]
     table: dict[str, Any] = {"measure": measure, "blocks": pair if first.key == "blocks" else [first.block]}
-    table |= {} if first.key == "blocks" else {first.key: pair}
-    table |= {} if relation in {None, "equal"} else {"expected": relation}
-    return table if bound is None else {**table, "bound": bound}
+    return table if first.key == "blocks" else {**table, first.key: pair}
 
 
 def _relation(value: Mapping[str, Any]) -> Any:
@@ -196,10 +221,10 @@ class HypothesesField(Field):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        count = len(_tuple(row.row.value))
-        self.lines = [Hypothesis(f"Hypothesis {at + 1}") for at in range(count)]
+        self.lines = [Hypothesis(f"Hypothesis {at + 1}") for at in range(count_of(row))]
         for at, line in enumerate(self.lines):
             line.changed.connect(lambda value, at=at: self._change(at, value))
+            line.refused.connect(self._refuse)
             line.away.clicked.connect(lambda _on=False, at=at: self._remove(at))
             self.box.addWidget(line)
         self.add, self.why = add_button("Add a hypothesis", "Hypothesis"), label("", "small", "text2", wraps=True)
@@ -209,15 +234,21 @@ class HypothesesField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        for line, value in zip(self.lines, _tuple(self.row.row.value), strict=False):
+        for line, value in zip(self.lines, self.row.row.value if self.lines else (), strict=False):
             line.show_value(value if isinstance(value, Mapping) else {}, self.row.facts)
         self.add.setEnabled(bool(self.row.facts))
         self.why.setText("" if self.row.facts else NOTHING_TO_COMPARE)
 
     def _add(self) -> None:
         first: Compared = self.row.facts[0]
-        value = _table(first, first.others(self.row.facts)[0], first.measures[0][0], RELATIONS[0][0], None)
+        second = first.others(self.row.facts)[0]
+        value = _table(first, second, first.shared(second)[0][0]) | _related(RELATIONS[0][0], None)
         self.asked.emit(AddEntry(self.row.row.path, value))
+
+    def _refuse(self, why: str) -> None:
+        if why != self.refusal:
+            self.refusal = why
+            self.came.emit()
 
     def _remove(self, at: int) -> None:
         path = self.row.row.path
@@ -225,7 +256,9 @@ class HypothesesField(Field):
 
     def _change(self, at: int, value: Mapping[str, Any]) -> None:
         path, before = (*self.row.row.path, at), self.row.row.value[at]
-        before = before if isinstance(before, Mapping) else {}
+        if not isinstance(before, Mapping):
+            self.asked.emit(SetValue(path, value))
+            return
         asked: list[Request] = [
             SetValue((*path, key), one)
             for key, one in value.items()
@@ -236,7 +269,11 @@ class HypothesesField(Field):
             self.asked.emit(Several("Change hypothesis", tuple(asked)))
 
 
+def count_of(row: FormRow) -> int:
+    """Return how many hypotheses a row has; 0 where the file has something else there."""
+    return len(row.row.value) if isinstance(row.row.value, tuple) else 0
+
+
 HYPOTHESES: Final = SpecialEditor(
-    (("Analysis", "contrasts"),), HypothesesField, wide=True, structure=lambda row: len(_tuple(row.row.value)),
-    facts=compared,
-)  # fmt: skip
+    (("Analysis", "contrasts"),), HypothesesField, wide=True, structure=count_of, facts=compared
+)

@@ -481,5 +481,5 @@ class LanguageListField(EntryList):
 
 CONDITIONS: Final = SpecialEditor(
     (("Block", "conditions"),), ConditionsField, wide=True,
-    facts=lambda study, row: tuple(_line(study, name) for name in row.value if isinstance(row.value, tuple)),
+    facts=lambda study, row: tuple(_line(study, name) for name in (row.value if isinstance(row.value, tuple) else ())),
 )  # fmt: skip

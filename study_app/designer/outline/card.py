@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
     QTreeView,
 )
 
-from study_app.designer.outline.outline_rows import ElementPath, OutlineRow
+from study_app.designer.outline.outline_rows import QUESTIONNAIRES, ElementPath, OutlineRow
 from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
 from study_app.gui.theme.icons import draw_icon, icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
@@ -93,7 +93,7 @@ class RowPainter(QStyledItemDelegate):
                 painter.setBrush(Qt.BrushStyle.NoBrush)
                 painter.drawRoundedRect(place.adjusted(1, 2, -1, -2), RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
         x = sign_right(row) - INDENT
-        if row.drags and self.movable and (chosen or pointed):
+        if dragged_by(index) and self.movable and (chosen or pointed):
             paint_grip(painter, QRectF(x - 8, place.top(), 8, place.height()), t.text2)
         if self.tree.model().hasChildren(index):
             chevron = "chevron_down" if self.tree.isExpanded(index) else "chevron"
@@ -137,6 +137,12 @@ def paint_grip(painter: QPainter, place: QRectF, ink: str) -> None:
 
 LINE_PX = 2.0
 EDGE_PX = 24
+
+
+def dragged_by(index: QModelIndex) -> ElementPath:
+    """Return what is dragged by a row: its entry in a list, or a questionnaire among the parts, into the session."""
+    row, above = index.data(ROW_ROLE), index.parent().data(ROW_ROLE)
+    return row.step or (row.path if above is not None and above.path == (QUESTIONNAIRES,) else ())
 
 
 class Tree(Themed, QTreeView):
@@ -197,9 +203,9 @@ class Tree(Themed, QTreeView):
         arrow = row is not None and self.model().hasChildren(index) and event.position().x() < sign_right(row)
         self.arrow_pressed = arrow
         plain = event.button() == Qt.MouseButton.LeftButton and not event.modifiers()
-        if plain and row is not None and row.drags and self.rows.movable:
+        if plain and row is not None and (drags := dragged_by(index)) and self.rows.movable:
             selected = [one.step for one in self.selected_rows() if one.step[:-1] == row.step[:-1]]
-            together = tuple(dict.fromkeys(selected)) if row.step and row.step in selected else (row.drags,)
+            together = tuple(dict.fromkeys(selected)) if row.step and row.step in selected else (drags,)
             self._pressed = (event.position().toPoint(), together)
             if len(together) > 1:
                 self.setFocus(Qt.FocusReason.MouseFocusReason)

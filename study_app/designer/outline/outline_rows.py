@@ -74,11 +74,6 @@ class OutlineRow:
     field: Path = ()  # the field of it that was found, () where none was looked for
     named: bool = False  # whether what was looked for is in its title or id
 
-    @property
-    def drags(self) -> Path:
-        """What is dragged by it: its entry in a list, or a questionnaire, which can be dropped into the session."""
-        return self.step or (self.path if self.path[:1] == (QUESTIONNAIRES,) and len(self.path) == 2 else ())
-
 
 def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
     """Return the outline of a study; with words to find only the elements that hold them.
@@ -136,7 +131,8 @@ def icon_of(path: Path, document: Mapping[str, Any]) -> str:
 def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_session: bool) -> OutlineRow:
     path, note, kind = element.path, "", str(element.path[0])
     if in_session and len(path) == 1:
-        note = counted(len(value_at(study.document, path)), "step" if path == SEQUENCE else "session")
+        listed = value_at(study.document, path)
+        note = counted(len(listed), "step" if path == SEQUENCE else "session") if isinstance(listed, tuple) else ""
     elif in_session and element.depth == 0:
         note = duration(times_s[element.id]) if element.id in times_s else ""
     elif in_session:

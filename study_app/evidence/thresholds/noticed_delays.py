@@ -159,7 +159,7 @@ def draw(found: Compared) -> Figure:
             agree = success("logistic", delays, test.effect, test.width, test.guess, test.lapse)
             shares.plot(delays, agree, color=colour, label=f"agree in {LIKERT}, criterion {at:.0f} ms")
     for axes in (shares, thresholds):
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False, fontsize=6.5)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False, fontsize=7.2)
     return figure
 
 

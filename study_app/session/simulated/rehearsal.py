@@ -13,7 +13,7 @@ too.
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import partial
@@ -46,12 +46,21 @@ from study_app.session.pages import (
     TextPage,
 )
 from study_app.session.ports import KeptSession, Ports
-from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at, source_to_resume
+from study_app.session.resume import (
+    FIRST,
+    REHEARSED_SCREENS,
+    Start,
+    find_protocol,
+    is_rehearsal,
+    resume_at,
+    source_to_resume,
+)
 from study_app.session.runner import Runner
 from study_app.session.simulated.observers import Choice, Draw, SensedTrial, choices, hand_for, reading_s, rest
 from study_app.session.simulated.participant import LOOK_AT_SETTING_S, AdjustingObserver, SimulatedParticipant
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeRequested, Stepped, Submitted
 from study_app.session.trial import TankView
+from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.blinding import Key
 from study_app.store.folders import StudyFolder, locate, rehearsal_folder
@@ -114,6 +123,9 @@ class DiscardingStore:
 
 def rehearsal_rig(study: Protocol, person: str, seed: int, device: str) -> Rig:
     """Return a device with a simulated hand, and its servo on a virtual clock that only the servo advances."""
+    if not descriptor_of(device).moves_by_itself:
+        alone = " or ".join(one.name for one in discover().devices if one.moves_by_itself)
+        raise SessionError(f"device '{device}' waits for a person: rehearse with {alone}")
     settings = study_settings(study, stream(seed, f"rehearsal/{person}/hand"))
     rig = open_rig(device, settings, clock=VirtualClock())
     if hand_of(rig.device) is None:
@@ -296,6 +308,9 @@ class RehearsedSession(SimulatedParticipant):
         if given is None:
             return super()._answers_to(page)
         answers = given if isinstance(given, Mapping) else {page.items[0].id: given}
+        if unknown := answers.keys() - {item.id for item in page.items}:
+            possible = ", ".join(item.id for item in page.items)
+            raise SessionError(f"{', '.join(map(repr, sorted(unknown)))} is not asked on this page: answer {possible}")
         visible = [item for item in page.items if item.id in shown(page.items, answers) and item.id in answers]
         return choices(visible, answers, self._stream(page.stream), changes_mind=False)
 
@@ -398,9 +413,6 @@ def rehearse(
     SessionError
         The device does not move by itself, or a session broke; what was kept before is safe.
     """
-    if not descriptor_of(device).moves_by_itself:
-        alone = " or ".join(one.name for one in discover().devices if one.moves_by_itself)
-        raise SessionError(f"device '{device}' waits for a person: rehearse with {alone}")
     source = source_bytes(protocol)
     study = parse(source, str(protocol))
     folder = rehearsal_folder(workspace().results, study.study.name) if results is None else Path(results)
@@ -480,8 +492,22 @@ def open_session(
         store = begin(results, study, source, start, clock=SessionClock(rig.servo.now_ns))
         own = session_protocol(StudyFolder(results), store.as_recorded(study), participant, session)
         with store:
-            schedule = build_schedule(own, participant, seed)
-            yield RehearsedSession(own, schedule, rig, store, observer=observer, answer=answer), store
+            rehearsed = RehearsedSession(
+                own, build_schedule(own, participant, seed), rig, store, observer=observer, answer=answer
+            )
+            with _tables_of(store):
+                yield rehearsed, store
+
+
+@contextmanager
+def _tables_of(store: SessionStore) -> Iterator[None]:
+    """Bring the tables of a session that is left before its end up to date."""
+    try:
+        yield
+    finally:
+        if not store.fingerprint:
+            with suppress(StoreError):  # they are written again when it is resumed
+                store.write_tables()
 
 
 def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
@@ -514,6 +540,8 @@ def reopen_session(
     """
     lines = journal.read(locate(session_folder)[1].journal)
     begun = start_of(lines)
+    if not is_rehearsal(receipt.read(locate(session_folder)[1].receipt)):
+        raise SessionError(f"{session_folder} is a participant's session, not a simulated one: resume it by a window")
     read = partial(source_to_resume, session_folder)
     name = find_protocol(begun, read=read) if protocol is None else str(protocol)
     source = read(name)
@@ -535,7 +563,8 @@ def reopen_session(
         with store:
             start = resume_at(own, schedule, lines, store.key)
             known = _features_of_whole_session(own, schedule, rig.device.name, store.key.codes, store.key.nonce)
-            yield RehearsedSession(own, schedule, rig, store, start, known=known, answer=answer), store
+            with _tables_of(store):
+                yield RehearsedSession(own, schedule, rig, store, start, known=known, answer=answer), store
 
 
 def _features_of_whole_session(

@@ -8,9 +8,11 @@ too) has a line that names its file and participant. Below the lines of a file m
 import base64
 import json
 import threading
+import time
 import urllib.request
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from http.client import HTTPException
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -75,16 +77,26 @@ def stamped(lines: str, server: str) -> str:
     asked = client.TimestampRequestBuilder().data(lines.encode()).build()
     if not server.startswith(("http://", "https://")):
         raise StoreError(f"{server} is not a server of time stamps: give a URL such as https://freetsa.org/tsr")
-    request = urllib.request.Request(  # noqa: S310 - http or https, as checked
-        server, asked.as_bytes(), {"Content-Type": "application/timestamp-query"}
-    )
     try:
+        request = urllib.request.Request(  # noqa: S310 - http or https, as checked
+            server, asked.as_bytes(), {"Content-Type": "application/timestamp-query"}
+        )
         with urllib.request.urlopen(request, timeout=WAITS_S) as answer:  # noqa: S310
-            content = answer.read(LONGEST)
+            content = _received(answer)
         client.decode_timestamp_response(content)
-    except (OSError, ValueError) as error:
+    except (OSError, HTTPException, ValueError) as error:
         raise StoreError(f"{server} gave no time stamp ({error}): try again later") from error
     return f"stamp {base64.b64encode(content).decode()}\n"
+
+
+def _received(answer: Any) -> bytes:
+    """Return what a server answers, in time for all of it."""
+    until_s, content = time.monotonic() + WAITS_S, b""
+    while more := answer.read1(LONGEST):
+        content += more
+        if len(content) > LONGEST or time.monotonic() > until_s:
+            raise TimeoutError("too much, or too slow")
+    return content
 
 
 def read_proof(path: Path) -> Proof:

@@ -264,7 +264,10 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     sequence = protocol.get("sequence") if isinstance(protocol := held.get("protocol"), dict) else None
     steps = sequence if isinstance(sequence, list) else []
     left = sum(isinstance(line, events.PageLeft) and line.page in steps[-1:] for line in lines)
-    was_last = bool(steps) and left >= steps.count(steps[-1])
+    blocks = protocol.get("blocks") if isinstance(protocol, dict) else None
+    tables = blocks.values() if isinstance(blocks, dict) else ()
+    breaks = [block.get("break_page") for block in tables if isinstance(block, dict)]
+    was_last = bool(steps) and steps[-1] not in breaks and left >= steps.count(steps[-1])
     if isinstance(last, events.SessionEnded) and last.status != "completed" and was_last:
         found.error(folder.journal, f"its status is {last.status!r}, though the last page was left: it was changed")
 
