@@ -145,3 +145,78 @@ def test_the_guide_of_two_conditions_makes_a_study_without_problems(designer: An
     assert tuple(map(dict, designer.value(*CONTRASTS))) == (contrast,)
     assert designer.study.protocol is not None
     assert designer.study.protocol.study.block_order == "balanced"
+
+
+ONE = 'measure = "like_honey", blocks = ["liquids"], conditions = ["thin", "thick"]'
+IN_GROUPS = """[groups.a]
+sequence = ["welcome", "liquids", "reaching", "delays", "thanks"]
+
+[groups.b]
+sequence = ["welcome", "delays", "reaching", "liquids", "thanks"]
+
+[limits]"""
+
+
+def stated(designer: Any, hypothesis: str, *changes: tuple[str, str]) -> Any:
+    """Return the line of a hypothesis of the study."""
+    tables = f"[analysis]\nparticipants = 11\ncontrasts = [{{ {hypothesis} }}]\n\n[limits]"
+    designer.change(("format = 1", "format = 2"), ("[limits]", tables), *changes)
+    designer.open()
+    designer.go_to("sequence")
+    return designer.field(*CONTRASTS).lines[0]
+
+
+@pytest.mark.parametrize("typed", ["Backspace", "x"])
+def test_a_bound_that_is_no_number_is_refused_and_changes_nothing(qtbot: Any, designer: Any, typed: str) -> None:
+    line = stated(designer, f"{ONE}, bound = 0.6")
+    before = designer.text
+    line.bound.setFocus()
+    line.bound.selectAll()
+    designer.hit(typed)
+    qtbot.waitUntil(lambda: "The study keeps 0.6" in designer.field(*CONTRASTS).refusal)
+    assert designer.text == before
+    assert designer.keyboard is line.bound
+
+
+def test_a_hypothesis_without_anything_to_compare_keeps_what_it_names(designer: Any) -> None:
+    fewer = (
+        ('conditions = ["thin", "thick"]', 'conditions = ["thin"]'),
+        ('conditions = ["prompt", "late"]', 'conditions = ["prompt"]'),
+    )
+    choose(stated(designer, f'{ONE}, expected = "higher"', *fewer).relation, "is lower than")
+    (table,) = designer.value(*CONTRASTS)
+    assert (table["conditions"], table["expected"]) == (("thin", "thick"), "lower")
+
+
+def test_a_measure_stays_by_its_id(designer: Any) -> None:
+    line = stated(designer, f'{ONE}, expected = "higher"', ('id = "harder"', 'id = "like_honey"'))
+    choose(line.first, "Late")
+    (table,) = designer.value(*CONTRASTS)
+    assert (table["measure"], table["blocks"]) == ("like_honey", ("delays",))
+
+
+def test_the_order_is_found_where_groups_have_their_own_sessions(designer: Any) -> None:
+    own = 'sequence = ["welcome", "liquids", "reaching", "delays", "thanks"]\n'
+    designer.change(("format = 1", "format = 2"), (own, ""), ("[limits]", IN_GROUPS))
+    designer.open()
+    designer.hit("ctrl+f")
+    designer.type("order of blocks")
+    designer.hit("Return")
+    assert designer.editing.selected == ("blocks", "liquids")
+    assert designer.form_row(*ORDER).isAncestorOf(designer.keyboard)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ('conditions = ["thin", "thick"]', ""),
+        ('phase = "main" ', "phase = {} "),
+        ('sequence = ["w', 'sequence = 5 # ["w'),
+    ],
+)
+def test_a_study_with_other_things_in_their_places_is_shown(designer: Any, before: str, after: str) -> None:
+    designer.change(("format = 1", "format = 2"), (before, after))
+    designer.open()
+    for block in designer.value("blocks"):
+        designer.go_to("blocks", block)
+        assert designer.form_row("blocks", block, "task").isVisible()

@@ -126,6 +126,14 @@ def test_a_questionnaire_is_dragged_into_the_session(qtbot: Any, with_form: Any)
     assert with_form.text == before
 
 
+def test_a_small_drag_of_a_questionnaire_in_its_block_adds_no_step(qtbot: Any, designer: Any) -> None:
+    designer.open()
+    before = sequence(designer)
+    at = place_of(designer, "questionnaires", "liquid")
+    drag(qtbot, designer, at, at + QPoint(6, 5))
+    assert sequence(designer) == before
+
+
 def test_the_outline_has_a_row_for_the_session_order_with_that_of_the_blocks(designer: Any) -> None:
     designer.change(("format = 1", "format = 2"))
     designer.open()

@@ -299,7 +299,7 @@ def balance_of(protocol: Protocol, block: Block, participants: int) -> tuple[str
 
 STUDIES: Final = 200
 SPREAD_OF: Final = 30
-"""A batch has at least so many participants of a study where one person's error is computed."""
+"""Fewest simulated participants from which the error of one participant's threshold is estimated."""
 THRESHOLD_STUDIES: Final = 60
 MORE: Final = 4 / 3
 MOST_PEOPLE: Final = 60
@@ -350,7 +350,7 @@ def focus_of(protocol: Protocol | None, path: Path) -> Focus:
     if protocol is None or (len(path) < 2 and path != SEQUENCE):
         return Focus()
     block = protocol.blocks.get(str(path[1])) if path[0] == "blocks" else None
-    if path == SEQUENCE:  # the first hypothesis leads
+    if path == SEQUENCE:  # the block of the first hypothesis is simulated
         block = next((protocol.blocks.get(one.blocks[0]) for one in hypotheses_of(protocol)), None)
     if (key := _NAMED_BY.get(str(path[0]))) is not None:
         users = [one for one in protocol.blocks_in_order if getattr(one, key) == path[1]]

@@ -139,7 +139,7 @@ LINE_PX = 2.0
 EDGE_PX = 24
 
 
-def dragged_by(index: QModelIndex) -> ElementPath:
+def dragged_by(index: Index) -> ElementPath:
     """Return what is dragged by a row: its entry in a list, or a questionnaire among the parts, into the session."""
     row, above = index.data(ROW_ROLE), index.parent().data(ROW_ROLE)
     return row.step or (row.path if above is not None and above.path == (QUESTIONNAIRES,) else ())

@@ -5,6 +5,7 @@ too) has a line that names its file and participant. Below the lines of a file m
 (Ed25519, base64) and ``stamp TOKEN`` (RFC 3161), both over the bytes of the lines.
 """
 
+import atexit
 import base64
 import json
 import threading
@@ -136,7 +137,9 @@ def leave(study: StudyFolder, say: Callable[[str], object]) -> None:
         except StoreError as error:
             say(f"the proof of the study is not in {to}: {error}")
 
-    threading.Thread(target=write, name="proof").start()
+    thread = threading.Thread(target=write, name="proof", daemon=True)  # a folder may never answer
+    thread.start()
+    atexit.register(thread.join, 2 * WAITS_S)
 
 
 def proof_text(study: StudyFolder, *, server: str = "", sign: bool | None = None) -> str:
