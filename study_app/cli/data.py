@@ -327,11 +327,11 @@ def proof(
     from study_app.store.folders import StudyFolder
     from study_app.store.verification.proofs import proof_text
 
+    text = proof_text(StudyFolder(results), server=server or "", sign=sign or None)
     changes = {"proofs": always and str(always.absolute()), "stamp_root": root and str(root.absolute())}
     changes |= {"stamps": server} if always is not None else {}
     if given := {name: value for name, value in changes.items() if value is not None}:
         workstation.save(workstation.MachineSettings(**(workstation.load().model_dump() | given)))
-    text = proof_text(StudyFolder(results), server=server or "", sign=sign or None)
     if to is None:
         click.echo(text, nl=False)
     else:

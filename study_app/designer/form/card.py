@@ -225,7 +225,6 @@ class FormHead(QWidget):
 ACROSS = 2
 FOOT_FROM = 460
 """The height of the form from which it has a foot [px]."""
-WORDS_PX = 50
 
 
 class FormFoot(Themed, QWidget):
@@ -236,7 +235,6 @@ class FormFoot(Themed, QWidget):
         self.title = label("", "label")
         self.place = cut_text("", "small", "text2", right=True)
         self.words = label("", "small", "text2", wraps=True)
-        self.words.setMinimumHeight(WORDS_PX)
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.glossary = small_button("info", "Glossary", role="plain", height=26)
         above = hbox(self.title, (self.place, 1), self.glossary, spacing=8)

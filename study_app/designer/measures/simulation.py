@@ -519,7 +519,7 @@ def _ratios(protocol: Protocol, block: str, people: int, check: Check) -> Iterat
         plans = [threshold_plan(protocol, protocol.blocks[name]) for name in one.blocks]
         groups = [int(people * share + 1e-9) for share in group_shares(protocol, one) or (1.0,)]
         spreads = []
-        for plan in plans if one.measure == "threshold" and min(groups) > 1 else ():
+        for plan in plans if one.measure == "threshold" and one.bound is None and min(groups) > 1 else ():
             check()
             if plan is not None:
                 found = study_batch(Case("", plan, (SEED, 0, plan.trials, 0)), (max(people, SPREAD_OF),))

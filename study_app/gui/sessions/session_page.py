@@ -360,7 +360,7 @@ class MotionPlot(QStackedWidget):
         self.addWidget(self.sentence)
         self.addWidget(drawn)
         self.points = 0
-        describe_plot(self, "Motion of the hand", "")
+        describe_plot(self.plot, "Motion of the hand", "")
 
     def show_motion(self, times_s: NDArray[np.float64], positions_m: NDArray[np.float64]) -> None:
         """Draw positions (n, 3) [m] over times (n,) [s]."""
@@ -372,7 +372,7 @@ class MotionPlot(QStackedWidget):
         mm, lasted_s = positions_m[whole] * 1e3, max(1e-9, float(times_s[-1]))
         low, high = mm.min(axis=0), mm.max(axis=0)
         ranges = ", ".join(f"{n} {a:.0f} to {b:.0f}" for n, a, b in zip(NAMES, low, high, strict=True))
-        self.setAccessibleDescription(f"Position of the hand over {lasted_s:.0f} s in mm: {ranges}.")
+        self.plot.setAccessibleDescription(f"Position of the hand over {lasted_s:.0f} s in mm: {ranges}.")
         self.plot.show_span(lasted_s, [(-lasted_s, "0 s"), (0.0, f"{lasted_s:.0f} s")])
         self.plot.show_reach(max(LEAST_MM, float(np.abs(mm).max())))
         self.plot.show_traces(times_s[whole] - lasted_s, mm)
@@ -381,7 +381,6 @@ class MotionPlot(QStackedWidget):
     def show_sentence(self, sentence: str) -> None:
         self.points = 0
         self.sentence.setText(sentence)
-        self.setAccessibleDescription(sentence)
         self.setCurrentIndex(0)
 
 
