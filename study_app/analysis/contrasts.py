@@ -139,6 +139,7 @@ def _result(
         no_interval=untested if ends is None else "",
         note=untested if test is None else "",
         contrast=one,
+        compared=one.words({block.id: block.stimulus.condition for block in study.levels if block.stimulus}),
         ratio=ratio,
         p_adjusted=p_adjusted,
         members=members,
@@ -153,7 +154,7 @@ def _sides(one: Contrast) -> str:
 
 def question(one: ContrastResult) -> str:
     """Return the hypothesis in words."""
-    words = one.contrast.described()
+    words = one.contrast.described(one.compared)
     return f"{words[:1].upper()}{words[1:]}"
 
 
@@ -161,7 +162,7 @@ def answer(one: ContrastResult) -> str:
     """Return what is found, in a sentence."""
     if one.p_adjusted is None:
         return f"Not tested: {one.note}."
-    first, second = one.contrast.compared
+    first, second = one.compared
     what = one.contrast.measure.replace("_", " ").capitalize()
     side = "below" if (one.effect or 0.0) < 0 else "above"
     amount = f"{number(one.effect)} times" if one.ratio else f"{number(abs(one.effect or 0.0))} {side}"

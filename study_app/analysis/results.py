@@ -243,12 +243,13 @@ class LevelsResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContrastResult(Outcome):
-    """The test of a contrast; ``ratio``: the effect is first ÷ second, otherwise first − second.
+    """The test of what is ``compared``; ``ratio``: the effect is first ÷ second, otherwise first − second.
 
     ``equivalent`` says whether the effect is shown to stay within the study's bound; None where it has none.
     """
 
     contrast: Contrast
+    compared: tuple[str, str]
     ratio: bool
     p_adjusted: float | None
     members: int

@@ -331,9 +331,15 @@ class Contrast(Table):
         first, second = self.conditions or self.groups or self.blocks
         return first, second
 
-    def described(self) -> str:
-        """Return it in words."""
+    def words(self, conditions: Mapping[str, str | None]) -> tuple[str, str]:
+        """Return what is compared: blocks with the conditions of their stimuli, by block, where these differ."""
         first, second = self.compared
+        of = [conditions.get(block) for block in self.blocks]
+        return (f"{first} ({of[0]})", f"{second} ({of[1]})") if len(set(of)) > 1 and None not in of else (first, second)
+
+    def described(self, words: tuple[str, str] | None = None) -> str:
+        """Return it in words; ``words`` are those of what is compared, otherwise its ids."""
+        first, second = words or self.compared
         where = "" if len(self.blocks) == 2 else f" in block {self.blocks[0]}"
         moves = "differs between" if self.expected is None else f"is {self.expected} in"
         joint = "and" if self.expected is None else "than in"

@@ -79,8 +79,9 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     with quick_pdfs():
         page = report(delayed, tmp_path / "report", failed=pytest.fail)[0].read_text(encoding="utf-8")
     first = page[page.index('class="first"') :]
-    assert first.index("Threshold is higher in late than in prompt; equivalent within 1.25") < first.index("Prompt: ")
-    assert f"Threshold in late is {found.effect:.2f} times that in prompt" in first
+    asked = "Threshold is higher in late (late_one) than in prompt (prompt_one); equivalent within 1.25"
+    assert first.index(asked) < first.index("Prompt: ")
+    assert f"Threshold in late (late_one) is {found.effect:.2f} times that in prompt (prompt_one)" in first
 
 
 def statements(contrast: Contrast, shift: float = 0.0) -> Study:

@@ -10,6 +10,7 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from study_app import __version__
+from study_app.analysis.contrasts import RATIOS
 from study_app.analysis.data.blocks import SPENDINGS, TRENDS, decisions, spoken
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
@@ -25,7 +26,7 @@ from study_app.protocol.orders.balance import block_order_words
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
 from study_app.protocol.trials.stimuli import assumed_for
-from study_app.protocol.trials.tracks import design_of, method_of, standards_of, stimulus_of
+from study_app.protocol.trials.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
 from study_app.psychophysics.precision import BETWEEN_PEOPLE
 from study_app.store.exclusions import named
 from study_app.store.sites.merged import DASH, folders_of
@@ -88,7 +89,14 @@ def read_commitment(folder: Path) -> Commitment | None:
 def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
     """Yield the contrasts, and what each main block asks; what a test would show is marked as a hypothesis."""
     for contrast in () if protocol.analysis is None else protocol.analysis.contrasts:
-        yield f"Hypothesis: {contrast.described()}."
+        stimuli = {block.id: stimulus_of(protocol, block) for block in protocol.main_blocks if block.stimulus}
+        words = contrast.words({block: condition_of(protocol, stimulus) for block, stimulus in stimuli.items()})
+        ratio = contrast.measure in RATIOS and all(stimuli[block].spacing == "log" for block in contrast.blocks)
+        yield (
+            f"Hypothesis: {contrast.described(words)}. Test: {'Welch' if contrast.groups else 'paired'} t test of "
+            f"{'the logarithm of ' if ratio else ''}one number of each participant, "
+            f"{'two-sided' if contrast.expected is None else 'one-sided'}, corrected by Holm over all contrasts."
+        )
     for block in protocol.main_blocks:
         if block.design is not None:
             yield from _of_intervals(protocol, block)

@@ -223,7 +223,7 @@ def test_every_forgery_is_told_by_a_line_that_was_kept_elsewhere(study: Path, ac
 
 def test_the_page_lists_the_forgeries_and_what_tells_them() -> None:
     page = (Path(__file__).parents[3] / "docs" / "files.md").read_text(encoding="utf-8")
-    told, untold = (part.split("\n\n")[1].splitlines() for part in page.split("told by `verify` alone")[1:])
+    told, untold = (part.split("\n\n")[1].splitlines() for part in page.split("found by `verify` alone")[1:])
     assert told == [f"- {name}" for name, (_, alone) in FORGERIES.items() if alone]
     assert untold == [f"- {name}" for name, (_, alone) in FORGERIES.items() if not alone]
 
