@@ -135,3 +135,16 @@ def test_enter_passes_problems_without_a_repair_and_ends_at_a_field_of_one(broke
     assert broken.form_row(*last.fault.path).isAncestorOf(field)
     field = broken.hit("F8")
     assert broken.form_row(*unclear.fault.path).isAncestorOf(field), "F8 passes none"
+
+
+def test_a_letter_at_a_repair_is_typed_into_its_field(qtbot: Any, designer: Any) -> None:
+    """Space there would press the button, and copy the other language."""
+    designer.change(('languages = ["en"]', 'languages = ["en", "nl"]'), ('title = "Liquids"', 'title.en = "Liquids"'))
+    designer.open()
+    button = designer.hit("F8")
+    path = button.problem.fault.path
+    for letters in ("E", "en titel"):  # to where the keyboard is then
+        designer.type(letters)
+    qtbot.waitUntil(lambda: '"Een titel"' in designer.text)
+    assert designer.value(*path)["nl"] == "Een titel"
+    assert designer.form_row(*path).isAncestorOf(designer.keyboard)

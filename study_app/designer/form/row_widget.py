@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Final
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QCoreApplication, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QAbstractItemView, QBoxLayout, QVBoxLayout, QWidget
 
@@ -285,6 +285,7 @@ class RowWidget(Themed, QWidget):
         for problem, word in [(one, word) for one, word in asked if times[word] == 1][:MOST_REPAIRS]:
             made = RepairButton(problem, word)
             made.clicked.connect(lambda _on=False, one=problem, word=word: self.repair_asked.emit(one, word))
+            made.typed.connect(self._type)
             apply_theme_within(made, self.theme)
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
             made.show()  # at once: Tab passes what a layout is still to show
@@ -295,6 +296,13 @@ class RowWidget(Themed, QWidget):
             min(self.repairs, key=lambda one: one.text() != held).setFocus(Qt.FocusReason.OtherFocusReason)
         for button in before:
             remove_widget(button)
+
+    def _type(self, event: QKeyEvent) -> None:
+        """Type a letter into the field."""
+        self.field.take_keyboard()
+        line = self.window().focusWidget()
+        if isinstance(line, TypedLine | TypedText) and self.isAncestorOf(line):
+            QCoreApplication.sendEvent(line, event)
 
     @property
     def help(self) -> str:

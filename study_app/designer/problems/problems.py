@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Final
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QFocusEvent, QMouseEvent, QPaintEvent
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QPaintEvent
 from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
 from study_app.designer.document.additions import Repair, additions_for, repairs
@@ -169,7 +169,12 @@ LONGEST = 20
 
 
 class RepairButton(ActionButton):
-    """Makes a repair of ``problem``; ``by_keys`` says whether a key led to it, not a click."""
+    """Makes a repair of ``problem``; ``by_keys`` says whether a key led to it, not a click.
+
+    ``typed`` carries the event of a letter, which is meant for the field.
+    """
+
+    typed = Signal(object)
 
     def __init__(self, problem: ProblemRow, words: str) -> None:
         super().__init__("", words, height=32)
@@ -186,6 +191,12 @@ class RepairButton(ActionButton):
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self.by_keys = event.reason() != Qt.FocusReason.MouseFocusReason
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.text().strip() and event.text().isprintable():
+            self.typed.emit(event)
+        else:
+            super().keyPressEvent(event)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.by_keys = False
