@@ -156,6 +156,7 @@ LABELS: Final = {
     "level_error_ms": "Level error of delays",
     "obrien-fleming": "O’Brien–Fleming",
     "participants": "Participants planned",
+    "replicates": "Equal conditions as one",
     "sequence": "Session order",
     "setting_label": "Neutral name of trials",
     "vary": "Varied quantity",

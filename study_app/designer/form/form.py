@@ -30,7 +30,7 @@ from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, Places, names, places_of, value_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 
-ENTRIES: Final = "Entries"
+ENTRIES: Final = "In this order"
 DEEPEST: Final = 3
 """So many tables within each other are shown in one form."""
 KINDS: Final[Mapping[Path, str]] = {SEQUENCE: "Pages, blocks and questionnaires"}
