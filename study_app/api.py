@@ -79,7 +79,7 @@ def load(study: str | Path) -> Protocol:
 
 
 def simulate_force(
-    scene: str | Path, liquid: str, motion: str | Path | tuple[ArrayLike, ArrayLike], **parameters: object
+    scene: str | Path, liquid: str, motion: str | Path | tuple[ArrayLike, ArrayLike], /, **parameters: object
 ) -> np.recarray[Any, Any]:
     """Compute the force along a motion with the servo's own tick, without a device.
 
@@ -104,13 +104,15 @@ def simulate_force(
     import numpy as np
 
     from study_app.haptics.model import motion as motions
+    from study_app.haptics.model.overrides import override_all
     from study_app.haptics.runtime import offline
+    from study_app.protocol.load import load_scene
 
-    chosen = _scene(scene, liquid, parameters)
+    chosen = override_all(load_scene(scene, liquid), parameters)
     if isinstance(motion, tuple):
         t_s, position_m = (np.asarray(values, np.float64) for values in motion)
         return offline.simulate(chosen, motions.Motion(t_s, position_m))
-    if str(motion) in motions.NAMES:
+    if str(motion) in motions.NAMES or not (Path(motion).suffix or Path(motion).exists()):
         return offline.simulate(chosen, motions.path(str(motion), rate_hz=chosen.rate_hz))
     return offline.simulate(chosen, motions.read(Path(motion)))
 
@@ -365,8 +367,11 @@ class ForceLoop:
         StudyError
             The liquid or a parameter is unknown, a value is out of range, or the servo has stopped.
         """
-        scene = _changed(self._scenes, liquid, parameters)
-        servo = self._servo
+        from study_app.haptics.model.overrides import override_all
+
+        if liquid not in self._scenes:
+            raise StudyError(f"{liquid!r} is not a liquid of the file: it has {', '.join(self._scenes)}")
+        scene, servo = override_all(self._scenes[liquid], parameters), self._servo
         if servo.may_adjust(scene):
             servo.adjust(scene)
         else:
@@ -451,17 +456,3 @@ def open_force(
             yield loop
         finally:
             loop._end()  # noqa: SLF001 - it is of this module
-
-
-def _scene(file: str | Path, liquid: str, parameters: Mapping[str, object]) -> Scene:
-    from study_app.protocol.load import load_scenes
-
-    return _changed(load_scenes(file), liquid, parameters)
-
-
-def _changed(scenes: Mapping[str, Scene], liquid: str, parameters: Mapping[str, object]) -> Scene:
-    from study_app.haptics.model.overrides import override_all
-
-    if liquid not in scenes:
-        raise StudyError(f"{liquid!r} is not a liquid of the file: it has {', '.join(scenes)}")
-    return override_all(scenes[liquid], parameters) if parameters else scenes[liquid]

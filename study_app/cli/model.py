@@ -35,14 +35,10 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
 
     Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz differs).
     """
-    from study_app.haptics.model import motion
-    from study_app.haptics.runtime import offline
+    from study_app import api
     from study_app.store.tables import csv_files
 
-    chosen = _changed(scene, liquid, changes)
-    programmed = path in motion.NAMES or not (Path(path).suffix or Path(path).exists())
-    moved = motion.path(path, rate_hz=chosen.rate_hz) if programmed else motion.read(Path(path))
-    table = offline.simulate(chosen, moved)
+    table = api.simulate_force(scene, liquid, path, **_values(changes))
     csv_files.write_columns(to, table)
     click.echo(f"{to}: {len(table)} rows")
 
@@ -52,13 +48,17 @@ def _changed(file: str, liquid: str, changes: tuple[str, ...]) -> Scene:
     from study_app.haptics.model.overrides import override_all
     from study_app.protocol.load import load_scene
 
+    return override_all(load_scene(file, liquid), _values(changes))
+
+
+def _values(changes: tuple[str, ...]) -> dict[str, str]:
     values = {}
     for change in changes:
         name, separator, value = change.partition("=")
         if not separator:
             raise click.UsageError(f"--set {change}: write NAME=VALUE, such as --set density_kg_m3=1200")
         values[name.strip()] = value.strip()
-    return override_all(load_scene(file, liquid), values)
+    return values
 
 
 @click.command()

@@ -77,10 +77,7 @@ def opened(**options: Any) -> None:
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (
-            lambda: api.simulate_force("rek2024", "oil", "circle"),
-            "'oil' is not a liquid of the file: it has water, honey",
-        ),
+        (lambda: api.simulate_force("rek2024", "oil", "circle"), 'there is no liquid "oil"'),
         (lambda: api.load("nothing"), "nothing"),
         (lambda: api.read("nowhere"), "nowhere"),
         (lambda: api.rehearse("demo", 0, seed=1), "0 people: give at least 1"),

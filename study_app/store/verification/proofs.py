@@ -10,10 +10,8 @@ import base64
 import json
 import threading
 import time
-import urllib.request
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from http.client import HTTPException
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -74,6 +72,9 @@ def stamped(lines: str, server: str) -> str:
     StoreError
         It gives none within `WAITS_S`.
     """
+    import urllib.request  # noqa: PLC0415 - loads the network's modules: only where a stamp is asked for
+    from http.client import HTTPException  # noqa: PLC0415 - the same
+
     client = _library("rfc3161_client")
     asked = client.TimestampRequestBuilder().data(lines.encode()).build()
     if not server.startswith(("http://", "https://")):
