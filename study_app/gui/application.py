@@ -1,5 +1,6 @@
 """The one Qt application of this program, made when the first window is asked for."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -22,6 +23,7 @@ def application_here() -> QApplication:
         there.setQuitOnLastWindowClosed(False)
         return there
     check_display()
+    os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")  # its idle thread delays the end by seconds under load
     QGuiApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
     application = QApplication(["liquid-study"])
     application.setApplicationName("liquid-study")

@@ -1,6 +1,5 @@
 """What keeps frames on time: the rest of a frame for drawing, collection in one thread, the thread's priority."""
 
-import atexit
 import ctypes
 import gc
 import os
@@ -117,7 +116,6 @@ _ends_at_once = threading.Event()
 def end_at_once() -> None:
     """Collect nothing more, for the program is ended from outside: to look at everything takes seconds under load."""
     _ends_at_once.set()
-    atexit.register(gc.freeze)
 
 
 @contextmanager
