@@ -1,7 +1,7 @@
 """The pages of the documentation, without Qt and without Sphinx: the website and the window Help read them here.
 
 A page is plain Markdown. A comment in it, ``<!-- generated: MODULE:FUNCTION -->``, stands for what that function
-returns. The pages of a section are those that the section's own page links to in its lists; all others are how-to.
+returns. The pages of a section are those that the section's own page links to in its lists; all others are in ``ELSE``.
 """
 
 import re
@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Final
 
 INDEX: Final = "index"
-ELSE: Final = "how-to"
+ELSE: Final = "do"
 """The section of pages that no section lists."""
 
-FOLDERS: Final = {"decisions": "explanation"}
+FOLDERS: Final = {"decisions": "look-up"}
 """The section of pages in a folder that no section lists."""
 
 _GENERATED: Final = re.compile(r"<!-- generated: ([\w.]+):(\w+) -->")

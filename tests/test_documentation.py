@@ -118,7 +118,7 @@ def test_every_page_is_in_one_section() -> None:
     sections = documentation.sections()
     listed = [page for pages_of in sections.values() for page in pages_of]
     assert sorted([documentation.INDEX, *sections, *listed]) == list(documentation.names())
-    assert list(sections) == ["tutorials", "how-to", "explanation", "reference", "validation"]
+    assert list(sections) == ["begin", "do", "look-up"]
 
 
 def test_every_page_but_decisions_is_in_the_list_of_a_section() -> None:
@@ -140,7 +140,13 @@ def test_the_page_on_installation_has_every_extra_and_none_for_sessions_alone() 
 
 
 def test_generated_parts_are_made_when_a_page_is_read() -> None:
-    for page, words in {"commands": "`--participants", "data-dictionary": "`lateness_p99_ms`"}.items():
+    made = {
+        "commands": "`--participants",
+        "data-dictionary": "`lateness_p99_ms`",
+        "kinds": "`limiter_slope`",
+        "designer-keys": "Ctrl+1",
+    }
+    for page, words in made.items():
         assert words not in documentation.source(page)
         assert words in documentation.page(page)
         assert "<!-- generated" not in documentation.page(page)

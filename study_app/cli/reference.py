@@ -1,14 +1,89 @@
-"""The commands as text: the page Commands of the documentation, made from the commands themselves."""
+"""Pages of the documentation that are made from the program: its commands, and every kind that a study can use."""
 
 import re
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 import click
 
 from study_app.cli import commands
 from study_app.cli.options import GROUPS
+from study_app.designer.new_study.known_studies import TEMPLATES
+from study_app.devices.descriptors import DEVICES
+from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.layout import LIMITERS
+from study_app.protocol import questions
+from study_app.protocol.questionnaires import instrument, instruments
+from study_app.protocol.trials import designs, methods
 
 PROGRAM = "liquid-study"
+DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "simulated: its hand moves by itself"}
+
+
+def kinds_markdown() -> str:
+    """Return the kinds of everything that has a descriptor, as Markdown: a table for each."""
+    tables = (
+        ("Questions", ("`kind`", "question", "its own keys", "value in tables"), _questions()),
+        ("Standard questionnaires", ("`instrument`", "texts", "scores", "source; compared with"), _instruments()),
+        ("Designs", ("`kind`", "question or answer"), _described(designs.KINDS)),
+        ("Methods", ("`kind`", "next level"), _described(methods.KINDS)),
+        ("Effects", ("effect", "what it is", "format", "`auto`", "not with"), _effects()),
+        ("Limiters", ("bit", "limiter", "column", "what it says"), _limiters()),
+        ("Devices", ("`--device`", "device", "kind", "options"), _devices()),
+        (
+            "Templates",
+            ("`--template`", "title", "question"),
+            ((f"`{name}`", *words) for name, words in TEMPLATES.items()),
+        ),
+    )
+    return "\n".join(line for heading, columns, rows in tables for line in _table(heading, columns, rows))
+
+
+def _table(heading: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
+    yield from (f"## {heading}", "", f"| {' | '.join(columns)} |", f"|{' --- |' * len(columns)}")
+    yield from (f"| {' | '.join(map(_cell, row))} |" for row in rows)
+    yield ""
+
+
+def _described(kinds: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    return ((f"`{name}`", " ".join((kind.__doc__ or "").split())) for name, kind in kinds.items())
+
+
+def _questions() -> Iterator[tuple[str, ...]]:
+    common = {*questions.Question.model_fields, "kind"}
+    for name, words in _described(questions.KINDS):
+        kind = questions.KINDS[name.strip("`")]
+        keys = (field.alias or key for key, field in kind.model_fields.items() if key not in common)
+        shown = "no `kind`" if name == f"`{questions.STATEMENT}`" else name
+        yield shown, words, ", ".join(f"`{key}`" for key in keys), kind.value_type
+
+
+def _instruments() -> Iterator[tuple[str, ...]]:
+    for name in instruments():
+        about = instrument(name)
+        doubt = f"; from memory: {about['from_memory']}" if "from_memory" in about else ""
+        scores = ", ".join(f"`{score}`" for score in about["scores"])
+        texts = ", ".join(about["languages"]) or "yours"
+        yield f"`{name}`", texts, scores, f"{about['source']}; {about['compared']}{doubt}"
+
+
+def _effects() -> Iterator[tuple[str, ...]]:
+    for effect in EFFECTS:
+        words = sys.modules[effect.bound_n.__module__].__doc__ or ""
+        excluded = ", ".join(f"`{name}`" for name in effect.excludes)
+        yield f"`{effect.name}`", words, str(effect.format), "yes" if effect.automatic else "no", excluded
+
+
+def _limiters() -> Iterator[tuple[str, ...]]:
+    for it in sorted(LIMITERS):
+        yield str(it.bit), it.label, f"`limiter_{it.name}`", it.meaning
+
+
+def _devices() -> Iterator[tuple[str, ...]]:
+    for device in DEVICES:
+        options = ", ".join(f"`--{option.name}`" for option in device.options)
+        yield f"`{device.name}`", device.title, DEVICE_KINDS[device.kind], options
 
 
 def commands_markdown() -> str:

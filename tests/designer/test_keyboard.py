@@ -1,7 +1,6 @@
 """The keyboard in the designer: every key, Tab through the place as it is seen, fields that are typed in."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,22 +15,11 @@ from study_app.gui.kit.commands import COMMANDS
 pytestmark = pytest.mark.slow
 
 
-PAGE = Path(__file__).parents[2] / "docs" / "designer.md"
-
-
 def test_every_key_of_the_place_is_one_shortcut(designer: Any) -> None:
     made = [keys.toString() for action in designer.place.actions() for keys in action.shortcuts()]
     made.append(designer.place.header.play.play.shortcut().toString())
     wanted = [keys for one in COMMANDS if not one.within for keys in one.keys]
     assert sorted({"Ins": "Insert"}.get(keys, keys) for keys in made) == sorted(wanted)
-
-
-def test_the_documentation_lists_every_key() -> None:
-    section = PAGE.read_text().split("## Keys")[1].split("\n## ")[0]
-    rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| ")][2:]
-    listed = {one.strip() for row in rows for either in row.split(",") for one in either.split(" or ")}
-    long = {"Ins": "Insert", "Del": "Delete"}
-    assert listed == {long.get(keys, keys) for one in COMMANDS for keys in one.shown}
 
 
 LEFT = Qt.MouseButton.LeftButton

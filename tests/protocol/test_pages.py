@@ -1,4 +1,4 @@
-"""The examples of the documentation are studies, and its tables name what there is."""
+"""The examples of the documentation are studies."""
 
 import re
 from pathlib import Path
@@ -6,15 +6,12 @@ from pathlib import Path
 from study_app.protocol.load import parse
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import variants
-from study_app.protocol.questionnaires import instrument, instruments
-from study_app.protocol.questions import KINDS, STATEMENT
-from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from study_app.protocol.trials.tracks import design_of
 from tests.protocol.groups.grouped import grouped
 
-TRIALS, QUESTIONS, GROUPS = (
+TRIALS, ADJUSTMENT, QUESTIONS, GROUPS = (
     (Path(__file__).parents[2] / "docs" / f"{name}.md").read_text(encoding="utf-8")
-    for name in ("trials", "questions", "groups")
+    for name in ("trials", "adjustment", "questions", "groups")
 )
 
 
@@ -23,7 +20,7 @@ def examples(page: str) -> list[str]:
 
 
 def test_examples_of_trials_are_studies_and_replace_parts_of_the_first() -> None:
-    example, estimation, adjustment = examples(TRIALS)
+    (example, estimation), (adjustment,) = examples(TRIALS), examples(ADJUSTMENT)
     assert orders_of(parse(example.encode(), "example")).answers == 140
     start, method, end = (example.index(table) for table in ("[stimuli", "[methods", "[blocks"))
     study = parse((example[:start] + example[method:end] + estimation).encode(), "example")
@@ -49,13 +46,3 @@ def test_example_of_groups_gives_the_steps_that_it_names() -> None:
         ("group thick_first, session 1", ("consent", "thick")),
         ("group thick_first, session 2", ("thin",)),
     ]
-
-
-def test_tables_name_every_design_kind_and_instrument() -> None:
-    rows = [line for line in TRIALS.splitlines() if line.startswith("| `")]
-    assert set(DESIGN_KINDS) <= {name for row in rows for name in re.findall(r"`(\w+)`", row.split("|")[1])}
-    named = set(re.findall(r"^\| `([\w-]+)` \|", QUESTIONS, re.MULTILINE))
-    assert (set(KINDS) - {STATEMENT}) | set(instruments()) <= named
-    for name in instruments():
-        (line,) = (line for line in QUESTIONS.splitlines() if line.startswith(f"| `{name}` |"))
-        assert set(re.findall(r"`(\w+)`", line.split("|")[3])) == set(instrument(name)["scores"])

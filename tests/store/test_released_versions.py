@@ -48,6 +48,11 @@ def test_every_released_version_is_recorded() -> None:
     assert {version for version, _ in STUDIES} == released
 
 
+def written_by(folder: Path) -> list[str]:
+    """Return the versions of the program in the receipts of a study."""
+    return [json.loads(path.read_text("utf-8"))["versions"]["liquid-study"] for path in folder.rglob("receipt.json")]
+
+
 def test_it_is_sound_but_for_what_is_unfinished(held: tuple[Path, dict[str, tuple[str, int]]]) -> None:
     folder, expected = held
     found = verify(folder)
@@ -72,6 +77,9 @@ def test_every_answer_is_exported_and_the_report_is_whole(
     failed: list[str] = []
     assert report(folder, tmp_path / "report", failed=failed.append)[0].name == "report.html"
     assert failed == []
+    (ran,) = set(written_by(folder))
+    methods = (tmp_path / "report" / "methods.txt").read_text("utf-8")
+    assert f"Sessions: liquid-study {ran}; analysis: liquid-study {__version__}." in methods
 
 
 @needs_servo

@@ -217,6 +217,12 @@ class Study:
         return tuple(sorted(set(map(str, counted)))) or (self.version,)
 
     @property
+    def programs(self) -> tuple[str, ...]:
+        """The versions of the program that ran the sessions that count."""
+        counted = self.participants.loc[self.participants["counted"], "version"]
+        return tuple(sorted(set(map(str, counted.dropna()))))
+
+    @property
     def simulated(self) -> bool:
         """Whether any participant was simulated."""
         return bool(self.participants["simulated"].any())

@@ -154,7 +154,8 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
     if blocks:
         yield from _of_statements(study, results, blocks)
     if blocks or results.levels:
-        yield f"Sessions and analysis: liquid-study {__version__}."
+        ran, analysed = (f"liquid-study {listed(them)}" for them in (study.programs or [__version__], [__version__]))
+        yield f"Sessions and analysis: {ran}." if ran == analysed else f"Sessions: {ran}; analysis: {analysed}."
 
 
 def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:

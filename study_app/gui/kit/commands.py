@@ -95,6 +95,12 @@ _OF: Final = {one.id: one for one in COMMANDS}
 _NAMES: Final = {"Return": "Enter", "Escape": "Esc", "Insert": "Ins", "Delete": "Del"}
 
 
+def keys_markdown() -> str:
+    """Return every command with its keys, as a table of Markdown."""
+    rows = (f"| {', '.join(one.shown)} | {one.words}{one.within and f' ({one.within})'} |" for one in COMMANDS)
+    return "\n".join(("| key | does |", "| --- | --- |", *rows, ""))
+
+
 def add_commands(place: QWidget, runs: Mapping[str, Callable[[], object]]) -> dict[str, QAction]:
     """Add the actions of commands, by their names, to a widget."""
     return {name: _OF[name].action(place, run) for name, run in runs.items()}

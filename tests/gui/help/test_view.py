@@ -22,11 +22,11 @@ def test_pages_shown_before_are_let_go_of_with_their_pictures(place, qtbot):
 
 
 def test_a_link_leads_to_a_heading_of_another_page_and_back_returns(place, qtbot):
-    place.reader.anchorClicked.emit(QUrl("trials.md#tables-and-report"))
+    place.reader.anchorClicked.emit(QUrl("trials.md#catch-trials"))
     assert place.reader.page == "trials"
     top = place.reader.cursorForPosition(place.reader.viewport().rect().topLeft())
     seen = {top.block().text(), top.block().next().text(), top.block().next().next().text()}
-    assert "Tables and report" in seen
+    assert "Catch trials" in seen
     assert place.list.currentItem().data(PAGE) == "trials"
     place.reader.anchorClicked.emit(QUrl("no-such-page.md"))
     assert place.reader.page == "trials"
