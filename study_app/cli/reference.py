@@ -14,10 +14,13 @@ from study_app.devices.descriptors import DEVICES
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.layout import LIMITERS
 from study_app.protocol import questions
+from study_app.protocol.checks import delayed_force
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.trials import designs, methods
 
 PROGRAM = "liquid-study"
+LEAST_DELAY_MS = 10
+LOOPS = (("kalman", "light"), ("ewma", "light"), ("kalman", "middle"), ("kalman", "firm"))
 DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "simulated: its hand moves by itself"}
 
 
@@ -36,6 +39,29 @@ def kinds_markdown() -> str:
             ("`--template`", "title", "question"),
             ((f"`{name}`", *words) for name, words in TEMPLATES.items()),
         ),
+    )
+    return "\n".join(line for heading, columns, rows in tables for line in _table(heading, columns, rows))
+
+
+def delayed_force_markdown() -> str:
+    """Return how much of a delayed force is left, and up to which delay at least 95 % are, by liquid and hand."""
+    entries = [one for one in delayed_force.table() if one.estimator == "kalman"]
+    delays = [delay for delay in sorted({one.delay_ms for one in entries}) if delay >= LEAST_DELAY_MS]
+    left = {(one.liquid, one.hand, one.delay_ms): f"{one.left_percent:.0f}" for one in entries}
+    liquids = dict.fromkeys(one.liquid for one in entries)
+    words = {liquid: liquid.replace("physical2_", "`physical2`: ").replace("_", " ") for liquid in liquids}
+    shares = (
+        (words[name], *(f"{left[name, 'light', delay]} ({left[name, 'middle', delay]})" for delay in delays))
+        for name in liquids
+    )
+    longest = ((words[name], *(f"{delayed_force.longest_ms(name, *how):g}" for how in LOOPS)) for name in liquids)
+    tables = (
+        (
+            "Force left [%], light hand (middle hand), `kalman`",
+            ("liquid", *(f"{delay:g} ms" for delay in delays)),
+            shares,
+        ),
+        ("Longest delay [ms] at which at most 5 % is withheld", ("liquid", *map(", ".join, LOOPS)), longest),
     )
     return "\n".join(line for heading, columns, rows in tables for line in _table(heading, columns, rows))
 
