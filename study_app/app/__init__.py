@@ -2,7 +2,7 @@
 
 ``main_controller`` owns the main window and makes its places, two of which take long to load;
 ``session.live_session`` runs one session from its request to the closed journal; ``session.entry`` begins or resumes
-one by command.
+one by command; read these first.
 """
 
 import gc

@@ -1,6 +1,6 @@
 """Running a study without Qt: events in, pages and commands out.
 
-``transitions`` decides (its table over events and state). ``runner`` carries out what it decided, follows the task
-(``tasks``) and measures the trial (``trial``). ``simulated`` runs whole sessions with simulated
-participants.
+``start`` claims or reopens a session, ``transitions.table`` decides what follows an event, and ``runner`` carries it
+out; read these first. ``tasks`` says when a trial ends, ``trial`` records and measures it, and ``simulated`` runs whole
+sessions with simulated participants.
 """

@@ -1,0 +1,107 @@
+"""Print measured numbers of the documentation that are older than the code they measure.
+
+A section of a page measures if it names a command of `MEASURES`, or a benchmark, which measures what it imports. Its
+numbers are as old as the latest date in the section; without one, as the date that docs/validation.md gives for the
+command. Code is as old as its last commit. Run in a clone: ``python tests/benchmarks/project/old_numbers.py``.
+"""
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from datetime import date, datetime
+from pathlib import Path
+from typing import Final, NamedTuple
+
+MODEL: Final = ("study_app/haptics",)
+ANSWERS: Final = ("study_app/psychophysics", "study_app/protocol/simulated.py")
+MEASURES: Final = {
+    "accuracy": (*MODEL, "study_app/evidence/accuracy"),
+    "cfd": ("study_app/evidence/cfd", "study_app/haptics/kernels/effects"),
+    "delay-thresholds": (*ANSWERS, "study_app/evidence/thresholds"),
+    "devices bench": ("study_app/devices/bench",),
+    "power": (*ANSWERS, "study_app/analysis/planning"),
+    "scene": MODEL,
+    "soak": (*MODEL, "study_app/evidence/soak"),
+    "stability": (*MODEL, "study_app/evidence/stability"),
+    "timing --lsl": ("study_app/outlets", "study_app/evidence/outlets"),
+    "timing --triggers": ("study_app/outlets", "study_app/evidence/outlets"),
+    "timing": ("study_app/haptics/runtime", "study_app/gui/participant", "study_app/evidence/timing"),
+    "validate": (*ANSWERS, "study_app/analysis/levels", "study_app/evidence/thresholds"),
+    "validate-report": ("study_app/analysis", "study_app/evidence/report_rates"),
+}
+"""What a command measures; of two that fit, the longer one counts."""
+
+_COMMAND: Final = re.compile(r"\bliquid-study ([a-z][\w -]*)|\b(tests[/.]benchmarks[\w/.]+)")
+_DATE: Final = re.compile(r"\b(\d{1,2} [A-Z][a-z]+ \d{4}|\d{4}-\d\d-\d\d)\b")
+_CODE: Final = re.compile(r"```.*?^```|`[^`\n]*`|\]\([^)]*\)", re.MULTILINE | re.DOTALL)
+_SECTION: Final = re.compile(r"^(?=#{1,4} )", re.MULTILINE)
+
+
+class OldNumber(NamedTuple):
+    """A section whose numbers are older than the code of its command, or have no date."""
+
+    page: str
+    section: str
+    command: str
+    measured: date | None
+    changed: date
+
+
+def dates(text: str) -> Iterator[date]:
+    """Yield the dates in a text: 22 November 2026, 2026-11-22."""
+    for words in _DATE.findall(text):
+        try:
+            yield datetime.strptime(words, "%Y-%m-%d" if words[4] == "-" else "%d %B %Y").date()
+        except ValueError:
+            continue
+
+
+def commands(text: str, top: Path) -> dict[str, tuple[str, ...]]:
+    """Return the measuring commands that a text names, with the code that each measures."""
+    found: dict[str, tuple[str, ...]] = {}
+    for words, benchmark in _COMMAND.findall(text):
+        if benchmark:
+            script = benchmark.removesuffix(".py").replace(".", "/") + ".py"
+            if (top / script).is_file():
+                found[benchmark] = (script, *_imported(top, top / script))
+        elif names := [name for name in MEASURES if f"{words} ".startswith(f"{name} ")]:
+            found[max(names, key=len)] = MEASURES[max(names, key=len)]
+    return found
+
+
+def _imported(top: Path, script: Path) -> Iterator[str]:
+    for module in re.findall(r"^\s*from (study_app[\w.]*) import", script.read_text(encoding="utf-8"), re.MULTILINE):
+        path = module.replace(".", "/")
+        yield f"{path}.py" if (top / f"{path}.py").is_file() else path
+
+
+def last_change(top: Path, paths: tuple[str, ...]) -> date:
+    """Return the day of the last commit to any of the paths."""
+    words = ["git", "-C", str(top), "log", "-1", "--format=%cs", "--", *paths]
+    return date.fromisoformat(subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip())
+
+
+def old_numbers(top: Path) -> Iterator[OldNumber]:
+    """Yield the sections of the pages in a clone whose numbers are older than what they measure, or have no date."""
+    pages = {path: path.read_text(encoding="utf-8") for path in sorted((top / "docs").rglob("*.md"))}
+    runs: dict[str, date] = {}
+    for line in pages.get(top / "docs" / "validation.md", "").splitlines():
+        runs |= {name: max(dates(line)) for name in commands(line, top) if any(dates(line))}
+    for path, text in pages.items():
+        for section in _SECTION.split(text):
+            heading, _, body = section.partition("\n")
+            if not re.search(r"\d", _CODE.sub("", body)) or "decisions" in path.parts or path.stem == "validation":
+                continue
+            for name, measured in commands(body, top).items():
+                run = max(dates(body), default=runs.get(name))
+                changed = last_change(top, measured)
+                if run is None or run < changed:
+                    yield OldNumber(path.relative_to(top).as_posix(), heading.strip("# "), name, run, changed)
+
+
+if __name__ == "__main__":
+    rows = list(old_numbers(Path.cwd()))
+    for row in rows:
+        print(f"{row.page} | {row.section} | {row.command} | measured {row.measured or '?'} | changed {row.changed}")
+    print(f"{len(rows)} sections have numbers that are older than their code, or without a date", file=sys.stderr)
