@@ -13,6 +13,7 @@ from study_app.designer.new_study.known_studies import TEMPLATES
 from study_app.devices.descriptors import DEVICES
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.layout import LIMITERS
+from study_app.outlets.markers import CODES
 from study_app.protocol import questions
 from study_app.protocol.checks import delayed_force
 from study_app.protocol.questionnaires import instrument, instruments
@@ -33,6 +34,7 @@ def kinds_markdown() -> str:
         ("Methods", ("`kind`", "next level"), _described(methods.KINDS)),
         ("Effects", ("effect", "what it is", "format", "`auto`", "not with"), _effects()),
         ("Limiters", ("bit", "limiter", "column", "what it says"), _limiters()),
+        ("Trigger codes", ("code", "event of the journal"), ((str(code), f"`{name}`") for name, code in CODES.items())),
         ("Devices", ("`--device`", "device", "kind", "options"), _devices()),
         (
             "Templates",
