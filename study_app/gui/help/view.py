@@ -53,6 +53,7 @@ PAGES_OF_PLACES: Final = {
 _COMMENT: Final = re.compile(r"<!--.*?-->\n*", re.DOTALL)
 _HTML_IMAGE: Final = re.compile(r'<img src="([^"]+)"[^>]*alt="([^"]*)"[^>]*>')
 _EMPTY_CELL: Final = re.compile(r"(?<=\|) *(?=\|)")
+_HEADING: Final = re.compile(r"^#+ (.+)$", re.MULTILINE)
 _INLINE_MARKS: Final = re.compile(r"[`*\\]|\[([^]]*)\]\([^)]*\)")
 
 
@@ -76,13 +77,20 @@ def entries() -> tuple[HelpEntry, ...]:
 
 
 def found(words: str) -> tuple[HelpEntry, ...]:
-    """Return the pages that contain all words, those with them in the title first; all pages for no words."""
+    """Return the pages that contain all words, those with them in title and headings first; all pages for no words."""
     wanted = words.casefold().split()
     if not wanted:
         return entries()
     pages = [entry for entry in entries() if all(word in _searched(entry.page) for word in wanted)]
-    pages.sort(key=lambda entry: -sum(word in entry.title.casefold() for word in wanted))
+    pages.sort(key=lambda entry: (*_missing(wanted, entry), entry.heads))
     return tuple(HelpEntry(entry.page, entry.title) for entry in pages)
+
+
+def _missing(wanted: list[str], entry: HelpEntry) -> tuple[int, int]:
+    """Return how many words a page's title lacks, and how many the best of its headings."""
+    headings = [entry.title, *_HEADING.findall(documentation.source(entry.page))]
+    lacking = [sum(word not in heading.casefold() for word in wanted) for heading in headings]
+    return lacking[0], min(lacking)
 
 
 @cache

@@ -21,6 +21,8 @@ def test_a_search_finds_pages_with_all_words_and_titles_first() -> None:
     assert "timing" in pages
     assert found("photodiode zebra") == ()
     assert not any(row.heads for row in found("photodiode"))
+    assert next(row.page for row in found("new version")) == "year"  # its heading has both words
+    assert next(row.page for row in found("spss")) == "export"  # a list of pages comes after them
 
 
 def test_a_search_finds_generated_parts() -> None:
