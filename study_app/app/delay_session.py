@@ -5,11 +5,10 @@ read from the recordings and tables that a session leaves.
 """
 
 import tempfile
-import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import nullcontext
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -249,21 +248,8 @@ class _Showing:
 FRAME_MS, TRACE_MS, TILES_MS = 16, 33, 500
 HEARTBEAT_MS = 100  # Python hears Ctrl+C only while it runs; Qt waits outside it
 LONGEST_FRAME_TICKS = 100
-PATIENCE_S = 0.2
 
 T = TypeVar("T")
-
-
-@dataclass(slots=True)
-class _Firing:
-    """A timer that was asked for: every so many milliseconds, so many times."""
-
-    period_ms: int
-    left: int
-    fire: Callable[[], object]
-    start_ns: int = 0
-    error: BaseException | None = None
-    done: threading.Event = field(default_factory=threading.Event)
 
 
 class WindowsThread(QObject):
@@ -276,17 +262,12 @@ class WindowsThread(QObject):
     """
 
     _asked = Signal(object)
-    _over = Signal()
 
     def __init__(self, *, paints: bool) -> None:
         super().__init__()
         self._application = application_here() if paints else QCoreApplication.instance() or QCoreApplication([])
         self._painting = Painting() if paints else None
-        self._qt_timer = QTimer(self, timerType=Qt.TimerType.PreciseTimer)
-        self._qt_timer.timeout.connect(self._fire)
-        self._firing: _Firing | None = None
-        self._working = False
-        self._asked.connect(self._begin, Qt.ConnectionType.QueuedConnection)
+        self._asked.connect(self._do, Qt.ConnectionType.QueuedConnection)
 
     @property
     def frames(self) -> int:
@@ -294,70 +275,50 @@ class WindowsThread(QObject):
 
     def during(self, work: Callable[[], T]) -> T:
         """Run ``work`` in another thread while windows live in this one; return what it returns, or raise its error."""
-        loop = QEventLoop()
-        returned: list[T] = []
-        raised: list[BaseException] = []
-
-        def run() -> None:
-            try:
-                returned.append(work())
-            except BaseException as error:  # noqa: BLE001 - handed over, not swallowed
-                raised.append(error)
-            finally:
-                self._working = False
-                self._over.emit()
-
-        self._over.connect(loop.quit, Qt.ConnectionType.QueuedConnection)
-        thread = threading.Thread(target=run, name="timing")
-        heart = QTimer()
+        loop, heart = QEventLoop(), QTimer()
         heart.timeout.connect(lambda: None)
         heart.start(HEARTBEAT_MS)
-        self._working = True
-        with collecting_here():
+        with collecting_here(), ThreadPoolExecutor(1, thread_name_prefix="timing") as thread:
             if self._painting is not None:
                 self._painting.begin()
-            thread.start()
+            found = thread.submit(work)
+            found.add_done_callback(lambda _found: self._asked.emit(loop.quit))
             try:
                 loop.exec()
             finally:
-                thread.join()
+                wait((found,))
                 heart.stop()
-                self._over.disconnect(loop.quit)
                 if self._painting is not None:
                     self._painting.end()
-        if raised:
-            raise raised[0]
-        return returned[0]
+        return found.result()
 
     def timer(self, period_ms: int, count: int, fire: Callable[[], object]) -> int:
         """Call ``fire`` from a precise timer of Qt; return when it was started [ns]. For ``work``, in its thread."""
-        asked = _Firing(period_ms, count, fire)
-        self._asked.emit(asked)
-        while not asked.done.wait(PATIENCE_S):
-            if not self._working:
-                raise RuntimeError("call timer only from the work that the windows' thread runs")
-        if asked.error is not None:
-            raise asked.error
-        return asked.start_ns
+        fired: Future[int] = Future()
+        self._asked.emit(partial(self._begin, period_ms, count, fire, fired))
+        return fired.result()
 
-    def _begin(self, asked: _Firing) -> None:
-        self._firing = asked
-        asked.start_ns = time.monotonic_ns()
-        self._qt_timer.start(asked.period_ms)
+    def _do(self, asked: Callable[[], object]) -> None:
+        asked()
 
-    def _fire(self) -> None:
-        firing = self._firing
-        if firing is None:
-            return
-        try:
-            firing.fire()
-        except Exception as error:  # noqa: BLE001 - handed over to whoever asked
-            firing.error = error
-        firing.left -= 1
-        if firing.left <= 0 or firing.error is not None:
-            self._qt_timer.stop()
-            self._firing = None
-            firing.done.set()
+    def _begin(self, period_ms: int, count: int, fire: Callable[[], object], fired: Future[int]) -> None:
+        timer, left, start_ns = QTimer(self, timerType=Qt.TimerType.PreciseTimer), count, time.monotonic_ns()
+
+        def tick() -> None:
+            nonlocal left
+            left -= 1
+            try:
+                fire()
+            except Exception as error:  # noqa: BLE001 - handed over to whoever asked
+                timer.stop()
+                fired.set_exception(error)
+            else:
+                if left <= 0:
+                    timer.stop()
+                    fired.set_result(start_ns)
+
+        timer.timeout.connect(tick)
+        timer.start(period_ms)
 
 
 class Painting(QObject):
@@ -385,8 +346,8 @@ class Painting(QObject):
         self._began_ns = 0
         self._timers = [
             self._timer(FRAME_MS, self._frame),
-            self._timer(TRACE_MS, self._traces),
-            self._timer(TILES_MS, self._tiles),
+            self._timer(TRACE_MS, lambda: self.operator.show_traces(self.health, self._servo.now_ns() * 1e-9)),
+            self._timer(TILES_MS, lambda: self.operator.show_lateness(self.health)),
         ]
 
     def _windows(self) -> tuple[ParticipantWindow, OperatorWindow]:
@@ -443,12 +404,6 @@ class Painting(QObject):
     def _painted(self, _sample_ns: int) -> None:
         self.frames += 1
         self.health.frame(time.monotonic_ns())
-
-    def _traces(self) -> None:
-        self.operator.show_traces(self.health, self._servo.now_ns() * 1e-9)
-
-    def _tiles(self) -> None:
-        self.operator.show_lateness(self.health)
 
 
 def lend(load_name: LoadName) -> WindowsThread:

@@ -558,7 +558,10 @@ class LabController(QObject):
                 self.trouble = self.view().trouble
                 self._let_go()
             case "fade in", *_:
-                self._fade_in()
+                if self.live is None or self.live.servo.fault is not None:
+                    self._open(self.device)
+                else:
+                    self.live.fade_in()
             case "path", name if live is not None:
                 live.play(name)
             case "point", x_m, y_m, z_m if live is not None:
@@ -760,13 +763,6 @@ class LabController(QObject):
             self.live.stop_force()
         elif self._opening.busy_with is not None:
             self._cancel()
-
-    def _fade_in(self) -> None:
-        """Let the force return; where the servo stopped itself, by opening its device again."""
-        if self.live is None or self.live.servo.fault is not None:
-            self._open(self.device)
-        else:
-            self.live.fade_in()
 
     def _save(self, path: Path, setting: Setting) -> None:
         if self.bench.blind:

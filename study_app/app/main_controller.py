@@ -78,7 +78,8 @@ class WorkstationController(QObject):
         return place
 
     def change(self, values: dict[str, Any]) -> None:
-        made = MachineSettings.model_validate(_plain(self.settings) | values)
+        before = {name: getattr(self.settings, name) for name in MachineSettings.model_fields}
+        made = MachineSettings.model_validate(before | values)
         if made == self.settings:
             self._show()
             return
@@ -128,10 +129,6 @@ class WorkstationController(QObject):
                 undo=self.undo_called,
                 kept_in=str(settings_file()),
             )
-
-
-def _plain(settings: MachineSettings) -> dict[str, Any]:
-    return {name: getattr(settings, name) for name in MachineSettings.model_fields}
 
 
 PATIENCE_S = 5.0
@@ -336,7 +333,10 @@ class MainController(QObject):
         if self.machine.trouble:
             self.window.show_message("The default settings are used", f"{self.machine.trouble}.")
         elif self._follows_machine and chosen_workspace() is None:
-            self._ask_for_workspace()
+            asked = self.question = WorkspaceDialog(self.window, self.window.theme, offered_workspace().folder)
+            asked.accepted.connect(lambda: self._choose_workspace(asked.folder))
+            asked.finished.connect(asked.deleteLater)
+            asked.open()
         self._opened.start()
 
     def show_bug(self, error: BaseException) -> bool:
@@ -346,13 +346,6 @@ class MainController(QObject):
             self._bugs.add(bug)
             self.window.show_message("The last action failed", bug)
         return False
-
-    def _ask_for_workspace(self) -> None:
-        """Ask once which folder holds protocols and results; until it is answered the offered one is used."""
-        asked = self.question = WorkspaceDialog(self.window, self.window.theme, offered_workspace().folder)
-        asked.accepted.connect(lambda: self._choose_workspace(asked.folder))
-        asked.finished.connect(asked.deleteLater)
-        asked.open()
 
     def _choose_workspace(self, folder: Path) -> None:
         try:

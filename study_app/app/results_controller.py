@@ -158,7 +158,10 @@ class ResultsController(QObject):
             for number, answer in self.reader.answers():
                 self._take(number, answer)
             if self._orders and time.monotonic() - self._since_s > PATIENCE_S:
-                self._show_going()
+                if self._blocks and len(self._redrawn) >= self._blocks:
+                    self._show(testing=self._going, drawing=None)
+                else:
+                    self._show(drawing=self._going, testing=None)
         self._listen_to_writer()
         if not self.busy:
             self._listening.stop()
@@ -188,9 +191,19 @@ class ResultsController(QObject):
             case SessionsFound() if newest:
                 self._take_sessions(answer)
             case StudyFound() if newest:
-                self._take_study(answer)
+                self._blocks = answer.blocks
+                nothing = Trouble("No figures", "This study has no questionnaire.", "Refresh", "again")
+                self._show(
+                    trials=answer.trials,
+                    doubts=answer.doubts,
+                    colours=answer.colours,
+                    trouble=None if answer.blocks else nothing,
+                )
             case FigureDrawn() if newest:
-                self._take_figure(answer)
+                self._redrawn.add(answer.name)
+                there = [figure.name for figure in self.view.figures]
+                figures = [answer if figure.name == answer.name else figure for figure in self.view.figures]
+                self._show(figures=tuple(figures if answer.name in there else [*figures, answer]))
 
     def _take_studies(self, found: StudiesFound) -> None:
         there = [one.folder for one in found.studies]
@@ -231,20 +244,6 @@ class ResultsController(QObject):
             opened="" if reveal is None else unblinded_words(reveal),
         )
 
-    def _take_study(self, found: StudyFound) -> None:
-        self._blocks = found.blocks
-        nothing = Trouble("No figures", "This study has no questionnaire.", "Refresh", "again")
-        self._show(
-            trials=found.trials, doubts=found.doubts, colours=found.colours, trouble=None if found.blocks else nothing
-        )
-
-    def _take_figure(self, drawn: FigureDrawn) -> None:
-        """Show a figure in the place of the one before of its name, or below the others."""
-        self._redrawn.add(drawn.name)
-        there = [figure.name for figure in self.view.figures]
-        figures = [drawn if figure.name == drawn.name else figure for figure in self.view.figures]
-        self._show(figures=tuple(figures if drawn.name in there else [*figures, drawn]))
-
     def _end(self, order: Order, *, newest: bool) -> None:
         if isinstance(order, Decided):
             self._read(order.folder)
@@ -276,12 +275,6 @@ class ResultsController(QObject):
         else:
             trouble = Trouble("The study cannot be read", sentence, "Refresh", "again")
             self._show(trouble=trouble, figures=(), drawing=None, testing=None)
-
-    def _show_going(self) -> None:
-        if self._blocks and len(self._redrawn) >= self._blocks:
-            self._show(testing=self._going, drawing=None)
-        else:
-            self._show(drawing=self._going, testing=None)
 
     def _show(self, **changes: Any) -> None:
         view = replace(self.view, **changes)

@@ -28,7 +28,7 @@ from study_app.gui.settings import view as settings_view
 from study_app.gui.settings.display_test import DisplayTest
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.gui.theme.themed import apply_theme
+from study_app.gui.theme.themed import Themed, apply_theme
 from study_app.gui.widgets.main_view import Place
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.telemetry import Timing
@@ -73,7 +73,7 @@ OPENED = unblinded_words({"at": "2026-11-19", "by": "AK", "reason": "collection 
 def shown(qtbot: Any, made: Any, size: tuple[int, int], theme: Any = LIGHT) -> Any:
     """Return a window or a place on the screen."""
     qtbot.addWidget(made)
-    if hasattr(made, "apply_theme"):
+    if isinstance(made, Themed):
         apply_theme(made, theme)
     made.resize(*size)
     made.show()

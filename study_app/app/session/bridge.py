@@ -208,13 +208,7 @@ class SessionBridge(QObject):
         self._post(PauseRequested(self._now(), "program"))
 
     def fail(self, error: BaseException) -> None:
-        """Zero force, then say what failed: to the journal, if it still takes it, and to the operator.
-
-        Where no more failed than one of the cockpit's panels, that is disabled, and the session goes on.
-        """
-        if name := self.operator.panel_of(error):
-            self.operator.tell_of_failure(name, error)
-            return
+        """Zero force, then say what failed: to the journal, if it still takes it, and to the operator."""
         self.parts.servo.stop_force()
         first = not self.trouble
         what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
@@ -231,10 +225,14 @@ class SessionBridge(QObject):
             log.error("and could not be recorded: %s", second)  # noqa: TRY400 - one line, the first has the trace
 
     def _handle_uncaught(self, error: BaseException) -> bool:
-        """Handle an exception that no slot caught; return whether it was only a panel's, which is disabled."""
-        panel = self.operator.panel_of(error)
-        self.fail(error)
-        return bool(panel)
+        """Handle an exception that no slot caught; return whether it only kept the operator's window from painting."""
+        frame = None if error.__traceback__ is None else error.__traceback__.tb_frame
+        if frame is None or not isinstance(error, Exception) or frame.f_code.co_name not in {"paint", "paintEvent"}:
+            paints_here = False
+        else:
+            paints_here = not frame.f_globals["__name__"].startswith("study_app.gui.participant")
+        (self.operator.tell_of_failure if paints_here else self.fail)(error)
+        return paints_here
 
     @guarded_session_slot
     def _tell_of_thread(self, what: str) -> None:
@@ -353,9 +351,8 @@ class SessionBridge(QObject):
             case "reconnect":
                 self._reconnect()
             case "failed":
-                name, error = details
-                log.error("the panel %r failed and is disabled: %s", name, error, exc_info=error)
-                self.record_note(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
+                log.error("a part of the operator's window failed: %s", *details, exc_info=details[0])
+                self.record_note(f"a part of the operator's window failed: {type(details[0]).__name__}: {details[0]}")
             case "page":
                 self.participant.come_forward()
             case "close":

@@ -21,7 +21,7 @@ from study_app.designer.problems.problems import NameRefusal, ProblemRow, Repair
 from study_app.gui.kit.commands import tip
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, name_bars, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
@@ -370,7 +370,7 @@ class FormCard(Card):
         for place, part in enumerate(self._parts.values()):
             if self.sections.indexOf(part) != place:
                 self.sections.insertWidget(place, part)
-                apply_theme_within(part, self.theme)
+                name_bars(part)
                 part.show()  # at once: a layout shows it later, and what is hidden takes no keyboard
         if gone is not None:
             self._refocus(form, before, gone)

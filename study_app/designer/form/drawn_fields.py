@@ -523,7 +523,6 @@ class StripView(Themed, QWidget):
         while len(self.phases) < len(strip.phases):
             made = PhaseButton(self)
             made.clicked.connect(lambda _checked=False, made=made: self._open(made))
-            made.apply_theme(self.theme)
             self.phases.append(made)
         for at, button in enumerate(self.phases):
             button.setVisible(at < len(strip.phases))

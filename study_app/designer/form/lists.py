@@ -34,7 +34,7 @@ from study_app.designer.measures.study_facts import valid_part
 from study_app.designer.place.segments import cut_text
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import apply_theme_within
+from study_app.gui.theme.themed import name_bars
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Elided, figures
@@ -199,7 +199,7 @@ class EntryList(Field):
         self.fill()
         self.list.setFixedHeight(len(self.rows) * (FIELD_PX + 6) + 4)
         self.choose(at for at in chosen if at < len(self.rows))
-        apply_theme_within(self.list, self.theme)
+        name_bars(self.list)
         if inside:
             self.take_keyboard()
 

@@ -32,7 +32,7 @@ from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText,
 from study_app.designer.place.segments import Segments
 from study_app.designer.problems.problems import ProblemRow, RepairButton
 from study_app.gui.kit.commands import with_key
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, name_bars, remove_widget
 from study_app.gui.widgets.boxes import add_layout, hbox, insert_layout, vbox
 from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import IconButton
@@ -208,7 +208,7 @@ class RowWidget(Themed, QWidget):
         assert isinstance(column, QVBoxLayout)  # noqa: S101 - made so
         made.hide()
         column.insertWidget(column.count() - 1, made)
-        apply_theme_within(made, self.theme)
+        name_bars(made)
         return made
 
     def _remove(self) -> None:
@@ -286,7 +286,7 @@ class RowWidget(Themed, QWidget):
             made = RepairButton(problem, word)
             made.clicked.connect(lambda _on=False, one=problem, word=word: self.repair_asked.emit(one, word))
             made.typed.connect(self._type)
-            apply_theme_within(made, self.theme)
+            name_bars(made)
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
             made.show()  # at once: Tab passes what a layout is still to show
             self.repairs.append(made)

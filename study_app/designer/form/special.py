@@ -26,7 +26,7 @@ from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedSente
 from study_app.designer.place.segments import Segments, small_button
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import Tone, TypeRole
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
@@ -219,7 +219,6 @@ class QuestionRows(Themed, QWidget):
             made.joined.connect(lambda between, path=line.path: self.asked.emit(Do("join", (path, between))))
             add_parts(self.column, made, Rule())
             self.rows.append(made)
-        apply_theme_within(self, self.theme)
 
 
 class Panel(Themed, QWidget):

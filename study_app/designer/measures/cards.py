@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
 from study_app.designer.place.segments import cut_text, small_button
 from study_app.gui.theme.theme import Tone, font
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, insert_layout, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule, fill_rounded, smooth_painter
@@ -410,7 +410,6 @@ class CardGrid(Themed, QWidget):
 
     def _made(self, card: MeasureCard) -> CardWidget:
         part = CardWidget(card, self.opens)
-        apply_theme_within(part, self.theme)
         return part
 
 

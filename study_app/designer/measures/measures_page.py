@@ -15,7 +15,7 @@ from study_app.designer.measures.simulation import Controls
 from study_app.designer.place.segments import cut_text, small_button
 from study_app.designer.problems.problems import ProblemRow
 from study_app.gui.theme.theme import Tone
-from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, paint_ground
 from study_app.gui.widgets.labels import Elided, label
@@ -269,8 +269,6 @@ class MeasuresPage(Themed, QWidget):
         self.forces.setMinimumHeight(FORCES_PX)
         self.forces.setMaximumHeight(HIGHEST_PX)
         self.column.insertWidget(3, self.forces, 2)
-        for made in (self.curves, self.forces):
-            apply_theme_within(made, self.theme)
 
 
 class FactsRow(QScrollArea):

@@ -46,7 +46,7 @@ from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, TANK, font
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget, replace_inside
+from study_app.gui.theme.themed import Themed, name_bars, remove_widget, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule, fill_rounded, scrolled, smooth_painter
@@ -330,7 +330,7 @@ class Questions(Themed, QWidget):
                 across.addWidget(label(question.unit, "label", "text2"))
             self._own += [self._add(row, question.words, beside), beside]
             self.own[question] = field
-            apply_theme_within(beside, self.theme)
+            name_bars(beside)
 
     def _propose(self) -> None:
         self.name.setPlaceholderText(self._proposed or NAME_HINT)
@@ -407,7 +407,7 @@ class NoStudyCard(Card):
         for study in (one for one in studies if one.drafted):
             made = ActionButton("save", f"Continue {study.title} ({study.file}) with its unsaved changes")
             made.clicked.connect(lambda _on=False, source=study.source: self.study_asked.emit(source))
-            apply_theme_within(made, self.theme)
+            name_bars(made)
             self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignHCenter)
             self.drafts.append(made)
 
@@ -458,7 +458,7 @@ class ChosenCard(Card):
                 Rule(),
             )
         for old, new in zip(before, (self.about, self.details), strict=True):
-            apply_theme_within(new, self.theme)
+            name_bars(new)
             at = self.inside.indexOf(old)
             self.inside.removeWidget(old)
             self.inside.insertWidget(at, new)
@@ -532,7 +532,7 @@ class NewStudyPage(Themed, QWidget):
                 grid.setColumnStretch(one, 1)
             add_layout(column, grid)
         column.addStretch()
-        apply_theme_within(inside, self.theme)
+        name_bars(inside)
         replace_inside(self.area, inside)
         self.refuse("")
         first = next((button for button in self.buttons if button.choice.source == chosen), self.buttons[0])

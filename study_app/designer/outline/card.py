@@ -28,7 +28,7 @@ from study_app.designer.outline.outline_rows import QUESTIONNAIRES, ElementPath,
 from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
 from study_app.gui.theme.icons import draw_icon, icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
-from study_app.gui.theme.themed import Themed
+from study_app.gui.theme.themed import Coloured, Themed
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import Card, fill_rounded
@@ -45,11 +45,14 @@ Index = QModelIndex | QPersistentModelIndex
 class RowPainter(QStyledItemDelegate):
     """Paints rows; the tree says the theme and whether rows may be moved."""
 
-    def __init__(self, tree: QTreeView) -> None:
+    def __init__(self, tree: "Tree") -> None:
         super().__init__(tree)
         self.tree = tree
-        self.theme: Theme | None = None
         self.movable = True
+
+    @property
+    def theme(self) -> Theme:
+        return self.tree.theme
 
     def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
         return QSize(100, HEADING_PX if not index.data(ROW_ROLE).path else ROW_PX)
@@ -60,8 +63,6 @@ class RowPainter(QStyledItemDelegate):
         place = QRectF(option.rect)  # type: ignore[attr-defined]  # missing in the stubs
         place.setLeft(0)
         place.setRight(self.tree.viewport().width())
-        if self.theme is None:
-            return
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if row.path:
@@ -177,10 +178,6 @@ class Tree(Themed, QTreeView):
         self.arrow_pressed = False
         self._pressed: tuple[QPoint, tuple[ElementPath, ...]] | None = None
 
-    def apply_theme(self, theme: Theme) -> None:
-        self.theme = self.rows.theme = theme
-        self.viewport().update()
-
     def selected_rows(self) -> list[OutlineRow]:
         """Return the selected elements, in the order of the outline, the current one's list first."""
         found = [index.data(ROW_ROLE) for index in self.selectedIndexes()]
@@ -285,7 +282,7 @@ class Tree(Themed, QTreeView):
             painter.fillRect(place, QColor(self.theme.accent))
 
 
-class OutlineCard(Card):
+class OutlineCard(Coloured, Card):
     """Draws outline rows.
 
     Signals: ``chosen`` (path), ``element_clicked``, ``form_asked`` (Enter), ``find_changed`` (words), ``field_asked``
@@ -340,7 +337,6 @@ class OutlineCard(Card):
         self.tree.entered_row.connect(lambda: None if self._open_field() else self.form_asked.emit())
 
     def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
         self._sign.setIcon(icon("search", theme.text2, 16))
 
     @property

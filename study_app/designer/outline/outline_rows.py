@@ -29,7 +29,7 @@ from study_app.designer.document.names import languages_of, named_at
 from study_app.designer.document.steps import AddElement, AddInstrument, ChangeLanguage, Do, GoTo
 from study_app.designer.document.study import Study
 from study_app.gui.theme.icons import icon
-from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.labels import label
@@ -308,6 +308,7 @@ class AddList(Themed, QFrame):
         self.words.setAccessibleName("Filter what can be added")
         self.list = QListWidget()
         self.list.setAccessibleName("What can be added")
+        self.list.setProperty("role", "links")
         self.list.setFont(font("label"))
         self.list.setFrameShape(QFrame.Shape.NoFrame)
         self.list.setIconSize(QSize(18, 18))
@@ -321,12 +322,6 @@ class AddList(Themed, QFrame):
         self.list.currentItemChanged.connect(lambda item: self.help.setText(item.toolTip() if item else ""))
         self.list.itemClicked.connect(lambda _item: self._choose())
         self.list.itemActivated.connect(lambda _item: self._choose())
-
-    def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
-        row = f"border-radius: 6px; color: {theme.text};"
-        chosen = f"background: {theme.selected}; color: {theme.accent};"
-        self.list.setStyleSheet(f"QListWidget::item {{ {row} }} QListWidget::item:selected {{ {chosen} }}")
 
     def open(self, every: tuple[Addable, ...], above: QPoint) -> None:
         """Show what can be added, with its lower left corner at a place of the screen."""

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 from study_app.designer.measures.cards import INKS
 from study_app.gui.kit.commands import key_cap, keys_of, tip
 from study_app.gui.theme.theme import RADIUS_CARD, Tone, font
-from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Icon, smooth_painter
@@ -92,7 +92,6 @@ class NoticeCard(Card):
             self._buttons.addWidget(made)
             made.show()  # at once: a part that is not shown cannot take the keyboard
             self.buttons[action] = made
-        apply_theme_within(self, self.theme)
         if self._of_playing and self.buttons:
             next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
 

@@ -61,7 +61,7 @@ from study_app.gui.kit.devices import screen_number, settings_here, text_scale_o
 from study_app.gui.participant.forms.questions_page import QuestionsPage
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, Theme, font
-from study_app.gui.theme.themed import Themed
+from study_app.gui.theme.themed import Coloured
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.background import delayed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
@@ -87,7 +87,7 @@ RING: Final = 2
 LEAVES: Final = "Esc leaves the page"
 
 
-class LivePage(Themed, QGraphicsView):
+class LivePage(Coloured, QGraphicsView):
     """Shows a page in a `ParticipantWindow` that the mouse and the keys reach, at 100 % or as large as there is room.
 
     The page has a keyboard focus of its own, whatever the designer's is on, so that it looks as in a session: it
@@ -162,7 +162,6 @@ class LivePage(Themed, QGraphicsView):
         self._time_frames()
 
     def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
         self._colour_ground()
 
     def _colour_ground(self) -> None:

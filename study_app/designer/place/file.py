@@ -29,7 +29,7 @@ from study_app.designer.form.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
 from study_app.designer.place.segments import cut_text
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
-from study_app.gui.theme.themed import Themed
+from study_app.gui.theme.themed import Coloured
 from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.labels import label
@@ -118,7 +118,7 @@ class _Gutter(QWidget):
         self._editor.paint_gutter(QPainter(self), event.rect())
 
 
-class FileEditor(Themed, QPlainTextEdit):
+class FileEditor(Coloured, QPlainTextEdit):
     """The text; ``typed`` carries it within moments. While it is hidden, it is not brought up to date."""
 
     typed = Signal(str)
@@ -210,7 +210,6 @@ class FileEditor(Themed, QPlainTextEdit):
         self._showing = False
 
     def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
         self._showing = True
         self._colours.apply_theme(theme)
         self._showing = False

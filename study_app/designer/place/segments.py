@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import RADIUS_CONTROL, TypeRole, font
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import fill_rounded, smooth_painter
 from study_app.gui.widgets.controls import ActionButton
@@ -90,7 +90,6 @@ class Segments(Themed, QWidget):
         made.setAccessibleName(self._name)  # until it has words
         made.setAccessibleDescription(self._name)
         made.clicked.connect(lambda: self.chosen.emit(self._values[at]))
-        apply_theme_within(made, self.theme)
         self._row.addWidget(made)
         self.buttons.append(made)
 

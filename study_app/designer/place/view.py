@@ -40,7 +40,7 @@ from study_app.designer.place.segments import Segments, small_button
 from study_app.designer.problems.problems import ProblemRow, ProblemsCard, RepairButton
 from study_app.gui.kit.commands import add_commands, key_cap, press, tip
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.theme.themed import name_bars, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Icon
@@ -202,7 +202,6 @@ class PathBar(QWidget):
             made.clicked.connect(lambda _checked=False, path=path: self.open_asked.emit(path))
             for part in (sign, made):
                 self._steps.addWidget(part)
-                apply_theme_within(part, self.outline.theme)
             self.steps.append(made)
             self._parts += [sign, made]
 
@@ -709,7 +708,7 @@ class DesignerPlace(Place):
         self.prompt = prompt
         prompt.answered.connect(lambda _answer: self.close_prompt())
         prompt.given_up.connect(self.close_prompt)
-        apply_theme_within(prompt, self.theme)
+        name_bars(prompt)
         self.parts.prompts.addWidget(prompt)
         first.setFocus()
 

@@ -18,7 +18,7 @@ from study_app.designer.outline.outline_rows import icon_of
 from study_app.designer.place.segments import Segments, small_button
 from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
+from study_app.gui.theme.themed import Coloured, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
@@ -234,7 +234,7 @@ HIGHEST, NARROW_BELOW = 290, 1000
 HEAD_PX, ROW_PX, NAME_PX, NARROW_NAME_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 47, 300, 240, 190, 110
 
 
-class ProblemLine(Themed, QWidget):
+class ProblemLine(Coloured, QWidget):
     """One problem; ``opened`` when it is clicked, ``repair_asked`` with the words of a repair."""
 
     opened = Signal()
@@ -289,13 +289,11 @@ class ProblemLine(Themed, QWidget):
         for words in repairs[len(self.repairs) : 2]:
             made = RepairButton(self.row, words)
             made.clicked.connect(lambda _checked=False, made=made: self.repair_asked.emit(made.text()))
-            apply_theme_within(made, self.theme)
             self._repairs.addWidget(made)
             made.show()  # at once: Tab passes what a layout is still to show
             self.repairs.append(made)
 
     def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
         own = f"QPushButton {{ text-align: left; padding: 0; color: {theme.text}; }}"
         self.go.setStyleSheet(f"{own} QPushButton:disabled {{ color: {theme.text3}; }}")
 
@@ -395,7 +393,6 @@ class ProblemsCard(Card):
         self.lines = []
         for row in listed:
             self._add_line(row)
-        apply_theme_within(inside, self.theme)
         replace_inside(self.area, inside)
 
     def _add_line(self, row: ProblemRow) -> None:
@@ -405,7 +402,6 @@ class ProblemsCard(Card):
         made.repair_asked.connect(lambda words: self.repair_asked.emit(made.row, words))
         made.here = row == self.at
         for part in (made, Rule()):
-            apply_theme_within(part, self.theme)
             self._column.insertWidget(self._column.count() - 1, part)
         self.lines.append(made)
 

@@ -34,7 +34,7 @@ from study_app.designer.versions.version_rows import (
 )
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import Themed
+from study_app.gui.theme.themed import Coloured
 from study_app.gui.widgets.background import Background, delayed
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
 from study_app.gui.widgets.cards import Card, Icon
@@ -176,7 +176,7 @@ class _Colours(QSyntaxHighlighter):
         self.setFormat(0, len(text), made)
 
 
-class DifferenceText(Themed, QPlainTextEdit):
+class DifferenceText(Coloured, QPlainTextEdit):
     """A difference of texts, to be read and copied: lines that are gone begin with "-", new ones with "+"."""
 
     def __init__(self) -> None:
@@ -200,7 +200,6 @@ class DifferenceText(Themed, QPlainTextEdit):
             self.verticalScrollBar().setValue(scrolled)
 
     def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
         self._colours.theme = theme
         self._colours.rehighlight()
 

@@ -13,7 +13,7 @@ from study_app.devices.doctor_worker import ExaminationClient, start_examination
 from study_app.devices.registry import descriptor_of, doctor_of, title_of
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, Tone, font
-from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within
+from study_app.gui.theme.themed import Themed, apply_theme
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton
@@ -104,7 +104,6 @@ class FindingRow(Themed, QWidget):
         if yes and self.body is None:
             self.body = self._body(self.finding)
             self._column.addWidget(self.body)
-            apply_theme_within(self.body, self.theme)
         if self.body is not None:
             self.body.setVisible(yes)
         self.more.show_action("minus" if yes else "chevron_down", "Less" if yes else "Why")
@@ -238,7 +237,9 @@ class DiagnosisDialog(QDialog):
         self.copy.setEnabled(False)
         self.support.setEnabled(False)
         self.close_button.show_action("", "Cancel")
-        self._show_waiting()
+        for row in self.rows:
+            row.show_waiting()
+        self._order(self.rows)
         self._wanted = True
         self._timer.start()
         self._look()
@@ -272,18 +273,10 @@ class DiagnosisDialog(QDialog):
         self._say(words, "text2" if well else "bad", "check" if well else "warning", "ok" if well else "bad")
         self.seen.setText("Seen: " + "  ·  ".join(said.seen))
         self.seen.setVisible(bool(said.seen))
-        self._show_findings(said)
-        self.over.emit(well)
-
-    def _show_waiting(self) -> None:
-        for row in self.rows:
-            row.show_waiting()
-        self._order(self.rows)
-
-    def _show_findings(self, report: Report) -> None:
-        for row, finding in zip(self.rows, report.findings, strict=True):
+        for row, finding in zip(self.rows, said.findings, strict=True):
             row.show_finding(finding)
-        self._order([self.rows[finding.number - 1] for finding in report.in_order])
+        self._order([self.rows[finding.number - 1] for finding in said.in_order])
+        self.over.emit(well)
 
     def _order(self, rows: Sequence[FindingRow]) -> None:
         """Put rows under each other, and lead the keyboard through them in that order."""

@@ -15,7 +15,6 @@ from study_app.devices.descriptor import DeviceOption
 from study_app.gui.kit.devices import BenchShown, DeviceShown, remembered_options
 from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, file_of
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Radio
@@ -181,7 +180,6 @@ class DevicesPlace(Place):
         if isinstance(row.title, Radio):
             self._group.addButton(row.title)
             row.title.clicked.connect(lambda: self.asked.emit("choose", device.name))
-        apply_theme_within(card, self.theme)
 
     def show_benches(self, benches: Mapping[str, BenchShown]) -> None:
         for name, row in self.rows.items():

@@ -32,7 +32,7 @@ from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, Q
 
 from study_app import documentation
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import Themed
+from study_app.gui.theme.themed import Coloured
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card
 from study_app.gui.widgets.controls import ActionButton
@@ -100,14 +100,11 @@ def _searched(page: str) -> str:
 
 @cache
 def text_of(page: str) -> str:
-    """Return a page as Markdown without comments and HTML."""
+    """Return a page as Markdown without comments, HTML and empty cells, which Qt joins with the ones before."""
     text = _HTML_IMAGE.sub(r"![\2](\1)", _COMMENT.sub("", documentation.page(page)))
-    return "\n".join(_row(line) if line.startswith("|") else line for line in text.split("\n"))
-
-
-def _row(line: str) -> str:
-    """Return a row of a table without empty cells, which Qt joins with the ones before."""
-    return _EMPTY_CELL.sub("\N{NO-BREAK SPACE}", line)
+    return "\n".join(
+        _EMPTY_CELL.sub("\N{NO-BREAK SPACE}", line) if line.startswith("|") else line for line in text.split("\n")
+    )
 
 
 def anchor_of(heading: str) -> str:
@@ -148,7 +145,7 @@ def _face(used: QFont) -> QTextCharFormat:
     return made
 
 
-class PageReader(Themed, QTextBrowser):
+class PageReader(Coloured, QTextBrowser):
     """A page; ``page_asked(name, anchor)`` where a link leads to another one. Other links open outside the program."""
 
     page_asked = Signal(str, str)
@@ -174,7 +171,6 @@ class PageReader(Themed, QTextBrowser):
             self._scroll_to(anchor)
 
     def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
         self.setStyleSheet(f"QTextBrowser {{ background: {theme.surface}; color: {theme.text}; }}")
         if self.page:
             self._draw()
@@ -185,7 +181,7 @@ class PageReader(Themed, QTextBrowser):
         path = name.toString() if isinstance(name, QUrl) else name
         picture = QImage(str(self._folder / self._here(path)))
         ratio = self.devicePixelRatioF()
-        width = round(self._text_width() * ratio)
+        width = round(max(200, min(WIDEST_TEXT, self.viewport().width() - 2 * MARGIN)) * ratio)
         if picture.width() > width:
             picture = picture.scaledToWidth(width, Qt.TransformationMode.SmoothTransformation)
         picture.setDevicePixelRatio(ratio)
@@ -202,9 +198,6 @@ class PageReader(Themed, QTextBrowser):
     def _here(self, path: str) -> str:
         """Return where a path of the page leads to, from the folder of the pages."""
         return posixpath.normpath(posixpath.join(posixpath.dirname(self.page), path))
-
-    def _text_width(self) -> int:
-        return max(200, min(WIDEST_TEXT, self.viewport().width() - 2 * MARGIN))
 
     def _draw(self) -> None:
         document = QTextDocument(self, defaultFont=font("body", weight=400), documentMargin=MARGIN)
@@ -311,6 +304,7 @@ class HelpPlace(Place):
         self.words.setFont(font("label", weight=400))
         self.list = QListWidget()
         self.list.setAccessibleName("Pages")
+        self.list.setProperty("role", "links")
         self.list.setFrameShape(QFrame.Shape.NoFrame)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.nothing = label("No page contains all of these words.", "label", "text2", wraps=True)
@@ -338,15 +332,6 @@ class HelpPlace(Place):
         head = hbox((label("Help", "title"), 1), self.back, margins=(SHADOW, 0, SHADOW, 0))
         body = hbox(pages, (page, 1), spacing=14)
         vbox(head, (body, 1), spacing=14, margins=(24, 24, 24, 18), parent=self)
-
-    def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
-        row = f"border-radius: 6px; padding-left: 6px; color: {theme.text};"
-        chosen = f"background: {theme.selected}; color: {theme.accent};"
-        self.list.setStyleSheet(
-            f"QListWidget {{ background: transparent; }} QListWidget::item {{ {row} }}"
-            f"QListWidget::item:selected {{ {chosen} }}"
-        )
 
     def open_page(self, name: str, anchor: str = "") -> None:
         """Show a page, at a heading that an anchor names; a page that does not exist is not shown."""

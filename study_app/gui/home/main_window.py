@@ -22,7 +22,7 @@ from study_app.errors import StudyError
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import DARK, LIGHT, RADIUS_CONTROL, Theme, font
-from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within
+from study_app.gui.theme.themed import Coloured, Themed, apply_theme, name_bars
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Logo, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
@@ -124,7 +124,7 @@ class RailButton(Themed, PressedByEnter):
         painter.drawText(words, align, self.text())
 
 
-class Rail(Themed, QWidget):
+class Rail(Coloured, QWidget):
     """The strip; ``go_asked`` carries the name of a place.
 
     Parameters
@@ -162,7 +162,6 @@ class Rail(Themed, QWidget):
             button.narrow(yes)
 
     def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
         word = "Light" if theme.dark else "Dark"
         self.switch.say("sun" if theme.dark else "moon", f"{word} theme", word)
 
@@ -182,7 +181,7 @@ def bug_words(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}. This is a bug: please report it, with what the terminal shows."
 
 
-class MainWindow(QMainWindow):
+class MainWindow(Themed, QMainWindow):
     """The rail and the places; a place is made when one first goes there.
 
     Parameters
@@ -199,7 +198,6 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.setWindowTitle("Liquid Study")
         self.setMinimumSize(LEAST)
-        self.theme = theme
         self.notice: Question | None = None
         self._notice_of = ""  # the place that has it said
         self._resting = False  # whether a session has the screen
@@ -243,7 +241,7 @@ class MainWindow(QMainWindow):
             made.go_asked.connect(self.go)
             self._places[name] = made
             self.stack.addWidget(made)
-            apply_theme_within(made, self.theme)
+            name_bars(made)
         return self._places[name]
 
     def go(self, name: str) -> None:
@@ -331,7 +329,6 @@ class MainWindow(QMainWindow):
 
     def show_theme(self, theme: Theme) -> None:
         if theme is not self.theme:
-            self.theme = theme
             apply_theme(self, theme)
 
     def _change_theme(self) -> None:

@@ -42,7 +42,6 @@ from study_app.gui.kit.commands import add_commands, key_cap, with_key
 from study_app.gui.kit.devices import DeviceShown, looking
 from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.sessions.session_facts import SessionFacts, extent_of, sessions
-from study_app.gui.theme.themed import apply_theme_within
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, scrolled
@@ -229,8 +228,6 @@ class HomePlace(Place):
             asked = self.new_asked if ships else self.edit_asked
             card.edit.connect(lambda facts, asked=asked: asked.emit(facts.source))
             cards.append(card)
-        for made in cards:
-            apply_theme_within(made, self.theme)
         held, bar = self._focused_card(), self.cards_area.verticalScrollBar()
         down_px = bar.value()
         self.grid.show_cards(cards)

@@ -24,7 +24,7 @@ from study_app.gui.lab.lab_state import (
 )
 from study_app.gui.lab.parameters import HIDDEN
 from study_app.gui.theme.theme import LIGHT, RADIUS_CONTROL, Theme, font
-from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Icon, MaskedPanel, Rule, fill_rounded, smooth_painter
@@ -474,7 +474,6 @@ def _fit(lines: list, count: int, kind: type, layout: QVBoxLayout, whole: Readin
         line = kind()
         layout.addWidget(line)
         lines.append(line)
-        apply_theme_within(line, whole.theme)
 
 
 BUTTON: Final = 32

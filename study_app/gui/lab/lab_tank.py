@@ -68,7 +68,8 @@ class TailPlaces:
 def tail_places(tail: Tail, camera: Camera, box: Box) -> TailPlaces:
     """Return where a tail goes on the screen of ``camera``."""
     count = len(tail.positions_m)
-    x, y, z = (np.clip(tail.positions_m[:, k], *span) for k, span in enumerate(_inside(box)))
+    inside = (-box.x, box.x), (box.floor, box.water), (-box.z, box.z)
+    x, y, z = (np.clip(tail.positions_m[:, k], *span) for k, span in enumerate(inside))
     pixels = _pixels(camera, x, y, z)
     floor = _pixels(camera, x, np.full(count, box.floor), z)
     shades = np.minimum((tail.ages * SHADES).astype(int), SHADES - 1)
@@ -180,10 +181,6 @@ def _pixels(camera: Camera, x: Floats, y: Floats, z: Floats) -> Floats:
 
 def _points(pixels: Floats) -> list[QPointF]:
     return [QPointF(across, down) for across, down in pixels.tolist()]
-
-
-def _inside(box: Box) -> tuple[tuple[float, float], ...]:
-    return (-box.x, box.x), (box.floor, box.water), (-box.z, box.z)
 
 
 WORKSPACE_M: Point = (0.1, 0.06, 0.06)

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy,
 from study_app.gui.lab.lab_state import SIDES, Choices, LabView
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
-from study_app.gui.theme.themed import Themed, apply_theme_within, replace_inside
+from study_app.gui.theme.themed import Themed, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, CompactStop, IconButton, Toggle
@@ -642,7 +642,6 @@ class FormPanel(Card):
             part for block in self.blocks.values() for part in ((Rule(), block) if block is not first else (block,))
         ]
         vbox(*parts, STRETCH, spacing=0, margins=(0, 0, 6, 0), parent=inside)
-        apply_theme_within(inside, self.theme)
         replace_inside(self.area, inside)
         before: QWidget = self.copy
         for part in (part for row in self.rows.values() for part in row.parts()):

@@ -63,7 +63,9 @@ class LabPlace(Place):
         self._escape = EscapeKey(self, anywhere=True)
         self._lay_out()
         self._connect()
-        self._shortcuts()
+        for sequence, what in ((KEY, "switch"), ("Ctrl+Z", "undo"), ("Ctrl+Shift+Z", "redo"), ("Ctrl+Y", "redo")):
+            shortcut = QShortcut(QKeySequence(sequence), self, context=Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            shortcut.activated.connect(partial(self.ask, what))
         self._arrange(wide=True)
 
     def _lay_out(self) -> None:
@@ -147,12 +149,6 @@ class LabPlace(Place):
     def ask(self, what: str, *details: Any) -> None:
         """Ask for something by its name."""
         self.asked.emit(what, details)
-
-    def _shortcuts(self) -> None:
-        """Give X, undo and redo to the place alone: other places of the window have keys of their own."""
-        for sequence, what in ((KEY, "switch"), ("Ctrl+Z", "undo"), ("Ctrl+Shift+Z", "redo"), ("Ctrl+Y", "redo")):
-            shortcut = QShortcut(QKeySequence(sequence), self, context=Qt.ShortcutContext.WidgetWithChildrenShortcut)
-            shortcut.activated.connect(partial(self.ask, what))
 
     @property
     def view(self) -> LabView | None:

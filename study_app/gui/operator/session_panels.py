@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWi
 from study_app.gui.kit.commands import key_cap
 from study_app.gui.operator.operator_view import OperatorView, State, StepRow
 from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, Tone, TypeRole, font
-from study_app.gui.theme.themed import Themed, apply_theme_within
+from study_app.gui.theme.theme import RADIUS_CARD, Tone, TypeRole, font
+from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Bar, Card, Chip, Icon, Logo, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, CompactStop
@@ -203,7 +203,6 @@ class Strip(Themed, QWidget):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             row.addWidget(button)
         self.operator.setHidden(played)
-        apply_theme_within(self, PARTICIPANT)
 
     def show_view(self, view: OperatorView) -> None:
         self.state.show_state(*shown_state(view))
@@ -443,7 +442,6 @@ class Rail(Card):
         rows = view.steps
         while len(self.lines) < len(rows):
             line = StepLine()
-            line.apply_theme(self.theme)
             line.slim(self._slim)
             self.lines.append(line)
             self._steps_column.insertWidget(len(self.lines) - 1, line)

@@ -8,9 +8,9 @@ from functools import partial
 from traceback import clear_frames
 from typing import Any, Final, Literal
 
-from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QResizeEvent
-from PySide6.QtWidgets import QGraphicsItem, QMainWindow, QWidget
+from PySide6.QtWidgets import QMainWindow, QWidget
 
 from study_app.gui.kit.dialogs import REASON, Question
 from study_app.gui.kit.fields import Field
@@ -20,7 +20,7 @@ from study_app.gui.operator.plots import ForceCard, HiddenForceCard, LatenessCar
 from study_app.gui.operator.servo_health import Forces, ServoHealth
 from study_app.gui.operator.session_panels import NARROW, SLIM, WIDTH, Banner, Header, Rail
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
-from study_app.gui.theme.themed import apply_theme
+from study_app.gui.theme.themed import Themed, apply_theme
 from study_app.gui.widgets.boxes import add_layout, grid, vbox
 from study_app.gui.widgets.cards import Card, scrolled
 from study_app.gui.widgets.controls import ActionButton
@@ -86,7 +86,9 @@ class Arrangement(QWidget):
             return
         self._arranged = (width, height, across, signs)
         self._set_width(width)
-        self._set_height(height)
+        self._parts.stop.setFixedSize(SIDE, STOPS[height])
+        self._parts.notes.show_lines(NOTES[height])
+        self._parts.device.show_rows(DEVICE_ROWS[height])
         self._parts.buttons.narrow(not signs)
         self._parts.buttons.hint.setVisible(width == "wide")
         self._fill_middle(across=across)
@@ -110,11 +112,6 @@ class Arrangement(QWidget):
         self._body.addWidget(self.middle_area, 0, 1)
         self._body.addWidget(self._parts.buttons, 1, 0 if slim else 1, 1, 2 if slim else 1)
 
-    def _set_height(self, height: Height) -> None:
-        self._parts.stop.setFixedSize(SIDE, STOPS[height])
-        self._parts.notes.show_lines(NOTES[height])
-        self._parts.device.show_rows(DEVICE_ROWS[height])
-
     def _fill_middle(self, *, across: bool) -> None:
         p, span = self._parts, 1 if across else 2
         for card, least in ((p.lateness, 210), (p.force, 210), (p.position, 170)):
@@ -134,7 +131,7 @@ FULL = QSize(1600, 900)
 LEAST = QSize(1024, 640)
 
 
-class OperatorWindow(QMainWindow):
+class OperatorWindow(Themed, QMainWindow):
     """The cockpit.
 
     Parameters
@@ -161,7 +158,6 @@ class OperatorWindow(QMainWindow):
         super().__init__()
         self.setWindowTitle(f"{study} – operator")
         self.setMinimumSize(LEAST)
-        self.theme = theme
         self.may_close = False
         self._view: OperatorView | None = None
         self.header = Header()
@@ -177,18 +173,7 @@ class OperatorWindow(QMainWindow):
         self.buttons = Actions()
         self.question: Question | None = None
         self._asks_about = ""  # the setting that the question is about
-        self._failed: set[str] = set()
-        self._panels: dict[QWidget, str] = {  # in a slim window "Now" and "Counts" are outside the rail
-            self.rail.now: "Now",
-            self.rail.tally: "Counts",
-            self.rail: "Session",
-            self.tiles: "Servo",
-            self.lateness: "Tick lateness",
-            self.force: "Force",
-            self.position: "Position",
-            self.device: "Device",
-            self.notes: "Notes",
-        }
+        self._failures: set[str] = set()
         self.escape = EscapeKey(self, anywhere=True)
         self.arrangement = Arrangement(self)
         self.setCentralWidget(self.arrangement)
@@ -225,42 +210,20 @@ class OperatorWindow(QMainWindow):
     def _press(self, what: str, _checked: bool = False) -> None:
         self.ask(what)
 
-    def draw(self, name: str, how: Callable[[], object]) -> None:
-        """Draw what the session does not depend on; where that fails, say so once, and draw it no more."""
-        if name in self._failed:
-            return
+    def draw(self, show: Callable[..., object], *shown: object) -> None:
+        """Show what the session does not depend on; where that fails, the session goes on."""
         try:
-            how()
+            show(*shown)
         except Exception as error:  # noqa: BLE001 - told, and passed on to the log and the journal
-            self.tell_of_failure(self.panel_of(error) or name, error)  # Qt may paint another panel meanwhile
+            self.tell_of_failure(error)
 
-    def panel_of(self, error: BaseException) -> str:
-        """Return the name of the panel in which an error was raised; "" where the session depends on what failed."""
-        trace, inside = error.__traceback__, None
-        while trace is not None:
-            frame, trace = trace.tb_frame, trace.tb_next
-            local = frame.f_locals if frame.f_code.co_argcount else {}
-            owner = local.get("self")
-            if isinstance(owner, QGraphicsItem) and owner.scene() is not None:
-                owner = next(iter(owner.scene().views()), None)
-            inside = owner if isinstance(owner, QWidget) else inside
-            if isinstance(local, dict):  # before Python 3.13 a copy that the frame keeps, and with it a painter at work
-                local.clear()
-        here = (panel for panel in self._panels if inside is panel or (inside and panel.isAncestorOf(inside)))
-        return next((self._panels[panel] for panel in here if isinstance(error, Exception)), "")
-
-    def tell_of_failure(self, name: str, error: BaseException) -> None:
-        """Disable a panel that failed, and say so once; one that fails again, as it is painted, is hidden."""
+    def tell_of_failure(self, error: BaseException) -> None:
+        """Say once that a part of the window failed."""
         clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
-        panel = next(panel for panel, known in self._panels.items() if known == name)
-        if name in self._failed:
-            panel.setUpdatesEnabled(False)
-            QTimer.singleShot(0, panel, panel.hide)  # not now, while it is painted
-        else:
-            self._failed.add(name)
-            panel.setEnabled(False)
-            self.show_message("A part of this window failed", f"{name}: this panel failed. The session continues.")
-            self.ask("failed", name, error)
+        if (what := f"{type(error).__name__}: {error}") not in self._failures:
+            self._failures.add(what)
+            self.show_message("A part of this window failed", f"{what}. The session continues.")
+            self.ask("failed", error)
 
     def show_view(self, view: OperatorView) -> None:
         """Show everything but the plots; trouble first, for it may be that one of the parts cannot be shown."""
@@ -272,27 +235,20 @@ class OperatorWindow(QMainWindow):
             self.question.reject()  # the trial it was about is over: its answer would hit the next one
         for part in (self.stop, self.header, self.buttons):
             part.show_view(view)
-        for name, show in (
-            ("Now", self.rail.now.show_view),
-            ("Counts", self.rail.tally.show_view),
-            ("Servo", self.tiles.show_view),
-            ("Notes", self.notes.show_view),
-            ("Session", self.rail.show_view),
-            ("Device", self.device.show_view),
-        ):
-            self.draw(name, partial(show, view))
+        for show in (self.rail.now, self.rail.tally, self.tiles, self.notes, self.rail, self.device):
+            self.draw(show.show_view, view)
         self._view = view
 
     def show_traces(self, health: ServoHealth, now_s: float) -> None:
-        self.draw("Position", lambda: self.position.show_health(health, now_s))
+        self.draw(self.position.show_health, health, now_s)
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
         """Draw force and wake (30 times a second), where they are not hidden."""
-        if isinstance(card := self.force, ForceCard):
-            self.draw("Force", lambda: card.show_forces(forces, now_ns))
+        if isinstance(self.force, ForceCard):
+            self.draw(self.force.show_forces, forces, now_ns)
 
     def show_lateness(self, health: ServoHealth) -> None:
-        self.draw("Tick lateness", lambda: self.lateness.show_health(health))
+        self.draw(self.lateness.show_health, health)
 
     def ask_to_repeat(self) -> None:
         """Ask for the reason of a repetition; nothing happens without one."""
@@ -374,8 +330,7 @@ class OperatorWindow(QMainWindow):
             self.activateWindow()
 
     def _change_theme(self) -> None:
-        self.theme = LIGHT if self.theme.dark else DARK
-        apply_theme(self, self.theme)
+        apply_theme(self, LIGHT if self.theme.dark else DARK)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Close at once when the session is over; else leave it to who listens, with the window open."""

@@ -195,7 +195,10 @@ class TankWidget(QWidget):
         changed = changes(self.things, things) + ALWAYS
         self.things = things
         if self._pane is None:
-            self._repaint(changed)
+            self._drawn_ns, self._showing = None, True
+            self.repaint(changed)  # whatever waits to be done would make the view older
+            self._showing = False
+            self._tell()
         else:
             self._pane.update()
 
@@ -217,13 +220,6 @@ class TankWidget(QWidget):
         painter.end()
         if not self._showing:
             self._tell()
-
-    def _repaint(self, region: QRegion) -> None:
-        """Paint the view at once, for whatever waits to be done would make it older; tell when it is handed over."""
-        self._drawn_ns, self._showing = None, True
-        self.repaint(region)
-        self._showing = False
-        self._tell()
 
     def _made_pane(self) -> QWidget:
         pane = Pane(self, self._paint)
@@ -253,7 +249,9 @@ class TankWidget(QWidget):
         if not self._page.video and region.intersects(still.front_at.toAlignedRect()):
             painter.drawImage(still.front_at.topLeft(), still.front)
         self._captions.draw(painter, region, self._task, self._hint())
-        self._paint_patch(painter, region)
+        place = self.patch_area()
+        if self._photodiode and region.intersects(place.toAlignedRect()):
+            paint_patch(painter, place, lit=self.patch.lit)
         self._drawn_ns = None if self.view is None else self.view.sample_time_ns
 
     @property
@@ -380,8 +378,3 @@ class TankWidget(QWidget):
 
     def patch_area(self) -> QRectF:
         return patch_place(self.width(), self.height())
-
-    def _paint_patch(self, painter: QPainter, region: QRegion) -> None:
-        place = self.patch_area()
-        if self._photodiode and region.intersects(place.toAlignedRect()):
-            paint_patch(painter, place, lit=self.patch.lit)

@@ -120,7 +120,11 @@ class PointerCapture(QObject):
             if event.type() == QEvent.Type.MouseMove:
                 self._follow(event.globalPosition().toPoint(), event.modifiers())
             else:
-                self._hold(event)
+                bit = BUTTONS.get(event.button(), 0)
+                bits = self._bits & ~bit if event.type() == QEvent.Type.MouseButtonRelease else self._bits | bit
+                if bits != self._bits:
+                    self._bits = bits
+                    self.pressed.emit(bits)
             return True
         return False
 
@@ -157,13 +161,6 @@ class PointerCapture(QObject):
             self._last = middle
         else:
             self._returning = True
-
-    def _hold(self, event: QMouseEvent) -> None:
-        bit = BUTTONS.get(event.button(), 0)
-        bits = self._bits & ~bit if event.type() == QEvent.Type.MouseButtonRelease else self._bits | bit
-        if bits != self._bits:
-            self._bits = bits
-            self.pressed.emit(bits)
 
     def _move(self, right: float, up: float, near: float) -> None:
         for axis, step in enumerate((right, up, near)):
@@ -261,6 +258,7 @@ class ParticipantWindow(QWidget):
         self._title()
         self.setObjectName("participant")
         self.setFont(font("body"))
+        self.given_theme = PARTICIPANT
         self.setStyleSheet(stylesheet(PARTICIPANT))
         self.setMinimumSize(LEAST_SIZE)
         give_role(self, QAccessible.Role.Window)
@@ -335,7 +333,11 @@ class ParticipantWindow(QWidget):
         made.show()
         made.raise_()
         if isinstance(made, TankWidget):
-            self._enter_tank(made, made.page)
+            self.activateWindow()
+            self.setFocus()
+            made.setCursor(Qt.CursorShape.BlankCursor)
+            if self._captures:
+                self._capture.take(made, made.page.workspace_m)
         else:
             made.focus_first()
         old.hide()  # only now, or Qt would lead the keyboard somewhere itself
@@ -458,14 +460,6 @@ class ParticipantWindow(QWidget):
             tank.controls = SettingControls(page, said, self._clock, tank, buttons=shown)
             tank.controls.event_made.connect(self.event)
         return tank
-
-    def _enter_tank(self, tank: TankWidget, page: TaskPage) -> None:
-        """Give the keyboard to the window, and the pointer to the hand if it is the device."""
-        self.activateWindow()
-        self.setFocus()
-        tank.setCursor(Qt.CursorShape.BlankCursor)
-        if self._captures:
-            self._capture.take(tank, page.workspace_m)
 
     def _may_leave_tank(self) -> bool:
         return self.tank is not None and self.tank.may_leave

@@ -17,7 +17,7 @@ from study_app.gui.kit.dialogs import Question
 from study_app.gui.sessions.session_facts import extent_of, operator_language, step_title
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import LIGHT, Theme, font
-from study_app.gui.theme.themed import Themed, apply_theme, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, apply_theme, remove_widget
 from study_app.gui.widgets.accessible import describe_plot, give_role
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Chip, Rule, scrolled, smooth_painter
@@ -275,7 +275,6 @@ class PreflightWindow(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setMinimumSize(LEAST)
         self.resize(FULL)
-        self.theme = theme
         self.who = label("", "label", "text2")
         self.chip = Chip("ok", "check", "")
         self.checks = Card(padding=10, gap=0)
@@ -358,7 +357,6 @@ class PreflightWindow(QWidget):
         self.rows = [CheckRow(check, last=check is view.checks[-1]) for check in view.checks]
         for row in self.rows:
             self.checks.column.addWidget(row)
-            apply_theme_within(row, self.theme)
 
     def _show_rows(self, view: PreflightView) -> None:
         for place, (name, words) in enumerate(view.rows):
@@ -453,7 +451,6 @@ class ComputerWindow(Question):
         vbox(self.state, self.bar, (area, 1), spacing=12, margins=0, parent=inside)
         super().__init__(parent, theme, "Check of this computer", ABOUT, close, back="Check again", inside=inside)
         self.setModal(True)
-        self._theme = theme
         self.back.clicked.disconnect(self.reject)
         self.back.clicked.connect(self.asked)
         self.resize(*SIZE)
@@ -475,7 +472,6 @@ class ComputerWindow(Question):
         self.rows = [CheckRow(check, last=check is checks[-1]) for check in checks]
         for place, row in enumerate(self.rows):
             self._rows.insertWidget(place, row)
-            apply_theme_within(row, self._theme)
         passed = sum(check.verdict == "ok" for check in checks)
         self.show_sentence(f"{passed} of {len(checks)} passed.")
 

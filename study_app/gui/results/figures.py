@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QWidget
 from study_app.analysis.worker_messages import FigureDrawn, Progress, StudyAt
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.gui.theme.theme import FAMILIES, Theme, font
-from study_app.gui.theme.themed import Themed, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Coloured, remove_widget
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Bar, Card
@@ -191,7 +191,7 @@ def drawn(svg: bytes, size: QSize, ratio: float) -> QImage:
     return image
 
 
-class FigureView(Themed, QWidget):
+class FigureView(Coloured, QWidget):
     """One figure as wide as it is given room, with its true proportions."""
 
     def __init__(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
@@ -221,7 +221,6 @@ class FigureView(Themed, QWidget):
         self._ask()
 
     def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
         self._ask()
 
     def heightForWidth(self, width: int) -> int:
@@ -312,7 +311,6 @@ class FigureCard(Card):
             self.drawing = None
         elif there:
             self.drawing = FigureView(figure, colours)
-            apply_theme_within(self.drawing, self.theme)
             self._place.addWidget(self.drawing, 0, Qt.AlignmentFlag.AlignHCenter)
             self.more.raise_()
 
@@ -439,7 +437,6 @@ class FiguresPanel(QScrollArea):
         self.cards = []
         for place, figure in enumerate(view.figures):
             card = kept.pop(figure.name, None) or FigureCard(figure, view.colours)
-            apply_theme_within(card, self.trouble.theme)
             self._column.insertWidget(place, card)
             self.cards.append(card)
         for gone in kept.values():

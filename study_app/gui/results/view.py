@@ -16,7 +16,7 @@ from study_app.gui.sessions.session_facts import Column, SessionFacts, matching,
 from study_app.gui.sessions.session_page import LeaveOutDialog, SessionPage, take_back_question, unblind_question
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
@@ -182,7 +182,6 @@ class ExclusionsCard(Card):
             remove_widget(line)
         self.lines = [self._line(one) for one in reversed(listed)]
         for place, line in enumerate(self.lines):
-            apply_theme_within(line, self.theme)
             self._rows.insertWidget(place, line)
         self.none.setVisible(not listed)
         for part in (self.area, self.open):
@@ -358,7 +357,6 @@ class ResultsPlace(Place):
             for tone, icon, words, tip in chips:
                 chip = Chip(tone, icon, words)  # type: ignore[arg-type]  # the tones above
                 chip.setToolTip(tip)
-                chip.apply_theme(self.theme)
                 self._chips.addWidget(chip)
                 self.chips.append(chip)
             self._arrange()

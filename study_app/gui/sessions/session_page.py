@@ -25,7 +25,7 @@ from study_app.gui.sessions.session_facts import (
     validity_chip,
 )
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import apply_theme, apply_theme_within, remove_widget
+from study_app.gui.theme.themed import Themed, apply_theme, remove_widget
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
@@ -124,7 +124,11 @@ def read_record(folder: Path) -> SessionRecord:
         limits=limits_sentence(trials, sealed=key is None and bool(start.measures_sealed)),
         trials=trials,
         notes=tuple(_notes(lines)),
-        files=tuple((name, (session.path / name).stat().st_size) for name in _files(session)),
+        files=tuple(
+            (path.relative_to(session.path).as_posix(), path.stat().st_size)
+            for path in sorted(session.path.rglob("*"))
+            if path.is_file()
+        ),
         left_out=own,
         motion_hidden="" if measured or key is not None else MOTION_HIDDEN,
     )
@@ -244,10 +248,6 @@ def _notes(lines: Sequence[Event]) -> list[str]:
         where = "before the first trial" if trial is None else f"trial {trial}"
         found.append(f"{datetime.fromisoformat(line.at):%H:%M}, {where}: {text}")
     return found
-
-
-def _files(session: SessionFolder) -> list[str]:
-    return sorted(path.relative_to(session.path).as_posix() for path in session.path.rglob("*") if path.is_file())
 
 
 WIDTH = 560
@@ -431,7 +431,7 @@ def trial_words(trial: TrialRecord) -> str:
     return said
 
 
-class SessionPage(QDialog):
+class SessionPage(Themed, QDialog):
     """One session in full, read in a thread; ``changed`` comes when something was left out or taken back."""
 
     changed = Signal()
@@ -441,7 +441,6 @@ class SessionPage(QDialog):
         self.facts = facts
         self.record: SessionRecord | None = None
         self.decision: Question | None = None
-        self._theme = theme
         self._reader, self._mover = Background(self), Background(self)
         self._reader.done.connect(self._show)
         self._mover.done.connect(self._show_motion)
@@ -535,7 +534,6 @@ class SessionPage(QDialog):
             line = QWidget()
             words = label(f"{what}: {one.reason} ({one.rule_or_person})", "label", wraps=True)
             hbox((words, 1), back, margins=0, parent=line)
-            apply_theme_within(line, self._theme)
             self._out.addWidget(line)
             self.lines.append(line)
         self.none_out.setVisible(not listed)
@@ -569,12 +567,12 @@ class SessionPage(QDialog):
         assert self.record is not None  # noqa: S101 - the button is off until it was read
         who = (self.facts.participant, self.facts.session)
         trials = {trial.number: trial.words for trial in self.record.trials if trial.excluded is None}
-        dialog = LeaveOutDialog(self, self._theme, [self.facts], {who: tuple(trials.items())}, self.facts)
+        dialog = LeaveOutDialog(self, self.theme, [self.facts], {who: tuple(trials.items())}, self.facts)
         leave_out = partial(exclude, self._study, *who)
         self._ask(dialog, lambda: partial(leave_out, trial=dialog.value("trial")))
 
     def _ask_take_back(self, one: Exclusion, what: str) -> None:
-        dialog = take_back_question(self, self._theme, what, one.reason)
+        dialog = take_back_question(self, self.theme, what, one.reason)
         take_back = partial(include, self._study, one.participant, one.session, trial=one.trial)
         self._ask(dialog, lambda: take_back)
 

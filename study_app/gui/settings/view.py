@@ -27,7 +27,7 @@ from study_app.gui.display.screens import ScreenShown, screens_shown
 from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, choice, number
 from study_app.gui.settings.display_test import DisplayTest, OffsetForm
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
-from study_app.gui.theme.themed import apply_theme_within, remove_widget
+from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Card, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Radio
@@ -281,7 +281,6 @@ class MachinePlace(Place):
         self.offset.show_offset(settings.display_offset, there.name)
         if self.test is not None:
             self.test.show_offset(settings.display_offset, there.name)
-        apply_theme_within(self.screens, self.theme)
 
     def _choose_folder(self) -> None:
         if chosen := QFileDialog.getExistingDirectory(self, "Workspace", self.folder.whole):

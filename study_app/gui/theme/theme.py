@@ -220,6 +220,8 @@ def stylesheet(theme: Theme) -> str:
             f"QFrame[role='entry'][state='refused'] {{ border: 2px solid {t.bad}; }}",
             f"QListWidget::item {{ border-radius: {RADIUS_CONTROL}px; }}",
             f"QListWidget::item:selected {{ background: {t.selected}; }}",
+            f"QListWidget[role='links']::item {{ border-radius: 6px; padding-left: 6px; color: {t.text}; }}",
+            f"QListWidget[role='links']::item:selected {{ background: {t.selected}; color: {t.accent}; }}",
             _buttons(t),
             _fields(t),
             _scrollbars(t),

@@ -1,5 +1,6 @@
-"""How a change of theme reaches what the style sheet does not: parts that paint themselves, marks, selections."""
+"""How the theme of a window reaches what the style sheet does not: parts that paint themselves, marks, selections."""
 
+from PySide6.QtCore import QEvent
 from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QScrollArea, QScrollBar, QWidget
 
@@ -7,21 +8,44 @@ from study_app.gui.theme.theme import LIGHT, Theme, stylesheet
 
 
 class Themed:
-    """What must know the theme beyond the style sheet: whatever paints itself or holds icons."""
+    """What paints itself in the colours of ``theme``, that of the window it is in; outside of one it is light."""
 
-    theme: Theme = LIGHT
+    @property
+    def theme(self) -> Theme:
+        return _given(self) or LIGHT
+
+
+class Coloured(Themed):
+    """What keeps colours beyond a painting: ``apply_theme`` takes those of another theme."""
+
+    _applied: Theme | None = None
 
     def apply_theme(self, theme: Theme) -> None:
-        self.theme = theme
-        if isinstance(self, QWidget):
-            self.update()
+        raise NotImplementedError
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)  # type: ignore[misc]  # of the widget
+        if event.type() == QEvent.Type.StyleChange and (given := _given(self)) not in {None, self._applied}:
+            self._applied = given
+            self.apply_theme(self.theme)
+
+
+def _given(part: object) -> Theme | None:
+    """Return the theme of the window that a part is in; between them may be what PySide had better not wrap."""
+    while isinstance(part, QWidget):
+        window = part.window()
+        if (found := getattr(window, "given_theme", None)) is not None:
+            return found
+        part = window.parentWidget()
+    return None
 
 
 def apply_theme(window: QWidget, theme: Theme) -> None:
-    """Give ``window`` and all its parts the colours of ``theme``."""
+    """Give ``window`` and all its parts the colours of ``theme``, those that come into it later, too."""
+    window.given_theme = theme  # type: ignore[attr-defined]
     window.setPalette(_palette(theme))
     window.setStyleSheet(stylesheet(theme))
-    apply_theme_within(window, theme)
+    name_bars(window)
 
 
 def _palette(theme: Theme) -> QPalette:
@@ -47,13 +71,10 @@ def _palette(theme: Theme) -> QPalette:
     return made
 
 
-def apply_theme_within(whole: QWidget, theme: Theme) -> None:
-    """Pass ``theme`` to a part and its parts, for what comes into a window later; name what Qt leaves without one."""
-    for part in (whole, *whole.findChildren(QWidget)):
-        if isinstance(part, Themed):
-            part.apply_theme(theme)
-        elif isinstance(part, QScrollBar):
-            part.setAccessibleName("Scroll bar")
+def name_bars(whole: QWidget) -> None:
+    """Name the scroll bars of a part, which Qt leaves without a name."""
+    for bar in whole.findChildren(QScrollBar):
+        bar.setAccessibleName("Scroll bar")
 
 
 def remove_widget(part: QWidget) -> None:

@@ -14,7 +14,7 @@ from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QFrame
 
 from study_app.gui.theme.theme import LIGHT, Theme, font
-from study_app.gui.theme.themed import Themed
+from study_app.gui.theme.themed import Coloured
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ class Axis(pg.AxisItem):
         self.update()
 
 
-class Plot(Themed, pg.GraphicsView):
+class Plot(Coloured, pg.GraphicsView):
     """An empty plot: no menu, no buttons, no mouse, no frame; horizontal grid lines at the ticks of y.
 
     Made of pyqtgraph's view box and axes alone: its plot item brings menus that outlive the window.
@@ -126,7 +126,6 @@ class Plot(Themed, pg.GraphicsView):
                 self.box.addItem(line, ignoreBounds=True)
 
     def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
         self.setBackground(theme.surface)
         for axis in self.axes.values():
             axis.setTextPen(QColor(theme.text3))

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QTableView,
 )
 
-from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
+from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import chip_size, fill_rounded, paint_chip
 
@@ -155,10 +155,6 @@ class Table(Themed, QTableView):
     def chosen_row(self) -> int | None:
         chosen = self.selectionModel().selectedRows()
         return chosen[0].row() if chosen else None
-
-    def apply_theme(self, theme: Theme) -> None:
-        self.theme = theme
-        self.viewport().update()
 
     def minimumSizeHint(self) -> QSize:
         return QSize(sum(least for _, least in self._widths), 26 + ROW_HEIGHT)

@@ -109,7 +109,7 @@ STEPS: dict[str, Any] = {
     "exclude all": ask("exclude", None, "no consent"),
     "exclude again": ask("exclude", 9, "again"),
     "participant stops": event(ForceStopped, "participant"),
-    "panel fails": ask("failed", "forces", ValueError("no plot")),
+    "part fails": ask("failed", ValueError("no plot")),
     "thread ends": lambda bridge, _: bridge._thread_exceptions.ended.emit("the writer ended"),
     "diagnose": ask("diagnose"),
     "disk is full": let(full=True),
@@ -135,7 +135,7 @@ BEGUN = "wait, go on, shown, push"
 PLAYS = {
     "requests": f"{BEGUN}, pointer, buttons, painted, left, note, mark, pause, resume, shown, repeat, shown, stop, "
     "push, fade in, shown, exclude a trial, exclude all, exclude again, participant stops, fade in, shown, "
-    "panel fails, thread ends, diagnose, late, wait, withdraw, note, thread ends, wait, diagnose, close",
+    "part fails, thread ends, diagnose, late, wait, withdraw, note, thread ends, wait, diagnose, close",
     "full disk": f"{BEGUN}, disk is full, mark, note, stop, wait, diagnose, disk has space, wait, fade in, shown, "
     "wait, disk is full, abort, close, close",
     "lost device": f"{BEGUN}, line, reconnect, servo stops, wait, device error, second error, reconnect, line, "

@@ -3,7 +3,6 @@
 import pkgutil
 import threading
 import weakref
-from operator import attrgetter
 
 import pytest
 from PySide6.QtCore import QEvent, Qt, QTimer
@@ -47,12 +46,13 @@ class Breaking:
         self.on, self.failed, kind = False, 0, pkgutil.resolve_name(f"study_app.gui.{owner}")
         whole, breaking = getattr(kind, method), self
 
-        def broken(self, *arguments, **named):  # a panel that failed is found by this name
+        def broken(self, *arguments, **named):
             if breaking.on:
                 breaking.failed += 1
                 raise ValueError(BROKEN)
             return whole(self, *arguments, **named)
 
+        broken.__code__ = broken.__code__.replace(co_name=method)  # as Qt calls it
         monkeypatch.setattr(kind, method, broken, raising=False)
 
     def now(self, bridge, do):
@@ -77,20 +77,12 @@ def paint_position(bridge):
     bridge.operator.position.plot.viewport().update()
 
 
-def paint_now(bridge):
-    bridge.operator.rail.now.update()
-
-
-def write_note(bridge):
-    bridge.operator.notes.field.setPlainText("left-handed")
-    bridge.operator.notes.field.entered.emit()
-
-
+@pytest.mark.qt_log_ignore("QBackingStore::endPaint")
 @pytest.mark.parametrize(
     ("owner", "method", "do"),
     [
         ("operator.window.OperatorWindow", "_change_theme", lambda bridge: bridge.operator.header.theme_button.click()),
-        ("participant.tank_widget.TankWidget", "paintEvent", paint_tank),
+        ("participant.tank_widget.TankWidget", "_paint", paint_tank),
         ("participant.window.ParticipantWindow", "keyPressEvent", tap),
         (
             "participant.window.ParticipantWindow",
@@ -123,24 +115,19 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
 
 @pytest.mark.qt_log_ignore("QBackingStore::endPaint")
 @pytest.mark.parametrize(
-    ("owner", "method", "do", "name", "panel", "width"),
+    ("owner", "method", "do"),
     [
-        ("operator.controls.NotesCard", "show_view", mark, "Notes", "notes", 1600),
-        ("operator.controls.NoteField", "toPlainText", write_note, "Notes", "notes", 1600),
-        ("operator.plots.PositionCard", "show_health", lambda it: it.show_traces(), "Position", "position", 1600),
-        ("widgets.live_plots.TracePlot", "paintEvent", paint_position, "Position", "position", 1600),
-        ("operator.session_panels.Rail", "paintEvent", lambda it: it.operator.rail.update(), "Session", "rail", 1600),
-        ("operator.session_panels.Tally", "show_view", mark, "Counts", "rail.tally", 1600),
-        ("operator.session_panels.Tally", "show_view", mark, "Counts", "rail.tally", 1024),
-        ("operator.session_panels.Now", "paintEvent", paint_now, "Now", "rail.now", 1024),
+        ("operator.controls.NotesCard", "show_view", mark),
+        ("operator.plots.PositionCard", "show_health", lambda it: it.show_traces()),
+        ("widgets.live_plots.TracePlot", "paintEvent", paint_position),
+        ("operator.session_panels.Tally", "show_view", mark),
     ],
 )
-def test_a_panel_that_fails_is_told_once_and_disabled_and_the_session_goes_on(
-    make, world, qtbot, monkeypatch, caplog, owner, method, do, name, panel, width
+def test_a_part_of_the_operators_window_that_fails_is_told_once_and_the_session_goes_on(
+    make, world, qtbot, monkeypatch, caplog, owner, method, do
 ):
     breaking = Breaking(monkeypatch, owner, method)
     bridge = make()
-    bridge.operator.resize(width, 900)
     begin_trial(bridge, world)
     QApplication.processEvents()
     breaking.now(bridge, do)
@@ -150,15 +137,13 @@ def test_a_panel_that_fails_is_told_once_and_disabled_and_the_session_goes_on(
         bridge.show_tiles()
         qtbot.wait(5)  # in Qt's loop, as it is in the program
     said = [one.text() for notice in bridge.operator.findChildren(Question) for one in notice.findChildren(QLabel)]
-    assert said.count(f"{name}: this panel failed. The session continues.") == 1
-    assert not attrgetter(panel)(bridge.operator).isEnabled()
-    assert breaking.failed < 6 or method == "toPlainText", "it is drawn no more"
+    assert said.count(f"ValueError: {BROKEN}. The session continues.") == 1
     assert (world.force_is_on, bridge.trouble) == (True, "")
     assert isinstance(bridge.participant.page, TaskPage)
     assert "broke" not in world.events()
     told = [entry[1]["text"] for entry in world.done if entry[0] == "note" and entry[1]["kind"] == "note"]
-    assert len([text for text in told if f"panel {name!r} failed" in text and BROKEN in text]) == 1
-    assert f"the panel {name!r} failed" in caplog.text
+    assert [BROKEN in text for text in told] == [True]
+    assert BROKEN in caplog.text
     breaking.on = False
     caplog.clear()
 

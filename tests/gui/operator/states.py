@@ -130,7 +130,7 @@ RUNNING: Actions = {
     ),
     "reconnecting": in_turn(clicked("banner.reconnect"), told(beyond=RECONNECTS, force_on=False)),
     "in the dark theme": lambda window: window.header.theme_button.click(),
-    "panel failed": lambda window: window.draw("Servo", lambda: 1 / 0),
+    "a part failed": lambda window: window.draw(lambda: 1 / 0),
 }
 DISK: Actions = {
     "a form": told(lambda it: it.welcome()),
