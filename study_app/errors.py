@@ -13,6 +13,7 @@
     ├── StoreError             results that cannot be written or read
     ├── AnalysisError          results that cannot be evaluated
     ├── MissingExtra           what was asked for needs libraries that were not installed
+    ├── PlugInError            a plug-in of another package that failed
     ├── WorkerError            a process that computes for this program ended unexpectedly
     └── DisplayError           no screen to open a window on
 """
@@ -109,6 +110,10 @@ class AnalysisError(StudyError):
 
 class MissingExtra(StudyError):
     """What was asked for needs libraries that were not installed."""
+
+
+class PlugInError(StudyError):
+    """A plug-in of another package failed."""
 
 
 ANALYSIS_LIBRARIES: Final = frozenset({"jinja2", "markupsafe", "matplotlib", "pandas", "pyreadstat", "scipy"})

@@ -13,6 +13,8 @@ from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynami
 from study_app.analysis.data.motion import Performance
 from study_app.analysis.statistics.equivalence import UNSEEN, Equivalence, fewest
 from study_app.analysis.statistics.outcome import Interval, Outcome
+from study_app.discovery import explained
+from study_app.errors import PlugInError
 from study_app.protocol.model import Contrast, Published
 from study_app.protocol.orders.balance import Evenness
 
@@ -56,7 +58,7 @@ def silent(_what: str, _share: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A part (``what``, of a block or of none) that could not be computed: the error, and where it was raised."""
+    """A part (``what``, of a block or of none) that could not be computed: the error, and where the program met it."""
 
     what: str
     error: str
@@ -66,6 +68,8 @@ class Failure:
     @property
     def why(self) -> str:
         """What a report says in the place of the part."""
+        if not self.where:
+            return f"its computation failed: {self.error}"
         return f"its computation failed ({self.error}; {self.where}); this is a fault of the program, please report it"
 
     def __str__(self) -> str:
@@ -92,9 +96,10 @@ class Failures:
             return compute()
         except Exception as error:  # noqa: BLE001 - one part must not take the report with it
             last = traceback.extract_tb(error.__traceback__)[-1]
-            failure = Failure(
-                what, f"{type(error).__name__}: {error}", f"{Path(last.filename).name}, line {last.lineno}", block
-            )
+            words, where = f"{type(error).__name__}: {error}", f"{Path(last.filename).name}, line {last.lineno}"
+            if isinstance(said := explained(error), PlugInError):
+                words, where = str(said), ""
+            failure = Failure(what, words, where, block)
             self.found.append(failure)
             return failure
 

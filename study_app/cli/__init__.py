@@ -17,9 +17,10 @@ import click
 
 from study_app import __version__
 from study_app.cli import data, model, power, study
-from study_app.cli.devices import devices, outlets
+from study_app.cli.devices import devices, outlets, plugins
 from study_app.cli.evidence import accuracy, stability, timing, validation
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands, example_of
+from study_app.discovery import explained
 from study_app.errors import StudyError, naming_the_extra
 
 BY_SIGNAL = 128  # added to a signal's number
@@ -50,7 +51,7 @@ for module in (study, data, power, model, accuracy, stability, timing, validatio
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)
-for command in (devices, outlets):  # what else their module holds belongs to the group devices
+for command in (devices, outlets, plugins):  # what else their module holds belongs to the group devices
     commands.add_command(command)
 
 
@@ -93,8 +94,12 @@ def main() -> None:
         if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG and error.filename:
             click.echo(f"liquid-study: {_shortened(str(error.filename))}: the file name is too long", err=True)
             sys.exit(EXIT_USER_ERROR)
-        logging.getLogger(__name__).critical("a bug ended the program", exc_info=True)
-        raise
+        bug = (said := explained(error)) is error
+        logging.getLogger(__name__).critical("a bug ended the program" if bug else str(said), exc_info=True)
+        if bug:
+            raise
+        click.echo(f"liquid-study: {_shortened(str(said))}", err=True)
+        sys.exit(EXIT_USER_ERROR)
     code = code if isinstance(code, int) else 0
     if code > BY_SIGNAL and (qt := sys.modules.get("PySide6.QtCore")):
         atexit.unregister(getattr(qt, "__moduleShutdown", print))

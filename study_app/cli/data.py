@@ -293,6 +293,8 @@ def verify(results: Path, fingerprints: Path | None) -> None:
         click.echo(f"error: {finding}")
     for finding in sorted(found.warnings, key=lambda one: one.shares):
         click.echo(f"{'to share it' if finding.shares else 'warning'}: {finding}")
+    for package, names in found.plug_ins.items():
+        click.echo(f"plug-in {package}: {', '.join(names)}")
     running = f", {found.running} running" if found.running else ""
     click.echo(f"{counted(found.sessions, 'session')}{running}: {'sound' if found.sound else 'not sound'}")
     end_if(not found.sound)

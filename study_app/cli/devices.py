@@ -44,11 +44,9 @@ def devices(context: click.Context) -> None:
 @devices.command("list")
 def list_devices() -> None:
     """List every device: whether it is connected, what it can do, and why it cannot be used."""
-    from study_app.devices.registry import backends, discover
+    from study_app.devices.registry import all_devices, backends
 
-    of = {
-        device.name: f"; {device.kind}, {device.degrees_of_freedom} degrees of freedom" for device in discover().devices
-    }
+    of = {device.name: f"; {device.kind}, {device.degrees_of_freedom} degrees of freedom" for device in all_devices()}
     for backend in backends():
         about = f"{backend.by}{of.get(backend.name.partition(':')[0], '')}"
         click.echo(f"{backend.name:<19} {backend.state}  ({about})")
@@ -56,6 +54,25 @@ def list_devices() -> None:
             if line:
                 space = " " * 20
                 click.echo(fill(line, _WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False))
+
+
+@click.command()
+def plugins() -> None:
+    """List the plug-ins of other packages: version, place, what each adds, and what is wrong with it.
+
+    Exit code 3 if one cannot be used.
+    """
+    from study_app.discovery import UPDATE, plug_ins
+
+    found = plug_ins()
+    for package, version, origin in dict.fromkeys((one.package, one.version, one.origin) for one in found):
+        click.echo(f"{package} {version}  ({origin})")
+        for one in found:
+            if (one.package, one.version) == (package, version):
+                click.echo(f"    {one.kind:<9} {one.name}{f': {one.fault}; {UPDATE}' if one.fault else ''}")
+    if not found:
+        click.echo("No plug-in is installed; docs/plug-ins.md says how to make one.")
+    end_if(any(one.fault for one in found))
 
 
 @devices.command(cls=TakesDeviceOptions)

@@ -22,7 +22,7 @@ GROUPS: Final = {
     "Data": "export plot report unblind exclude include withdraw merge verify proof rebuild reproduce replay",
     "Model": "scene simulate identify estimate figures",
     "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds",
-    "Devices": "devices outlets",
+    "Devices": "devices outlets plugins",
 }
 REMOVED: Final = {"emulate-falcon": "--device falcon-emulated runs the Falcon's driver on an emulated Falcon"}
 RENAMED: Final = {"run": {"--by": "--operator"}, "resume": {"--by": "--operator"}, "merge": {"--site": ""}}
@@ -303,10 +303,10 @@ class DeviceName(click.Option):
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         """Return the names, and what the option says else."""
-        from study_app.devices.registry import discover
+        from study_app.devices.registry import all_devices
 
         names = []
-        for device in discover().devices:
+        for device in all_devices():
             if device.moves_by_itself or not self._only_moving:
                 bare = [] if device.argument_required else [device.name]
                 names += [*bare, f"{device.name}:{device.argument}"] if device.argument else bare
@@ -332,11 +332,11 @@ class TakesDeviceOptions(click.Command):
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Return the command's own options, then those of the devices whose names are free."""
-        from study_app.devices.registry import discover
+        from study_app.devices.registry import all_devices
 
         own = super().get_params(ctx)
         taken = {parameter.name for parameter in own}
-        options = {option.name: option for device in discover().devices for option in device.options}
+        options = {option.name: option for device in all_devices() for option in device.options}
         added = [
             click.Option(
                 [f"--{option.name}", keyword],

@@ -3,14 +3,15 @@
 An outlet that cannot be opened or fails later is in `Outlets.lost` with the reason; the session continues without it.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Any, Final, Literal, Protocol, TypeAlias
 
+from study_app.discovery import Registry
 from study_app.errors import OutletError
 from study_app.outlets.markers import Marker, Sink, SinkKind, SinkThread
-from study_app.outlets.sinks import SINKS
+from study_app.outlets.sinks import SINKS as OWN
 from study_app.outlets.streams import SampleStream
 
 SampleChoice: TypeAlias = Literal["off", "single-blind", "always"]
@@ -42,21 +43,20 @@ class OutletStatus:
     shows_force: bool = False
 
 
-def sink_kinds() -> Mapping[str, SinkKind]:
-    """Return the kinds of sinks by name."""
-    return {kind.name: kind for kind in SINKS}
+SINKS: Final = Registry("outlet", {kind.name: kind for kind in OWN}, SinkKind, "name")
+"""The kinds of sinks by name."""
 
 
 def is_port(address: str) -> bool:
     """Return whether an address is that of a trigger port, such as ``serial:COM3``, without opening it."""
     name, _, place = address.partition(":")
-    kind = sink_kinds().get(name)
+    kind = SINKS.get(name)
     return kind is not None and ":" in kind.example and bool(place) and place.isprintable()
 
 
 def port_examples() -> tuple[str, ...]:
     """Return an address of each kind of port for triggers."""
-    return tuple(kind.example for kind in sink_kinds().values() if is_port(kind.example))
+    return tuple(kind.example for kind in SINKS.values() if is_port(kind.example))
 
 
 def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
@@ -68,9 +68,9 @@ def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
         The address is not one, or the sink cannot be opened.
     """
     name, _, place = address.partition(":")
-    kind = sink_kinds().get(name)
+    kind = SINKS.get(name)
     if kind is None:
-        examples = ", ".join(one.example for one in sink_kinds().values())
+        examples = ", ".join(one.example for one in SINKS.values())
         raise OutletError(f"'{address}' is not an address of markers: use one like {examples}")
     return kind.open(place, now_ns)
 
@@ -85,7 +85,7 @@ class Outlets:
         self._double = blinding == "double"
         self._withheld = self._double and samples == "single-blind"
         for address in addresses:
-            kind = sink_kinds().get(address.partition(":")[0])
+            kind = SINKS.get(address.partition(":")[0])
             with self._failing("Triggers" if kind is None else kind.title):
                 self._threads.append(SinkThread(open_sink(address, servo.now_ns)))
         if samples != "off" and not self._withheld:

@@ -33,7 +33,7 @@ from study_app.protocol.table import Brief, Description, Id, Language, Localised
 from study_app.protocol.trials.designs import AnyDesign, default_design, question_of
 from study_app.protocol.trials.methods import AnyMethod
 from study_app.protocol.trials.stimuli import Condition, Stimulus
-from study_app.protocol.trials.tasks import Explore, Follow, Reach, Seconds, Task
+from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach, Seconds
 
 __all__ = [
     "Analysis",
@@ -452,7 +452,7 @@ class Protocol(Table):
     scene: SceneDefaults = Field(default_factory=SceneDefaults)
     liquids: Named[StudyLiquid] = Field(min_length=1)
     conditions: dict[Id, Condition] = Field(min_length=1)
-    tasks: dict[Id, Task] = Field(min_length=1, description="What a participant does in a trial.")
+    tasks: dict[Id, AnyTask] = Field(min_length=1, description="What a participant does in a trial.")
     scales: dict[Id, Scale] = Field(default_factory=dict)
     questionnaires: dict[Id, Questionnaire] = Field(default_factory=dict)
     pages: dict[Id, PageText] = Field(default_factory=dict)

@@ -9,10 +9,11 @@ from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import ConfigDict, Discriminator, Field, SerializeAsAny, Tag, WrapValidator, model_validator
+from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
+from study_app.discovery import Registry
 from study_app.haptics.model.ranges import later, within
-from study_app.protocol.table import DIRECTIONS, Id, Localised, Printable, Table, invalid, text_in, unprintable
+from study_app.protocol.table import DIRECTIONS, Id, Localised, OfKinds, Printable, Table, invalid, text_in, unprintable
 
 POINTS = 7
 """Of the scale of statements."""
@@ -535,11 +536,32 @@ class Text(Question):
         return None
 
 
+class RecordedQuestion(Question):
+    """A question of a plug-in that is not here, as a receipt holds it: its answers are listed."""
+
+    model_config = ConfigDict(extra="allow")
+    widget: ClassVar[str] = "text"
+    measure: ClassVar[str] = "texts"
+    value_type: ClassVar[ValueType] = "text"
+
+    kind: str
+
+    @property
+    def kind_id(self) -> str:
+        return self.kind
+
+    def view(self, number: int, context: Context) -> ItemView:
+        return self._shown(TextView, number, context)
+
+    def problem(self, answer: Value, context: Context) -> str | None:
+        return None
+
+
 STATEMENT: Final = "statement"
 
-KINDS: Final[dict[str, type[Question]]] = {
-    kind_id(kind): kind for kind in (Choice, Number, Rating, Slider, Statement, Text)
-}
+KINDS: Final = Registry[type[Question]](
+    "question", {kind_id(kind): kind for kind in (Choice, Number, Rating, Slider, Statement, Text)}, Question, "kind"
+)
 """Every kind by its id; a question of a protocol file is of one of these."""
 
 
@@ -551,22 +573,23 @@ if TYPE_CHECKING:
     AnyQuestion: TypeAlias = Question
 else:
     AnyQuestion = Annotated[
-        SerializeAsAny[
-            Annotated[
-                reduce(or_, [Annotated[kind, Tag(name)] for name, kind in KINDS.items()]),
-                Discriminator(
-                    _kind_of,
-                    custom_error_type="question_kind",
-                    custom_error_message="is not a kind of question",
-                    custom_error_context={"place": "kind", "permitted": ", ".join(KINDS)},
-                ),
-            ]
+        Annotated[
+            reduce(or_, [Annotated[kind, Tag(name)] for name, kind in KINDS.own.items()]),
+            Discriminator(
+                _kind_of,
+                custom_error_type="question_kind",
+                custom_error_message="is not a kind of question",
+                custom_error_context={"place": "kind", "permitted": ", ".join(KINDS.own)},
+            ),
         ],
-        # a question that was made in Python stays as it is, of any kind
-        WrapValidator(lambda value, validated: value if isinstance(value, Question) else validated(value)),
+        OfKinds(KINDS, Question, RecordedQuestion),
     ]
 
 
 def question_of(table: Mapping[str, Any]) -> Question:
-    """Return a question of a receipt (KeyError if no kind has its name, ValueError if it is none of its kind)."""
-    return KINDS[_kind_of(table)].model_validate(table)
+    """Return a question of a receipt (KeyError if no kind has its name, ValueError if it is none of its kind).
+
+    One of a plug-in that is not here is a `RecordedQuestion`.
+    """
+    kind = _kind_of(table)
+    return (RecordedQuestion if ":" in kind and kind not in KINDS else KINDS[kind]).model_validate(table)

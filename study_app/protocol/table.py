@@ -10,7 +10,7 @@ import re
 import unicodedata
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Annotated, Any, ClassVar, Final, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Final, Generic, Self, TypeAlias, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -18,13 +18,17 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     StringConstraints,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticCustomError, to_jsonable_python
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema, to_jsonable_python
 
+from study_app.discovery import Registry
 from study_app.ids import MAX_ID
 
 Id: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=MAX_ID)]
@@ -156,4 +160,47 @@ class Table(BaseModel):
         node = handler(core_schema)
         stated: Any = ((ALTERNATIVES, cls.ONE_OF), (SECTIONS, cls.SECTIONS), (NOT_WITH, cls.NOT_WITH))
         handler.resolve_ref_schema(node).update((key, to_jsonable_python(value)) for key, value in stated if value)
+        return node
+
+
+K = TypeVar("K", bound=Table)
+RECORDED: Final = {"recorded": True}
+"""The context in which a recorded protocol is read: what a plug-in that is not here has added is kept as it stands."""
+
+
+class OfKinds(Generic[K]):
+    """Annotates the union of the program's own kinds of a table; a kind with a colon is that of a plug-in.
+
+    ``base`` is the class of all, ``stand_in`` holds a recorded table of a plug-in that is not here.
+    """
+
+    def __init__(self, registry: Registry[type[K]], base: type[K], stand_in: type[K]) -> None:
+        self.registry, self.base, self.stand_in = registry, base, stand_in
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Return the schema of the union, with what is validated before it."""
+        written = core_schema.simple_ser_schema("any")  # each kind writes its own keys
+        return core_schema.with_info_wrap_validator_function(self._validated, handler(source), serialization=written)
+
+    def _validated(self, value: Any, own: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        if isinstance(value, self.base):
+            return value
+        kind = value.get("kind") if isinstance(value, Mapping) else None
+        if not isinstance(kind, str) or ":" not in kind:
+            return own(value)
+        found, recorded = self.registry.get(kind), info.context == RECORDED
+        if found is None and not recorded:
+            message, hint = self.registry.missing(kind)
+            raise invalid(message, "kind", hint)
+        return (found or self.stand_in).model_validate(value, strict=not recorded, context=info.context)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Return the schema of the union, with the kinds of plug-ins."""
+        node = handler(schema)
+        for kind, found in self.registry.others.items():
+            part = handler(core_schema.definitions_schema(found.__pydantic_core_schema__, []))
+            handler.resolve_ref_schema(part)["title"] = kind  # classes of several packages may have one name
+            node["oneOf"].append(part)
+            if "discriminator" in node:
+                node["discriminator"]["mapping"][kind] = part["$ref"]
         return node

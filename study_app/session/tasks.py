@@ -12,12 +12,13 @@ entered by a later sample at the earliest.
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from pkgutil import resolve_name
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Point, Reach
+from study_app.protocol.trials.tasks import Point, Reach, Task
 
 Outcome: TypeAlias = Literal["complete", "timeout"]
 
@@ -122,27 +123,20 @@ class Tracker:
         self.outcome, self.end_ns, self._newest_ns = outcome, end_ns, end_ns
 
 
-class ExploreTracker(Tracker):
-    """Free exploration: the participant may go on after the least time and must after the longest."""
+class TimedTracker(Tracker):
+    """Time ends the task, or after its least time the participant; a target may move by the clock."""
 
-    def __init__(self, task: Explore) -> None:
-        super().__init__(task.max_s, "complete")
-        self._least_s = task.min_s
-
-    def leave(self) -> bool:
-        return self.finish(self._least_s)
-
-
-class FollowTracker(Tracker):
-    """Following: the target moves by the clock, and time alone ends the task."""
-
-    def __init__(self, task: Follow) -> None:
+    def __init__(self, task: Task) -> None:
         super().__init__(task.limit_s, "complete")
         self._task = task
 
+    def leave(self) -> bool:
+        return self._task.least_s is not None and self.finish(self._task.least_s)
+
     def _view(self, _time_ns: int, elapsed_ns: int) -> TaskView:
         elapsed_s = elapsed_ns / _NS
-        return TaskView(0, 0, None, 0.0, elapsed_s, self._task.target_m(elapsed_s))
+        target_m = self._task.target_m(elapsed_s)
+        return TaskView(None if target_m is None else 0, 0, None, 0.0, elapsed_s, target_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,15 +211,10 @@ class ReachTracker(Tracker):
         return TargetReached(lit, (time_ns - (self._start_ns or 0)) / _NS)
 
 
-def track(task: AnyTask) -> Tracker:
+def track(task: Task) -> Tracker:
     """Return a tracker at the beginning of ``task``."""
-    match task:
-        case Explore():
-            return ExploreTracker(task)
-        case Reach():
-            return ReachTracker(task)
-        case Follow():
-            return FollowTracker(task)
+    made: Tracker = resolve_name(task.tracker)(task)
+    return made
 
 
 def _nanoseconds(seconds: float) -> int:

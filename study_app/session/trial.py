@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NAMES, SAMPLE
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.telemetry import timing
-from study_app.protocol.trials.tasks import AnyTask, Follow
+from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.ports import RecorderPort, ServoPort
 from study_app.session.tasks import Outcome, TargetReached, TaskView, track
 from study_app.session.transitions.events import StartTrial
@@ -231,7 +231,7 @@ class RunningTrial:
         drawn_ns = now_ns - round((self._delay_s + SETTLED_S) * 1e9)
         position_m, shown_ns = self._servo.telemetry.position_at(drawn_ns)
         task = self._tracker.at(shown_ns)
-        hidden = self._hides_ball and task.elapsed_s >= self.command.task.lead_s
+        hidden = self._hides_ball and task.elapsed_s >= self.command.task.judged_from_s
         self._drawn_video = None if self._video is None else self._video.frame_at(drawn_ns)
         return TankView(position_m, task, shown_ns, hidden, self._drawn_video)
 
@@ -276,7 +276,7 @@ class RunningTrial:
     def leave(self) -> None:
         """End the task because the participant wants to go on, if it may end so already."""
         if self.command.adjusts:
-            self._tracker.finish(self.command.task.lead_s + LEAST_SET_S)
+            self._tracker.finish(self.command.task.judged_from_s + LEAST_SET_S)
         else:
             self._tracker.leave()
 
@@ -342,6 +342,6 @@ def resting_view(servo: ServoPort, task: AnyTask, now_ns: int) -> TankView:
 
 def ball_is_back(view: TankView, task: AnyTask) -> bool:
     """Return whether the ball is where the next interval of a task begins; tasks without such a place need none."""
-    if not isinstance(task, Follow):
+    if task.start_m is None:
         return True
     return math.dist(view.position_m.tolist(), task.start_m) <= task.radius_m

@@ -8,13 +8,15 @@ the status, at the end.
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import study_app
+from study_app.discovery import registry
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import block_codes, order_of
@@ -72,6 +74,31 @@ def versions() -> dict[str, str]:
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         **{library: library_version(library) for library in _LIBRARIES},
     }
+
+
+def plug_ins_of(protocol: Protocol, device: str, outlets: Iterable[str]) -> list[dict[str, str]]:
+    """Return the plug-ins that a session uses: by its protocol, its device and the titles of its outlets."""
+    sinks = registry("outlet")
+    asked = [
+        *(("task", task.kind) for task in protocol.tasks.values()),
+        *(("method", method.kind) for method in protocol.methods.values()),
+        *(("question", item.kind_id) for form in protocol.questionnaires.values() for item in form.items),
+        ("device", device.partition(":")[0]),
+    ]
+    if others := set(outlets) - {kind.title for kind in sinks.own.values()}:
+        asked += [("outlet", kind.name) for kind in sinks.others.values() if kind.title in others]
+    found = {one for kind, name in asked if (one := registry(kind).plug_in(name)) is not None}
+    return [one.described for one in sorted(found, key=str)]
+
+
+def recorded_plug_ins(receipts: Iterable[Path]) -> dict[str, list[str]]:
+    """Return the plug-ins that receipts name: kinds and names by package and version."""
+    found: dict[str, set[str]] = {}
+    for path in receipts:
+        with suppress(StoreError, KeyError, TypeError):
+            for one in read(path).get("plug_ins", ()):
+                found.setdefault(f"{one['package']} {one['version']}", set()).add(f"{one['kind']} {one['name']}")
+    return {package: sorted(names) for package, names in sorted(found.items())}
 
 
 @cache
@@ -139,7 +166,7 @@ def _holds(name: str, value: object) -> bool:
         "video",
     ):
         return isinstance(value, dict)
-    if name == "resumed":
+    if name in ("plug_ins", "resumed"):
         return isinstance(value, list)
     if name in ("started_at", "ended_at"):
         return value is None or holds("at", value)

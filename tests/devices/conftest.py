@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from study_app.devices.registry import discover
 from tests.devices.force_dimension.standin import COMPILER, StandIn, build
-from tests.devices.packages import TEMPLATE, install_metadata
+from tests.plug_in_packages import TEMPLATE, forget, install
 
 
 @pytest.fixture
@@ -22,13 +21,13 @@ def falcon_socket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[N
     site = tmp_path / "packages"
     site.mkdir()
     points = {"falcon-socket": "tests.devices.falcon.served.device:FALCON_SOCKET"}
-    install_metadata(site, "liquid_study_socket", "1.0", points)
+    install(site, "liquid_study_socket", "device", points)
     monkeypatch.syspath_prepend(site)
     paths = (str(site), str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, paths)))  # an empty one is the present folder
-    discover.cache_clear()
+    forget()
     yield
-    discover.cache_clear()
+    forget()
 
 
 @pytest.fixture(autouse=True)
@@ -47,9 +46,7 @@ def built_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command = [sys.executable, "-W", "ignore", "setup.py", "-q", "build_ext", "--inplace"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
-    install_metadata(
-        folder / "src", "liquid_study_example", project["version"], project["entry-points"]["liquid_study.devices"]
-    )
+    install(folder / "src", "liquid_study_example", "device", project["entry-points"]["liquid_study.devices"])
     return folder / "src"
 
 
@@ -57,9 +54,9 @@ def built_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def template(built_template: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Install the built template."""
     monkeypatch.syspath_prepend(built_template)
-    discover.cache_clear()
+    forget()
     yield built_template
-    discover.cache_clear()
+    forget()
 
 
 @pytest.fixture(scope="session")

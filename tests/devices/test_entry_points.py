@@ -1,15 +1,12 @@
 """A device of another package: found at its entry point, and used everywhere, without a change of this package."""
 
 import json
-import sys
-from pathlib import Path
-from textwrap import dedent
 
 import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.devices.registry import backends, discover, list_devices, open_device
+from study_app.devices.registry import backends, list_devices, open_device
 from study_app.errors import DeviceError
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.home.dialogs import NewSessionDialog
@@ -18,7 +15,7 @@ from study_app.gui.kit.devices import devices_shown
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from tests.compiled import needs_servo
-from tests.devices.packages import install_metadata
+from tests.plug_in_packages import forget, install
 
 pytestmark = pytest.mark.slow
 
@@ -72,32 +69,21 @@ DRIVER = """
 """
 
 
-def install(site: Path, package: str, entry_points: dict[str, str], **modules: str) -> None:
-    """Write an installed package: its modules and its metadata."""
-    for name, source in modules.items():
-        (site / f"{name}.py").write_text(dedent(source))
-    install_metadata(site, package, "1.0", entry_points)
-
-
 @pytest.fixture
 def site(tmp_path, monkeypatch):
     """Return a folder that packages can be installed into."""
     folder = tmp_path / "site"
     folder.mkdir()
     monkeypatch.syspath_prepend(folder)
-    before = set(sys.modules)
+    forget()
     yield folder
-    discover.cache_clear()
-    for name in set(sys.modules) - before:
-        if name.startswith("toy_"):
-            del sys.modules[name]
+    forget("toy_")
 
 
 @pytest.fixture
 def toy(site):
     """Install the toy device."""
-    install(site, "toy_hand", {"toy-hand": "toy_hand:TOY"}, toy_hand=DESCRIPTOR, toy_driver=DRIVER)
-    discover.cache_clear()
+    install(site, "toy_hand", "device", {"toy-hand": "toy_hand:TOY"}, toy_hand=DESCRIPTOR, toy_driver=DRIVER)
 
 
 def liquid_study(*words: str):
@@ -180,8 +166,7 @@ class TestDeviceOfAnotherPackage:
     ],
 )
 def test_a_broken_entry_point_is_one_row_and_every_other_device_stays(site, qtbot, value, source, reason):
-    install(site, "toy_broken", {"toy": value}, toy_broken=source)
-    discover.cache_clear()
+    install(site, "toy_broken", "device", {"toy": value}, toy_broken=source)
     listed = liquid_study("devices")
     assert listed.exit_code == 0
     (broken,) = (one for one in backends() if one.name == "toy (toy_broken)")
@@ -203,12 +188,12 @@ def test_a_device_that_cannot_be_looked_for_hides_no_other(site):
     install(
         site,
         "toy_blind",
+        "device",
         {"toy": "toy_blind:TOY"},
         toy_blind=DESCRIPTOR.replace(
             '[Backend("toy-hand", "a string", READY, "moves by itself, as a toy does")]', "1 / 0"
         ),
     )
-    discover.cache_clear()
     found = {one.name: one for one in backends()}
     assert found["toy-hand"].why == "it cannot be looked for: division by zero"
     assert {"mouse", "falcon", "scripted"} <= set(found)

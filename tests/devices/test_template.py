@@ -13,8 +13,8 @@ import pytest
 from study_app.devices.registry import backends, open_device
 from study_app.haptics.model import layout
 from tests.compiled import needs_servo
-from tests.devices.packages import TEMPLATE
 from tests.devices.subjects import until, write
+from tests.plug_in_packages import TEMPLATE
 
 SOURCES = Path("src", "liquid_study_example")
 COMPILER = shutil.which("cc")

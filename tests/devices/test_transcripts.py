@@ -11,7 +11,7 @@ import pytest
 
 from study_app.devices.doctor import Report, lines
 from study_app.devices.falcon.failures import failures_on
-from study_app.devices.registry import discover
+from study_app.devices.registry import all_devices
 from tests.compiled import needs_servo
 from tests.devices.subjects import Subject, falcon, force_dimension, inverse3, mouse, over, scripted
 from tests.golden import compare
@@ -34,7 +34,7 @@ def test_what_can_go_wrong_with_a_falcon(pytestconfig: pytest.Config) -> None:
 
 def test_descriptors(pytestconfig: pytest.Config) -> None:
     told = list[str]()
-    for one in discover().devices:
+    for one in all_devices():
         name = one.name
         values = one.window_values({"firmware": "/f.bin", "dhd-library": "/l.so", "nothing": "x"})
         told += [*value_lines(one, name), f"{name}: {one.label} {dict(values)}"]

@@ -15,7 +15,7 @@ import pytest
 from study_app.errors import OutletError
 from study_app.outlets import sinks
 from study_app.outlets.markers import CODES, HIGH_S, LOW_S, SinkThread, TriggerSink
-from study_app.outlets.session_outlets import open_sink, sink_kinds
+from study_app.outlets.session_outlets import SINKS, open_sink
 from study_app.outlets.sinks import PPCLAIM, PPEXCL, PPRELEASE, PPWCONTROL, PPWDATA, ParallelPort
 from tests.outlets.sinks import Recorder, marker
 
@@ -113,7 +113,7 @@ KINDS = {"serial": serial, "parallel": parallel, "lsl": lsl}
 
 
 def test_every_kind_is_tried_here() -> None:
-    assert set(sink_kinds()) == set(KINDS)
+    assert set(SINKS) == set(KINDS)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from typing import Any, Final
 from PySide6.QtWidgets import QDialog
 
 from study_app.app.main_controller import MainController
-from study_app.devices.registry import discover
+from study_app.devices.registry import all_devices
 from study_app.gui.home.study_facts import StudyFacts, study_facts
 from study_app.gui.settings.display_test import DisplayTest
 from study_app.gui.theme.theme import Theme
@@ -80,9 +80,7 @@ def _take_devices(camera: Camera, controller: MainController, theme: Theme) -> N
     controller.window.go("devices")
     camera.take(controller.window, f"devices-{theme.name}", HOME)
     over: list[bool] = []
-    controller.devices.diagnose(
-        next(it.name for it in discover().devices if it.doctor is not None and it.moves_by_itself)
-    )
+    controller.devices.diagnose(next(it.name for it in all_devices() if it.doctor is not None and it.moves_by_itself))
     dialog = controller.devices.dialog
     assert dialog is not None  # noqa: S101 - it was just opened
     dialog.over.connect(over.append)

@@ -11,6 +11,7 @@ from study_app.analysis.data.blocks import PlacedQuestion, PlacedScore, Question
 from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.results import GroupAnswers, QuestionResult, ScoreResult, number
+from study_app.discovery import by_name
 from study_app.protocol.questionnaires import instrument, instruments, score
 
 Numbers: TypeAlias = Mapping[str, Any]
@@ -155,7 +156,7 @@ def score_results(study: Study) -> tuple[ScoreResult, ...]:
 
 
 def _question_result(study: Study, asked: PlacedQuestion) -> QuestionResult:
-    measure = MEASURES[asked.question.measure]
+    measure = by_name(MEASURES, asked.question.measure)
     return QuestionResult(
         where=asked.where.id,
         title=asked.where.title,

@@ -24,6 +24,7 @@ from study_app.analysis.figures.page_layout import (
     sample_words,
 )
 from study_app.analysis.results import Failures, QuestionResult
+from study_app.discovery import by_name
 
 LEFT_PT: Final = 120.0
 RIGHT_PT: Final = 40.0
@@ -214,7 +215,7 @@ def question_pictures(
 
 
 def _picture(study: Study, asked: PlacedQuestion, found: QuestionResult, forms: Sequence[str], name: str) -> Picture:
-    figure = FIGURES[found.figure or ""]
+    figure = by_name(FIGURES, found.figure or "")
     title = found.short if found.short == found.title else f"{found.title}: {found.short}"
     caption = f"{found.title}: “{found.text}” {figure.caption} {sample_words(study, study.n)}"
     return picture_of(study, found.where, name, title, caption, partial(figure.draw, asked, found), forms)

@@ -370,7 +370,7 @@ class Finding(Generic[R]):
     """
 
     key: ClassVar[str]
-    place: ClassVar[float]
+    place: ClassVar[float] = 50
     row_place: ClassVar[float] = 100
     what: ClassVar[str] = ""
     kinds: ClassVar[tuple[Kind, ...]] = KINDS

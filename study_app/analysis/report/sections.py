@@ -46,6 +46,7 @@ from study_app.analysis.results import (
     short,
 )
 from study_app.analysis.statistics.outcome import FEW
+from study_app.discovery import by_name
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import named
@@ -401,7 +402,7 @@ def question_section(where: str, study: Study, results: Results, drawn_: Sequenc
         if not found.n:
             yield paragraph("No answers count yet.")
             continue
-        measure = MEASURES[found.measure]
+        measure = by_name(MEASURES, found.measure)
         if measure.cells is None:
             for group in found.groups:
                 if len(found.groups) > 1:

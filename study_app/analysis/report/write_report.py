@@ -25,7 +25,7 @@ from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.page_layout import Picture
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.study_figures import pictures
-from study_app.analysis.findings import all_findings
+from study_app.analysis.findings import FINDINGS, all_findings
 from study_app.analysis.findings.finding import TESTS
 from study_app.analysis.levels.evaluate import level_entries
 from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
@@ -51,6 +51,7 @@ from study_app.store.blinded.unblinding import reveals_of
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
 from study_app.store.output_files import write_output
+from study_app.store.receipt import recorded_plug_ins
 from study_app.store.sites.merged import MANIFEST, folders_of
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
@@ -150,6 +151,7 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
     """Return everything as JSON; ``texts`` are the findings in words. A part that fails is null."""
     parts: dict[str, Callable[[], Any]] = {
         "versions": versions,
+        **({"plug_ins": lambda: used} if (used := plug_ins(study)) else {}),
         "study": lambda: {
             **study_head(study),
             "blinded": not study.revealed,
@@ -181,6 +183,16 @@ def versions() -> dict[str, str]:
         "python": python_version(),
         **{library: metadata.version(library) for library in LIBRARIES},
     }
+
+
+def plug_ins(study: Study) -> dict[str, list[str]]:
+    """Return the plug-ins that the sessions used, and those of this report: kinds and names by package and version."""
+    places = map(StudyFolder, folders_of(study.folder).values())
+    found = recorded_plug_ins(session.receipt for place in places for session in place.sessions())
+    for one in FINDINGS.plug_ins:
+        if not one.fault:
+            found.setdefault(f"{one.package} {one.version}", []).append(f"{one.kind} {one.name}")
+    return found
 
 
 def sessions(study: Study) -> list[dict[str, Any]]:
@@ -371,6 +383,7 @@ def _again(study: Study, results: Results) -> Iterator[str]:
         ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),
         ("Seed of the analysis", str(results.seed)),
         *((f"Version of {library}", version) for library, version in versions().items()),
+        *((f"Plug-in {package}", ", ".join(names)) for package, names in plug_ins(study).items()),
         ("Key opened", "; ".join(map(_opened, reveals_of(study.folder))) or "no"),
     ]
     yield table(("Setting", "Value"), rows, words=2)

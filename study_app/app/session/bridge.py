@@ -21,6 +21,7 @@ from study_app.app.session.operator import OperatorMonitor, Parts, Reconnection,
 from study_app.app.session.timing import FrameBudget, ThreadPriority, freeze_garbage, unfreeze_garbage
 from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
+from study_app.discovery import explained
 from study_app.errors import DeviceError, DisplayError, ServoFault, StudyError, VideoError
 from study_app.gui.display.screens import Frames, has_card, place
 from study_app.gui.operator.operator_view import OperatorView, Session, stages
@@ -211,12 +212,13 @@ class SessionBridge(QObject):
         """Zero force, then say what failed: to the journal, if it still takes it, and to the operator."""
         self.parts.servo.stop_force()
         first = not self.trouble
+        raised, error = error, explained(error)
         what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
         if not first:
             return
         self.trouble, self.failure = what, error
-        log.error("the session failed: %s", error if isinstance(error, StudyError) else what, exc_info=_trace_of(error))
-        traceback.clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
+        log.error("the session failed: %s", what, exc_info=_trace_of(raised))
+        traceback.clear_frames(raised.__traceback__)  # they may hold a painter, and Qt would paint no window any more
         try:
             if not self.runner.finished:
                 self.runner.post(broken(self._now(), error))

@@ -24,6 +24,7 @@ from study_app.app.failures import BY_SIGNAL_S, CrashTrace
 from study_app.app.session.timing import unfreeze_garbage
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
+from study_app.discovery import explained
 from study_app.errors import SessionError, StoreError, StudyError
 from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.home.startup_window import OpeningWindow
@@ -196,12 +197,13 @@ class LiveSession(QObject):
         """Take a step toward the first page; whatever it meets ends in order."""
         try:
             step()
-        except StudyError as error:
-            self.error = error
-            self._close()
-        except Exception:  # noqa: BLE001 - printed; what is open must be closed in order
-            traceback.print_exc()
-            self.code = BUG
+        except Exception as raised:  # noqa: BLE001 - told; what is open must be closed in order
+            error = explained(raised)
+            if isinstance(error, StudyError):
+                self.error = error
+            else:
+                traceback.print_exc()
+                self.code = BUG
             self._close()
 
     def _ask(self, made: Ready) -> None:

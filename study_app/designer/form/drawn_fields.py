@@ -46,13 +46,12 @@ from study_app.gui.widgets.boxes import add_parts, hbox
 from study_app.gui.widgets.cards import smooth_painter
 from study_app.gui.widgets.numbers import Range
 from study_app.number_text import capitalised, duration, exact_duration
-from study_app.protocol.model import Reach
 from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
 from study_app.protocol.source.document import Path
 from study_app.protocol.trials.designs import ORDINALS, default_design
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.trials.tasks import AnyTask, Follow
+from study_app.protocol.trials.tasks import AnyTask
 from study_app.protocol.trials.tracks import design_of, method_of
 
 FARTHEST: Final = 3.0
@@ -433,9 +432,7 @@ def trial_strip(study: Study, row: Row) -> TrialStrip | None:
 
 def _length(task: AnyTask) -> str:
     """Return the key that says how long a task takes."""
-    if isinstance(task, Reach):
-        return "duration_s" if task.count is None else "count"
-    return "cycles" if isinstance(task, Follow) else "max_s"
+    return next((key for key in ("count", "duration_s", "cycles", "max_s") if getattr(task, key, None)), "kind")
 
 
 PICTURE_PX, GAP = 52, 6

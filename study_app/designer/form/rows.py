@@ -195,5 +195,7 @@ def choice_words(choice: Choice, default: object) -> str:
     """Return what a choice is called: its value in words, marked where it counts without being written."""
     if choice.value is None:
         return "Not set"
-    words = label_of(str(choice.value)) if not str(choice.value).isdigit() else str(choice.value)
+    package, _, name = str(choice.value).rpartition(":")
+    words = name if name.isdigit() else label_of(name)
+    words = f"{words} ({package})" if package else words
     return f"{words} (default)" if choice.value == default else words

@@ -32,8 +32,10 @@ from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
+from study_app.protocol import questions
 from study_app.protocol.orders.sequences import borders_even, row_count
 from study_app.protocol.source.document import value_at
+from study_app.protocol.trials import designs, tasks
 from study_app.protocol.wording.languages import language_name
 
 ROUNDS: Final = 3
@@ -242,9 +244,10 @@ class DescriptionField(LineField):
 DESCRIPTION: Final = SpecialEditor((("StudyHead", "description"),), DescriptionField)
 
 
-QUESTIONS: Final = ("Statement", "Rating", "Slider", "Number", "Choice", "Text")
-TASKS: Final = ("Explore", "Reach", "Follow")
-DESIGNS: Final = ("Abx", "Adjusted", "Estimation", "ForcedChoice", "Oddity", "Rated", "SameDifferent", "YesNo")
+QUESTIONS: Final = (*(kind.__name__ for kind in questions.KINDS.own.values()), *questions.KINDS.others)
+TASKS: Final = (*(kind.__name__ for kind in tasks.KINDS.own.values()), *tasks.KINDS.others)
+DESIGNS: Final = tuple({kind.__name__ for kind in designs.KINDS.values()})
+"""The titles of their tables."""
 
 
 class SentencesField(LanguagesField):

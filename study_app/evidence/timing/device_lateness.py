@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.devices.hand import hand_of
-from study_app.devices.registry import discover, open_device
+from study_app.devices.registry import all_devices, open_device
 from study_app.evidence.table import TURN_S, Evidence, check_seconds, take_turns
 from study_app.evidence.timing.measurement import PERIOD_NS, ServoLoop, granted
 
@@ -53,7 +53,7 @@ class DeviceLateness:
 
 def emulated_devices() -> tuple[str, ...]:
     """Return the names of the devices that move by themselves, the scripted hand first."""
-    names = [device.name for device in discover().devices if device.moves_by_itself]
+    names = [device.name for device in all_devices() if device.moves_by_itself]
     return (REFERENCE, *(name for name in names if name != REFERENCE))
 
 

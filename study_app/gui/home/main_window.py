@@ -18,6 +18,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QDialog, QMainWindow, QSizePolicy, QStackedWidget, QWidget
 from shiboken6 import isValid
 
+from study_app.discovery import explained
 from study_app.errors import StudyError
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.icons import draw_icon
@@ -177,7 +178,9 @@ NARROW_BELOW = 1680
 
 
 def bug_words(error: BaseException) -> str:
-    """Return what is said of an exception that is a bug."""
+    """Return what is said of an exception that no user can mend, unless a plug-in raised it."""
+    if isinstance(said := explained(error), StudyError):
+        return f"{said}."
     return f"{type(error).__name__}: {error}. This is a bug: please report it, with what the terminal shows."
 
 
@@ -274,7 +277,7 @@ class MainWindow(Themed, QMainWindow):
             return
         self.not_opened = error
         word = next(place.word for place in DESTINATIONS if place.name == name)
-        what = f"{error}." if isinstance(error, StudyError) else bug_words(error)
+        what = bug_words(error)
         again = ActionButton("", "Try again", role="primary")
         notice = Question(self, self.theme, f"“{word}” could not be opened", what, again, back="Close")
         notice.accepted.connect(lambda: self.go(name))

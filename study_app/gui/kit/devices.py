@@ -11,7 +11,7 @@ from PySide6.QtGui import QScreen
 
 from study_app.devices import DEFAULT_DEVICE
 from study_app.devices.descriptor import DRIVER_READY, NONE, READY, Backend, DeviceDescriptor, DeviceOption
-from study_app.devices.registry import descriptor_of, discover, list_devices, title_of
+from study_app.devices.registry import DEVICES, all_devices, descriptor_of, list_devices, title_of
 from study_app.errors import DeviceError
 from study_app.gui.display.screens import BY_CLOCK, LOCKED, describe_screen, has_card, screen_shown, screens_shown
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
@@ -145,7 +145,7 @@ def device_or_default(device: str) -> str:
 
 def window_options() -> tuple[DeviceOption, ...]:
     """Return the options of all devices that windows ask for, each name once."""
-    return tuple({option.name: option for device in discover().devices for option in device.window_options}.values())
+    return tuple({option.name: option for device in all_devices() for option in device.window_options}.values())
 
 
 def remembered_options() -> tuple[DeviceOption, ...]:
@@ -200,8 +200,7 @@ def _state(backend: Backend, *, by_command: bool) -> tuple[Tone, str, str]:
 
 def _descriptor(name: str) -> DeviceDescriptor | None:
     """Return the descriptor of a device; None of one that could not be loaded."""
-    kind = name.partition(":")[0]
-    return next((device for device in discover().devices if device.name == kind), None)
+    return DEVICES.get(name.partition(":")[0])
 
 
 def _sentence(words: str) -> str:

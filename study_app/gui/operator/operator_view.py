@@ -14,9 +14,8 @@ from study_app.devices.descriptor import Icon
 from study_app.gui.operator.servo_health import ForceFigures, Tile, Vitals, force_rows, health_tiles
 from study_app.gui.sessions.session_facts import operator_language, step_title
 from study_app.number_text import counted, grouped, minutes
-from study_app.protocol.model import Protocol, Reach
+from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, Schedule, Step, Trial
-from study_app.protocol.trials.tasks import Explore
 from study_app.protocol.trials.tracks import design_of
 from study_app.protocol.wording.languages import words
 from study_app.store.delivered import Broken
@@ -334,8 +333,8 @@ def _setting_line(session: Session, progress: Progress, *, answering: bool) -> s
         doing = "paused"
     elif answering:
         doing = "answering"
-    if isinstance(task, Reach):
-        doing += f"  ·  {progress.targets} {'targets' if task.count is None else f'of {task.count} targets'}"
+    if task.targets_m:
+        doing += f"  ·  {progress.targets} {'targets' if task.wanted is None else f'of {task.wanted} targets'}"
     if trial.phase != "main":
         return doing.capitalize()
     return f"{trial.label(session.protocol, session.language)}  ·  {doing}"
@@ -352,7 +351,7 @@ def _trial_time(session: Session, progress: Progress, now_s: float) -> TrialTime
         elapsed = now_s - (progress.trial_since_s if progress.trial_since_s is not None else now_s)
     if progress.of_intervals == trial.number:  # the task's limits are those of each interval
         return TrialTime(elapsed, None, None)
-    return TrialTime(elapsed, task.min_s if isinstance(task, Explore) else None, task.limit_s)
+    return TrialTime(elapsed, task.least_s, task.limit_s)
 
 
 def _step_row(stage: Stage, progress: Progress) -> StepRow:

@@ -46,8 +46,6 @@ from study_app.gui.participant.tank.layers import (
 )
 from study_app.gui.theme.theme import TANK
 from study_app.gui.widgets.accessible import say
-from study_app.protocol.model import Reach
-from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.pages import TaskPage
 from study_app.session.tasks import track
 
@@ -141,12 +139,9 @@ class TankWidget(QWidget):
     @property
     def may_leave(self) -> bool:
         """Whether the exploration shown has had its least time, so that the participant may go on."""
-        task = self._page.task
+        least_s = self._page.task.least_s
         return (
-            not self.resting
-            and isinstance(task, Explore)
-            and self.view is not None
-            and self.view.task.elapsed_s >= task.min_s
+            not self.resting and least_s is not None and self.view is not None and self.view.task.elapsed_s >= least_s
         )
 
     @property
@@ -266,10 +261,12 @@ class TankWidget(QWidget):
         todo, view, words = self._page.task, self.view, self._words
         if self._page.adjusts:
             return self._captions.setting_keys if self._by_mouse else ""
-        following = isinstance(todo, Follow) and not self.resting
-        if view is None or view.task.lit is None or isinstance(todo, Explore) or following:
+        following = todo.paced and not self.resting
+        if view is None or view.task.lit is None or following:
             return ""
-        target = todo.targets_m[view.task.lit] if isinstance(todo, Reach) else todo.start_m
+        target = todo.targets_m[view.task.lit] if todo.targets_m else todo.start_m
+        if target is None:
+            return ""
         x, y, z = (there - float(here) for there, here in zip(target, view.position_m, strict=True))
         if self._by_mouse and math.hypot(x, y) <= NEAR_RADII * todo.radius_m and abs(z) > todo.radius_m:
             return words.nearer if z > 0 else words.further_away
@@ -295,22 +292,22 @@ class TankWidget(QWidget):
             radius, haze = self.placer.size(step)
             sprites.ball(radius, ratio, haze)
         todo = self._page.task
-        self.targets = self._placed_targets(todo.targets_m if isinstance(todo, Reach) else ())
+        self.targets = self._placed_targets(todo.targets_m)
         self._stroke = max(2.0, self.camera.scale((0, 0, 0)) * 0.0010)
         self.things = self._frame()
 
     def _placed_targets(self, centres_m: tuple[Point, ...]) -> tuple[TargetPlace, ...]:
-        todo = self._page.task
-        if self.camera is None or isinstance(todo, Explore):
+        if self.camera is None:
             return ()
-        around_m = todo.radius_m + self._page.body_radius_m  # the ball is inside the ring while its centre counts
+        # the ball is inside the ring while its centre counts
+        around_m = self._page.task.radius_m + self._page.body_radius_m
         return tuple(target_place(self.camera, self._box, centre, around_m) for centre in centres_m)
 
     def _frame(self) -> dict[str, Placed]:
         task = self._task
         lit = task.lit if task else None
-        if isinstance(self._page.task, Follow):
-            self.targets = self._placed_targets(((task and task.target_m) or self._page.task.target_m(0.0),))
+        if (moving_m := (task and task.target_m) or self._page.task.target_m(0.0)) is not None:
+            self.targets = self._placed_targets((moving_m,))
         things: dict[str, Placed] = {}
         for index, target in enumerate(self.targets):
             is_lit, x = index == lit, target.middle.x()

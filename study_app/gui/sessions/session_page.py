@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDialog, QScrollArea, QStackedWidget, QWidget
 
-from study_app.devices.registry import discover
+from study_app.devices.registry import DEVICES
 from study_app.errors import StoreError
 from study_app.gui.kit.dialogs import REASON, Question
 from study_app.gui.kit.fields import Field, choice
@@ -117,7 +117,8 @@ def read_record(folder: Path) -> SessionRecord:
     start = start_of(lines)
     rows = session_tables.SessionRows(lines).trials
     trials = _trials(session, rows, lines, start.limits, own)
-    measured = any(device.name == start.device and not device.motion_shows_force for device in discover().devices)
+    device = DEVICES.get(start.device or "")
+    measured = device is not None and not device.motion_shows_force
     return SessionRecord(
         facts=facts,
         about=_about(lines, incidents(facts)),

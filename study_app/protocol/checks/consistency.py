@@ -38,7 +38,7 @@ from study_app.protocol.model import (
 from study_app.protocol.source.document import Path, names
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.trials.stimuli import OF_CONDITION
-from study_app.protocol.trials.tasks import Stroke, Task
+from study_app.protocol.trials.tasks import AnyTask, Stroke
 
 LEAST_N: Final = 0.01
 """Less is not felt: a tenth of the force that a hand at rest notices. [choice]"""
@@ -60,7 +60,7 @@ class Draft(BaseModel):
     scene: SceneDefaults | None = None
     liquids: Named[StudyLiquid] = {}
     conditions: dict[str, Condition] = {}
-    tasks: dict[str, Task] = {}
+    tasks: dict[str, AnyTask] = {}
     pages: dict[str, PageText] = {}
     blocks: Named[Block] = {}
     sequence: tuple[str, ...] = ()

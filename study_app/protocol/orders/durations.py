@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from study_app.protocol.groups import numbered_parts, session_count, sessions_differ, steps_of
-from study_app.protocol.model import Block, Explore, Protocol, Questionnaire
+from study_app.protocol.model import Block, Protocol, Questionnaire
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.tasks import AnyTask
@@ -76,7 +76,7 @@ def duration_range_s(protocol: Protocol) -> tuple[float, float]:
 
     kinds = [one.protocol for one in variants(protocol)]
     least_s = min(
-        session_s(one, lambda task: task.min_s if isinstance(task, Explore) else task.expected_s) for one in kinds
+        session_s(one, lambda task: task.expected_s if task.least_s is None else task.least_s) for one in kinds
     )
     return least_s, max(session_s(one, lambda task: task.limit_s) for one in kinds)
 

@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any, Final, TypeAlias
 
 from pydantic import BaseModel
-from pydantic.json_schema import GenerateJsonSchema
+from pydantic.json_schema import CoreModeRef, DefsRef, GenerateJsonSchema
 from pydantic_core import to_jsonable_python
 
 from study_app.protocol.formats import relax
@@ -30,6 +30,13 @@ class _Generator(GenerateJsonSchema):
     def encode_default(self, dft: Any) -> Any:
         """Return a default as JSON."""
         return to_jsonable_python(dft)
+
+    def get_defs_ref(self, core_mode_ref: CoreModeRef) -> DefsRef:
+        """Return the name of a definition; one of a plug-in has its module's, too."""
+        ref = super().get_defs_ref(core_mode_ref)
+        if not core_mode_ref[0].startswith("study_app."):
+            del self._prioritized_defsref_choices[ref][:2]
+        return ref
 
 
 @cache

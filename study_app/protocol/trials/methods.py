@@ -14,13 +14,16 @@ from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, TypeAlias
 
+import numpy as np
 from numpy.random import Generator
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
+from study_app.discovery import Registry
+from study_app.errors import PlugInError
 from study_app.haptics.model.ranges import within
 from study_app.number_text import counted
 from study_app.protocol.streams import Draw, shuffle
-from study_app.protocol.table import Table
+from study_app.protocol.table import OfKinds, Table
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import (
     CONSTANT_LEVELS,
@@ -156,9 +159,22 @@ class Method(Table):
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
         """Return the answers of simulated observers to one track each, of a method whose levels answers can have.
 
-        ``noise`` (tracks, noise trials) are the uniform numbers of the answers to noise trials.
+        ``noise`` (tracks, noise trials) are the uniform numbers of the answers to noise trials. Levels are asked for
+        one after the other here, as a session does; a kind that can compute all tracks at once does so, much faster.
         """
-        raise NotImplementedError(self.kind)
+        stimulus, trials = track.stimulus, self.presentations(track.stimulus)
+        draws = random.random((len(observers.thresholds), trials))
+        levels, successes = np.full(draws.shape, np.nan), np.zeros(draws.shape, bool)
+        for one, of_track in enumerate(draws):
+            seeds, heard = random.integers(2**32, size=max(1, self.rounds(stimulus))), list[TrialResult]()
+            while len(heard) < trials and not self.ended(track, heard):
+                number, sources = len(heard), [np.random.default_rng(seed).random for seed in seeds]
+                level = self.level(track, number, heard, sources)
+                levels[one, number] = stimulus.coordinate(level)
+                right = bool(of_track[number] < observers.probability(levels[one, number])[one])
+                successes[one, number] = right
+                heard.append(TrialResult(number, "", level, right, right))
+        return Answers(levels, successes)
 
     def rounds(self, stimulus: Stimulus) -> int:
         """Return how many rounds of drawn levels a track has."""
@@ -561,17 +577,33 @@ def _in_u(stimulus: Stimulus, answers: Sequence[Answer]) -> list[Answer]:
     return [(stimulus.coordinate(level), success) for level, success in answers]
 
 
-KINDS: Final[dict[str, type[Method]]] = {
-    "adjustment": Adjustment,
-    "constant": Constant,
-    "questplus": QuestPlus,
-    "updown": UpDown,
-}
+class RecordedMethod(Method):
+    """A method of a plug-in that is not here, as a key holds it: its levels were presented, and are not computed."""
+
+    model_config = ConfigDict(extra="allow")
+
+    kind: str
+
+    def presentations(self, stimulus: Stimulus) -> int:
+        raise PlugInError(f"{': '.join(KINDS.missing(self.kind))}")
+
+    def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
+        return stimulus.levels
+
+    def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
+        return float(self.presentations(track.stimulus))
+
+
+KINDS: Final = Registry[type[Method]](
+    "method", {"adjustment": Adjustment, "constant": Constant, "questplus": QuestPlus, "updown": UpDown}, Method, "kind"
+)
 
 if TYPE_CHECKING:
     AnyMethod: TypeAlias = Method
 else:
-    AnyMethod = Annotated[reduce(or_, KINDS.values()), Field(discriminator="kind")]
+    AnyMethod = Annotated[
+        reduce(or_, KINDS.own.values()), Field(discriminator="kind"), OfKinds(KINDS, Method, RecordedMethod)
+    ]
 
 
 def default_method(kind: str) -> Method:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from functools import reduce
 from itertools import pairwise
-from typing import Annotated, ClassVar, Final, Literal, NamedTuple, Self, TypeAlias
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, NamedTuple, Self, TypeAlias
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
+from study_app.discovery import Registry
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import Localised, Table, invalid
+from study_app.protocol.table import Localised, OfKinds, Table, invalid
 
 Seconds: TypeAlias = Annotated[float, within(0.1, 3600, "a hand moves within 0.1 s, no trial takes an hour")]
 Radius: TypeAlias = Annotated[float, within(0.5, 100, "a hand at rest trembles by a few tenths of a millimetre")]
@@ -36,12 +39,73 @@ SHAKE_M: Final = 0.03
 """As quick and as wide as free shaking of a light handle commonly is. [choice]"""
 
 
-class Explore(Table):
-    """Free motion in the tank, for ``min_s`` to ``max_s``; after ``min_s`` the participant may continue.
+class Task(Table):
+    """What the hand does in an interval: what each kind says of itself.
 
-    A task of any kind takes about ``expected_s`` and ends by itself after ``limit_s``; ``summary`` and ``activity`` are
-    words for those who read the study. The ball must be at ``start_m`` before an interval begins, if that is given.
+    A kind is a subclass whose ``kind`` is a ``Literal``, in `KINDS`, with a key ``instruction``. ``activity`` and
+    ``summary`` are words for those who read the study. ``tracker`` and ``hand`` name the class that follows the task
+    through the samples of a trial and the one that does it with a simulated hand, ``module:Class``.
     """
+
+    if TYPE_CHECKING:
+        kind: str
+        instruction: Localised | None
+
+    activity: ClassVar[str] = "doing the task"
+    tracker: ClassVar[str] = "study_app.session.tasks:TimedTracker"
+    hand: ClassVar[str] = "study_app.session.simulated.observers:Explorer"
+    start_m: ClassVar[Point | None] = None
+    """Where the ball must be before an interval begins [m, hand frame]; None: anywhere."""
+    targets_m: ClassVar[tuple[Point, ...]] = ()
+    """The targets that stand still [m, hand frame]."""
+    radius_m: ClassVar[float] = 0.0
+    """Of the targets [m]."""
+    wanted: ClassVar[int | None] = None
+    """How many targets complete it; None: time does."""
+    least_s: ClassVar[float | None] = None
+    """The time after which the participant may go on [s]; None: the task ends by itself."""
+    judged_from_s: ClassVar[float] = 0.0
+    """How much of its beginning is not judged [s]."""
+
+    @property
+    def summary(self) -> str:
+        return f"{self.activity} for {self.limit_s:g} s"
+
+    @property
+    def limit_s(self) -> float:
+        """The time after which it ends by itself [s]."""
+        raise NotImplementedError(self.kind)
+
+    @property
+    def expected_s(self) -> float:
+        """How long people take [s]."""
+        return self.limit_s
+
+    @property
+    def shortest_s(self) -> float:
+        """How long it takes at least [s]."""
+        return self.limit_s if self.least_s is None else self.least_s
+
+    @property
+    def paced(self) -> bool:
+        """Whether a target moves, which the hand follows."""
+        return self.target_m(0.0) is not None
+
+    def target_m(self, t_s: float) -> Point | None:
+        """Return where the target that moves is ``t_s`` after the task began [m, hand frame]; None: none moves."""
+        return None
+
+    def fastest_stroke(self, workspace_m: Point) -> Stroke:
+        """Return the fastest stroke that is likely, in a tank of these extents [m, hand frame]."""
+        return Stroke(SHAKE_HZ, min(SHAKE_M, workspace_m[0] / 2))
+
+    def lasting(self, most_s: float) -> Self:
+        """Return the task that time alone ends: after ``most_s``, or the first whole swing of a target after it [s]."""
+        return self
+
+
+class Explore(Task):
+    """Free motion in the tank, for ``min_s`` to ``max_s``; after ``min_s`` the participant may continue."""
 
     kind: Literal["explore"]
     min_s: float = Field(ge=0, le=3600, description="Least time before the participant may go on [s].")
@@ -49,8 +113,7 @@ class Explore(Table):
     instruction: Localised = Field(description="One sentence shown under the tank.")
 
     activity: ClassVar[str] = "free exploration"
-    lead_s: ClassVar[float] = 0.0
-    start_m: ClassVar[Point | None] = None
+    least_s = property(lambda self: self.min_s)
 
     @property
     def summary(self) -> str:
@@ -60,13 +123,12 @@ class Explore(Table):
     def expected_s(self) -> float:
         return (self.min_s + self.max_s) / 2
 
-    def fastest_stroke(self, workspace_m: Point) -> Stroke:
-        """Return the fastest stroke that is likely, in a tank of these extents [m, hand frame]."""
-        return Stroke(SHAKE_HZ, min(SHAKE_M, workspace_m[0] / 2))
-
     @property
     def limit_s(self) -> float:
         return self.max_s
+
+    def lasting(self, most_s: float) -> Self:
+        return self.model_copy(update={"min_s": most_s, "max_s": most_s})
 
     @model_validator(mode="after")
     def _least_before_most(self) -> Self:
@@ -75,7 +137,7 @@ class Explore(Table):
         return self
 
 
-class Follow(Table):
+class Follow(Task):
     """A target that moves as A r(t) sin 2πft along an axis, with a raised-cosine ramp r over lead_s.
 
     The task ends after the lead and ``cycles`` whole periods; only the periods after the lead are judged.
@@ -99,6 +161,10 @@ class Follow(Table):
     )
 
     activity: ClassVar[str] = "following a target"
+    hand: ClassVar[str] = "study_app.session.simulated.observers:Follower"
+    start_m = property(lambda self: self.target_m(0.0))
+    radius_m = property(lambda self: self.radius_mm / 1000)
+    judged_from_s = property(lambda self: self.lead_s)
 
     @property
     def summary(self) -> str:
@@ -113,18 +179,6 @@ class Follow(Table):
         return self.lead_s + self.cycles / self.frequency_hz
 
     @property
-    def expected_s(self) -> float:
-        return self.limit_s
-
-    @property
-    def radius_m(self) -> float:
-        return self.radius_mm / 1000
-
-    @property
-    def start_m(self) -> Point:
-        return self.target_m(0.0)
-
-    @property
     def amplitude_m(self) -> float:
         return self.amplitude_mm / 1000
 
@@ -133,8 +187,12 @@ class Follow(Table):
         """Root mean square of the target's speed over what is judged, A 2πf / √2 [m/s]."""
         return 2 * math.pi * self.frequency_hz * self.amplitude_m / math.sqrt(2)
 
-    def fastest_stroke(self, _workspace_m: Point) -> Stroke:
+    def fastest_stroke(self, workspace_m: Point) -> Stroke:
         return Stroke(self.frequency_hz, self.amplitude_m)
+
+    def lasting(self, most_s: float) -> Self:
+        swings = math.ceil((most_s - self.lead_s) * self.frequency_hz)
+        return self.model_copy(update={"cycles": max(swings, self.cycles)})
 
     def target_m(self, t_s: float) -> Point:
         """Return where the target is ``t_s`` after the task began, hand frame [m]; before it in the middle."""
@@ -148,9 +206,11 @@ REACH_S: Final = 0.3
 """From target to target, as fast as aimed reaches are. [choice]"""
 MOVE_S: Final = 1.5
 """How long people take from one target to the next, for the expected duration. [choice]"""
+SHORTEST_MOVE_S: Final = 1.0
+"""From target to target at least. [choice]"""
 
 
-class Reach(Table):
+class Reach(Task):
     """Targets light up one after the other, repeatedly; the ball must stay in the lit target for ``dwell_s``.
 
     The task is complete after ``count`` targets or after ``duration_s``, whichever of the two the protocol gives; it
@@ -171,8 +231,11 @@ class Reach(Table):
     instruction: Localised = Field(description="One sentence shown under the tank.")
 
     activity: ClassVar[str] = "reaching targets"
-    lead_s: ClassVar[float] = 0.0
-    start_m: ClassVar[Point | None] = None
+    tracker: ClassVar[str] = "study_app.session.tasks:ReachTracker"
+    hand: ClassVar[str] = "study_app.session.simulated.observers:Reacher"
+    targets_m = property(lambda self: tuple((x / 1000, y / 1000, z / 1000) for x, y, z in self.targets_mm))
+    radius_m = property(lambda self: self.radius_mm / 1000)
+    wanted = property(lambda self: self.count)
 
     @property
     def summary(self) -> str:
@@ -188,23 +251,22 @@ class Reach(Table):
             return min(self.timeout_s, self.count * (self.dwell_s + MOVE_S))
         return self.duration_s or 0.0
 
-    def fastest_stroke(self, _workspace_m: Point) -> Stroke:
+    @property
+    def shortest_s(self) -> float:
+        return self.duration_s or (self.count or 0) * (self.dwell_s + SHORTEST_MOVE_S)
+
+    def fastest_stroke(self, workspace_m: Point) -> Stroke:
         """Return the stroke between the two neighbours that are farthest apart."""
         following = (*self.targets_m[1:], self.targets_m[0])
         way_m = max(math.dist(*pair) for pair in zip(self.targets_m, following, strict=True))
         return Stroke(0.5 / REACH_S, way_m / 2)
 
     @property
-    def targets_m(self) -> tuple[Point, ...]:
-        return tuple((x / 1000, y / 1000, z / 1000) for x, y, z in self.targets_mm)
-
-    @property
     def limit_s(self) -> float:
         return self.timeout_s if self.duration_s is None else self.duration_s
 
-    @property
-    def radius_m(self) -> float:
-        return self.radius_mm / 1000
+    def lasting(self, most_s: float) -> Self:
+        return self.model_copy(update={"count": None, "duration_s": most_s, "timeout_s": most_s})
 
     @model_validator(mode="after")
     def _ends_before_its_timeout(self) -> Self:
@@ -233,17 +295,20 @@ class Reach(Table):
         return self
 
 
-AnyTask: TypeAlias = Explore | Reach | Follow
-Task: TypeAlias = Annotated[AnyTask, Field(discriminator="kind")]
+class RecordedTask(Task):
+    """A task of a plug-in that is not here, as a receipt holds it."""
+
+    model_config = ConfigDict(extra="allow")
+
+    kind: str
 
 
-def lasting(task: AnyTask, most_s: float) -> AnyTask:
-    """Return a task that time alone ends: after ``most_s``, or the first whole swing of a target after it [s]."""
-    match task:
-        case Explore():
-            return task.model_copy(update={"min_s": most_s, "max_s": most_s})
-        case Reach():
-            return task.model_copy(update={"count": None, "duration_s": most_s, "timeout_s": most_s})
-        case Follow():
-            swings = math.ceil((most_s - task.lead_s) * task.frequency_hz)
-            return task.model_copy(update={"cycles": max(swings, task.cycles)})
+KINDS: Final = Registry[type[Task]]("task", {"explore": Explore, "reach": Reach, "follow": Follow}, Task, "kind")
+"""Every kind by its id."""
+
+if TYPE_CHECKING:
+    AnyTask: TypeAlias = Task
+else:
+    AnyTask = Annotated[
+        reduce(or_, KINDS.own.values()), Field(discriminator="kind"), OfKinds(KINDS, Task, RecordedTask)
+    ]

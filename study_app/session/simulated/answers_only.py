@@ -21,11 +21,10 @@ from typing import Final
 from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
-from study_app.protocol.model import Explore, Follow, Protocol
+from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.simulated import NO_FEATURES, OBSERVER, Comparison, TrialFeatures, as_requested
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.session.simulated.observers import reading_s
@@ -59,7 +58,6 @@ from study_app.workspace import workspace
 
 DEVICE = {"name": "answers-only", "measured": False}
 SAY_EVERY_S = 5.0
-REACH_S = 1.0  # from target to target, without a hand
 BEGINS: Final = (PageShown, FormShown, TrialStarted)
 """The lines that begin a step."""
 
@@ -181,7 +179,7 @@ class Answering(SimulatedParticipant):
                 case TaskPage(adjusts=True) as page:
                     self._set(page)
                 case TaskPage() as page:
-                    self._pass(_least_s(page.task))
+                    self._pass(page.task.shortest_s)
                     self._post(TaskDone(self._time.seconds, "complete", {}))
                 case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
@@ -194,7 +192,7 @@ class Answering(SimulatedParticipant):
         """Set the level by what was sensed, exactly as it is, until it is done or the time is over."""
         observer, began_s = self._adjusting(page.trial), self._time.seconds
         sensed = self._sensed_in[page.trial]
-        self._pass(page.task.lead_s)
+        self._pass(page.task.judged_from_s)
         while True:
             self._pass(LOOK_AT_SETTING_S)
             steps = observer.steps(sensed[-1], self._remembered(page.trial, sensed[-1]))
@@ -251,17 +249,6 @@ class Answering(SimulatedParticipant):
                 self._store.finish(status, reason)
             case _:
                 """What moves, measures or stops something has nothing to do here."""
-
-
-def _least_s(task: AnyTask) -> float:
-    """Return how long a task takes at least [s]."""
-    if isinstance(task, Follow):
-        return task.limit_s
-    if isinstance(task, Explore):
-        return task.min_s
-    if task.duration_s is not None:
-        return task.duration_s
-    return (task.count or 0) * (task.dwell_s + REACH_S)
 
 
 def begin_at(results: Path, study: Protocol, source: bytes, start: SessionStart, step: int) -> Path:

@@ -9,7 +9,8 @@ that a seed gives the same motion everywhere.
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, TypeAlias
+from pkgutil import resolve_name
+from typing import Any, Final, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from study_app.devices.hand import HandOrders
 from study_app.protocol.orders.schedule import shuffle, stream
 from study_app.protocol.questions import ItemView, Value, shown
 from study_app.protocol.simulated import Rater, TrialFeatures, judgements
-from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
+from study_app.protocol.trials.tasks import Reach, Task
 from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage
 from study_app.session.tasks import track
@@ -198,9 +199,10 @@ def reading_s(page: TextPage) -> float:
 class Explorer:
     """Moves about for a while that it likes, then wants to go on."""
 
-    def __init__(self, task: Explore, device: HandOrders, draw: Draw, now_s: float) -> None:
-        stay_s = task.min_s + (0.1 + 0.2 * draw()) * max(task.min_s, 5.0)
-        self._leave_s = now_s + min(stay_s, task.max_s)
+    def __init__(self, task: Task, device: HandOrders, draw: Draw, now_s: float) -> None:
+        least_s = task.limit_s if task.least_s is None else task.least_s
+        stay_s = least_s + (0.1 + 0.2 * draw()) * max(least_s, 5.0)
+        self._leave_s = math.inf if task.least_s is None else now_s + min(stay_s, task.limit_s)
         device.follow(*exploration(draw, device.workspace_m, stay_s))
 
     def act(self, now_s: float, _view: TankView) -> bool:
@@ -211,7 +213,7 @@ class Explorer:
 class Reacher:
     """Reaches for the target that is seen lit, and tries again where the ball is seen to have come to rest outside."""
 
-    def __init__(self, task: Reach, device: HandOrders, draw: Draw) -> None:
+    def __init__(self, task: Reach, device: HandOrders, draw: Draw, _now_s: float) -> None:
         self._task = task
         self._device = device
         self._draw = draw
@@ -253,10 +255,10 @@ class Reacher:
 class Follower:
     """Moves with the target, whose even swing it anticipates, with the error of an aim."""
 
-    def __init__(self, task: Follow, device: HandOrders, draw: Draw) -> None:
+    def __init__(self, task: Task, device: HandOrders, draw: Draw, _now_s: float) -> None:
         t_s = np.arange(round(task.limit_s * FOLLOWED_HZ) + 1) / FOLLOWED_HZ
         error_m = AIM_ERROR * task.radius_m
-        path_m = np.array([task.target_m(float(t)) for t in t_s])
+        path_m = _followed(task, t_s)
         path_m += np.array([error_m * _between(draw, -1, 1) for _ in range(3)]) * np.minimum(t_s, 1.0)[:, np.newaxis]
         device.follow(t_s, path_m)
 
@@ -265,21 +267,26 @@ class Follower:
         return False
 
 
-Hand: TypeAlias = Explorer | Reacher | Follower
+class Hand(Protocol):
+    """Who does a task with a simulated hand."""
+
+    def act(self, now_s: float, view: TankView, /) -> bool:
+        """Move the hand as what is seen asks for; return whether the space bar is pressed."""
+        ...
 
 
-def hand_for(task: AnyTask, device: HandOrders, draw: Draw, now_s: float) -> Hand:
+def hand_for(task: Task, device: HandOrders, draw: Draw, now_s: float) -> Hand:
     """Return who does a task with a simulated hand, from ``now_s`` on [s]."""
-    match task:
-        case Explore():
-            return Explorer(task, device, draw, now_s)
-        case Reach():
-            return Reacher(task, device, draw)
-        case Follow():
-            return Follower(task, device, draw)
+    made: Hand = resolve_name(task.hand)(task, device, draw, now_s)
+    return made
 
 
-def rest(task: AnyTask, device: HandOrders) -> None:
+def _followed(task: Task, times_s: Floats) -> Floats:
+    """Return where the target that moves is at each time (n,) [s]: (n, 3) [m, hand frame]."""
+    return np.array([task.target_m(float(time_s)) for time_s in times_s])
+
+
+def rest(task: Task, device: HandOrders) -> None:
     """Let a simulated hand rest after a task: where its next interval begins, if that begins at a place."""
     if task.start_m is None:
         device.rest()
@@ -339,7 +346,7 @@ class ProgrammedBall:
     """
 
     def __init__(
-        self, task: AnyTask, workspace_m: tuple[float, float, float], *, hidden_after_lead: bool = False, seed: int = 1
+        self, task: Task, workspace_m: tuple[float, float, float], *, hidden_after_lead: bool = False, seed: int = 1
     ) -> None:
         self._task, self._hides = task, hidden_after_lead
         times_s, self._positions_m = _path(task, workspace_m, min(LONGEST_PATH_S, task.limit_s - BEFORE_END_S), seed)
@@ -355,22 +362,20 @@ class ProgrammedBall:
         now_ns = round(elapsed_s % self.duration_s * 1e9)
         position_m = np.array([np.interp(now_ns, self._times_ns, axis) for axis in self._positions_m.T])
         shown = self._tracker.at(now_ns)
-        return TankView(position_m, shown, now_ns, self._hides and shown.elapsed_s >= self._task.lead_s)
+        return TankView(position_m, shown, now_ns, self._hides and shown.elapsed_s >= self._task.judged_from_s)
 
 
-def _path(
-    task: AnyTask, workspace_m: tuple[float, float, float], duration_s: float, seed: int
-) -> tuple[Floats, Floats]:
+def _path(task: Task, workspace_m: tuple[float, float, float], duration_s: float, seed: int) -> tuple[Floats, Floats]:
     """Return times (n,) [s] and positions (n, 3) [m, hand frame] of a path of about ``duration_s``."""
-    if isinstance(task, Explore):
-        x, y, z = (size / 2 for size in workspace_m)
-        times_s, positions_m = exploration(stream(seed, "preview/hand").random, (x, y, z), duration_s)
-        kept = times_s <= duration_s
-        return times_s[kept], positions_m[kept]
-    if isinstance(task, Follow):
+    if isinstance(task, Reach):
+        return _reaches(task, duration_s)
+    if task.paced:
         times_s = np.arange(0.0, duration_s, 1 / RATE_HZ)
-        return times_s, np.array([task.target_m(float(time_s)) for time_s in times_s])
-    return _reaches(task, duration_s)
+        return times_s, _followed(task, times_s)
+    x, y, z = (size / 2 for size in workspace_m)
+    times_s, positions_m = exploration(stream(seed, "preview/hand").random, (x, y, z), duration_s)
+    kept = times_s <= duration_s
+    return times_s[kept], positions_m[kept]
 
 
 def _reaches(task: Reach, duration_s: float) -> tuple[Floats, Floats]:

@@ -23,7 +23,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from study_app.devices.hand import hand_of
-from study_app.devices.registry import descriptor_of, discover
+from study_app.devices.registry import all_devices, descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
@@ -88,14 +88,20 @@ REHEARSED_PEOPLE: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A page of questions, and what was felt in each interval of its trial: nothing on a form of its own."""
+    """What is asked, and what was felt in each interval of the trial: nothing on a form of its own.
 
-    page: QuestionnairePage | DesignPage
+    A task is the page where its level is set; the last that was felt is what is set, since the last steps.
+    """
+
+    page: QuestionnairePage | DesignPage | TaskPage
     felt: tuple[TrialFeatures, ...]
 
 
 Answer: TypeAlias = Callable[[Question], Value | Mapping[str, Value] | None]
-"""An observer: returns the answer, those by item id, or None for those of the simulated participant."""
+"""An observer: returns the answer, those by item id, or None for those of the simulated participant.
+
+Where a level is set, the answer is by how many steps, above 0 towards more; 0 confirms it.
+"""
 
 
 class DiscardingStore:
@@ -124,7 +130,7 @@ class DiscardingStore:
 def rehearsal_rig(study: Protocol, person: str, seed: int, device: str) -> Rig:
     """Return a device with a simulated hand, and its servo on a virtual clock that only the servo advances."""
     if not descriptor_of(device).moves_by_itself:
-        alone = " or ".join(one.name for one in discover().devices if one.moves_by_itself)
+        alone = " or ".join(one.name for one in all_devices() if one.moves_by_itself)
         raise SessionError(f"device '{device}' waits for a person: rehearse with {alone}")
     settings = study_settings(study, stream(seed, f"rehearsal/{person}/hand"))
     rig = open_rig(device, settings, clock=VirtualClock())
@@ -276,10 +282,10 @@ class RehearsedSession(SimulatedParticipant):
         setting.senses.feel(samples)
         setting.senses.see(self.rig.servo.now_ns(), view)
         since_s = view.task.elapsed_s - setting.judged_s
-        if setting.done or since_s < LOOK_AT_SETTING_S or view.task.elapsed_s < page.task.lead_s + LOOK_AT_SETTING_S:
+        judged_s = view.task.elapsed_s - page.task.judged_from_s
+        if setting.done or since_s < LOOK_AT_SETTING_S or judged_s < LOOK_AT_SETTING_S:
             return
-        sensed = self._attended(page.trial).sensed(setting.senses.features())
-        steps = setting.observer.steps(sensed, self._remembered(page.trial, sensed))
+        steps = self._steps(page, setting)
         setting.senses.clear()
         setting.judged_s = view.task.elapsed_s
         if steps:
@@ -288,6 +294,18 @@ class RehearsedSession(SimulatedParticipant):
             setting.done = True
             self.answers += 1
             self._post(Submitted(self._now_s()))
+
+    def _steps(self, page: TaskPage, setting: _Setting) -> int:
+        """Return the next steps of a level that is set, 0 where it is done."""
+        now = setting.senses.features()
+        earlier = self._features_of.get(page.trial, ()) if page.interval and page.interval.number > 1 else ()
+        given = None if self._answer is None else self._answer(Question(page, (*earlier, now)))
+        if given is None:
+            sensed = self._attended(page.trial).sensed(now)
+            return setting.observer.steps(sensed, self._remembered(page.trial, sensed))
+        if not isinstance(given, int):
+            raise SessionError(f"{given!r} is no number of steps: give a whole one, 0 where the level is set")
+        return given
 
     def look(self, senses: SensedTrial) -> TankView | None:
         """Show the frames that are due since the last look; return what the newest showed, None where none was due."""

@@ -13,7 +13,7 @@ from study_app.protocol.streams import Key
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.methods import Adjusting, Adjustment, TrialResult
 from study_app.protocol.trials.presentation import Presentation, next_level
-from study_app.protocol.trials.tasks import AnyTask, lasting
+from study_app.protocol.trials.tasks import AnyTask
 from study_app.protocol.trials.tracks import adjusting_of, design_of, method_of
 from study_app.session.resume import FIRST, Start
 from study_app.session.transitions.events import Command
@@ -165,7 +165,7 @@ class SessionState:
         block = self.plan.protocol.blocks[self.trial.block]
         task = self.plan.protocol.tasks[block.task]
         method = method_of(self.plan.protocol, block) if self.adjusts else None
-        return lasting(task, method.most_s) if isinstance(method, Adjustment) else task
+        return task.lasting(method.most_s) if isinstance(method, Adjustment) else task
 
     @property
     def adjusts(self) -> bool:

@@ -33,6 +33,7 @@ from study_app.haptics.model.gate import resolve
 from study_app.protocol.model import Protocol, SceneDefaults, StudyLiquid
 from study_app.protocol.orders.schedule import block_codes, draw_key
 from study_app.protocol.streams import draw_secret, group_of, own_code
+from study_app.protocol.table import RECORDED
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
 from study_app.store.blinded.sealing import open_text, seal
@@ -389,7 +390,7 @@ def whole_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
     whole = {**published, **tables, "questionnaires": questionnaires, "blocks": blocks}
     if not whole.get("sequence"):  # each group has its own, or each session
         whole.pop("sequence", None)
-    return Protocol.model_validate(whole)
+    return Protocol.model_validate(whole, context=RECORDED)
 
 
 def sealed(start: events.SessionStarted, event: events.Event, key: Key) -> events.Event:

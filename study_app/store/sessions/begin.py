@@ -188,7 +188,7 @@ def first_records(
         "resumed": [],
         **fields,
         "generator": receipt.GENERATOR,
-        **surroundings(start.device, start.screens, clock, start.motors_masked, start.outlets, start.video),
+        **surroundings(protocol, start.device, start.screens, clock, start.motors_masked, start.outlets, start.video),
         "protocol": receipt.without_conditions(protocol),
     }
     return started, first_receipt
@@ -220,6 +220,7 @@ def make_recorder(place: Place, start: SessionStarted, clock: SessionClock, key:
 
 
 def surroundings(
+    protocol: Protocol,
     device: Mapping[str, Any],
     screens: Mapping[str, Any],
     clock: SessionClock,
@@ -229,12 +230,14 @@ def surroundings(
 ) -> dict[str, Any]:
     """Return the receipt's part about what the session runs with, from its beginning or since it was resumed."""
     optional = {"motors_masked": motors_masked, "outlets": outlets, "video": video}
+    used = receipt.plug_ins_of(protocol, str(device.get("name")), outlets or ())
     return {
         "versions": receipt.versions(),
         "device": dict(device),
         "screens": dict(screens),
         "clock": {"origin_ns": clock.origin_ns, "origin_at": clock.at(0)},
         **{name: dict(value) for name, value in optional.items() if value is not None},
+        **({"plug_ins": used} if used else {}),
     }
 
 

@@ -145,7 +145,7 @@ def reopen(
             sweep(folder.recordings)
         for event in _recordings_found(folder, contents.lines, left.key) if left.start.recordings else ():
             store.append(event)
-        around = surroundings(device, screens, clock, motors_masked, outlets, video)
+        around = surroundings(protocol, device, screens, clock, motors_masked, outlets, video)
         store.note_resumed({"at": clock.at(at_s), **gap, **around})
         store.write_tables()
         write_description(study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions))

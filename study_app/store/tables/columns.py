@@ -142,7 +142,7 @@ RESPONSES_2: tuple[Column, ...] = (
     ),
     *(replace(column, may_miss=True) for column in (*TRIAL_COLUMNS, CODE)),
     replace(_RESPONSES_BY_NAME["item"], description="Id of the question; its words are in the session's receipt."),
-    Column("kind", "text", f"Kind of the question: {', '.join(KINDS)}."),
+    Column("kind", "text", f"Kind of the question: {', '.join(KINDS.own)}."),
     replace(_RESPONSES_BY_NAME["number"], description="Place of the question on its page, from 1, as shown."),
     optional(
         "response",

@@ -12,13 +12,13 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import study_app
-from study_app.errors import StoreError
+from study_app.errors import PlugInError, StoreError
 from study_app.store import receipt
 from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporaries
 from study_app.store.blinded.blinding import Key, opened, opened_key, whole_protocol
@@ -58,7 +58,7 @@ class Finding:
 
 @dataclass(slots=True)
 class Findings:
-    """What was found in a study's ``folder``, with so many sessions.
+    """What was found in a study's ``folder``, with so many sessions; ``plug_ins`` are those that receipts name.
 
     ``errors`` are files that cannot be trusted as they are, ``warnings`` something to know.
     """
@@ -68,6 +68,7 @@ class Findings:
     warnings: tuple[Finding, ...] = ()
     sessions: int = 0
     running: int = 0
+    plug_ins: dict[str, list[str]] = field(default_factory=dict)
 
     @property
     def sound(self) -> bool:
@@ -296,6 +297,8 @@ def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key
     """Return whether the protocol of a receipt is one, completed from the key, and as this version writes it."""
     try:
         whole = receipt.without_conditions(whole_protocol(held["protocol"], key))
+    except PlugInError:  # it is not here to tell; `verify` names it
+        return True
     except (KeyError, TypeError, AttributeError, ValueError):
         return False
     return start.version != study_app.__version__ or parse_json(json.dumps(whole)) == held["protocol"]

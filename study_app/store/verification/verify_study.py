@@ -13,8 +13,9 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
+from study_app.discovery import plug_ins
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.streams import group_of
@@ -46,6 +47,8 @@ from study_app.store.verification.proofs import Proof, read_proof, records
 from study_app.store.verification.verify_session import CheckedSession, Findings, check_session, check_table
 from study_app.store.withdrawals import Tombstone, describe_session, proof_of_withdrawal, tombstones
 
+RECORDED_KINDS: Final = ("question", "task", "method")
+"""Kinds of plug-ins without which a session cannot be checked in full."""
 Sessions: TypeAlias = list[CheckedSession]
 
 
@@ -98,6 +101,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, found: Findings
     early = listed(study.fingerprints)
     withdrawn = _withdrawn(study, found)
     sessions = [check_session(Place(study, one, name), key, found) for one in study.sessions()]
+    _plug_ins(study, found)
     _participants(study, name, sessions, found)
     if early_journals := sum(one.row is not None and not one.chained for one in sessions):
         many = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
@@ -113,6 +117,17 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, found: Findings
     for path in (*temporaries(folder), *temporaries(study.data)):
         found.warning(path, "is an incomplete file of a program that was ended, or is being written")
     return sessions
+
+
+def _plug_ins(study: StudyFolder, found: Findings) -> None:
+    """Name the plug-ins that the sessions used, and those that are not here."""
+    used = receipt.recorded_plug_ins(one.receipt for one in study.sessions())
+    found.plug_ins |= used
+    here = {f"{one.kind} {one.name}" for one in plug_ins() if not one.fault} if used else set()
+    for package, names in used.items():
+        if missing := [name for name in names if name not in here and name.split()[0] in RECORDED_KINDS]:
+            what = f"sessions used {', '.join(missing)} of {package}, which is not installed"
+            found.warning(study.data, f"{what}: what only the plug-in can tell was not checked")
 
 
 def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], found: Findings) -> None:

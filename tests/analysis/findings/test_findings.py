@@ -4,14 +4,12 @@ import csv
 import io
 import json
 import shutil
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from study_app.analysis import findings
 from study_app.analysis.data.study_tables import Study, load_study, pooled
 from study_app.analysis.findings import all_findings
 from study_app.analysis.report.sections import answers
@@ -22,6 +20,7 @@ from study_app.store.blinded.unblinding import unblind
 from tests.analysis.conftest import HIDDEN, SAMPLE, Results, twelve
 from tests.analysis.made_up import delays, everybody, liquids, study
 from tests.analysis.random_studies import drawn, keeps_contract
+from tests.plug_in_packages import forget, install
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
@@ -91,14 +90,14 @@ def _small(small: Results) -> Study:
 
 
 @pytest.fixture
-def toy(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The folder of findings with one more file."""
-    monkeypatch.setattr(findings, "__path__", [*findings.__path__, str(TOY)])
-    all_findings.cache_clear()
+def toy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A finding of another package."""
+    site = Path(shutil.copytree(TOY, tmp_path / "site"))
+    monkeypatch.syspath_prepend(site)
+    install(site, "toy_finding", "finding", {"highest": f"{KEY}:HighestAnswers"})
+    forget()
     yield
-    all_findings.cache_clear()
-    del sys.modules[f"{findings.__name__}.{KEY}"]
-    vars(findings).pop(KEY)
+    forget(KEY)
 
 
 @pytest.mark.nightly

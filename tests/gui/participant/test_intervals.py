@@ -16,7 +16,6 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, 
 from study_app.gui.participant.intervals.answer_page import STEP_MS
 from study_app.gui.participant.window import PointerCapture
 from study_app.protocol.questions import ChoiceView, NumberView
-from study_app.protocol.trials.tasks import lasting
 from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import ChoicePage, FeedbackPage, Interval, NumberPage, Progress, TaskPage
 from study_app.session.transitions.events import Continue, PauseRequested, Stepped, Submitted
@@ -113,7 +112,7 @@ def test_everything_fits_apart_and_can_be_hit_and_escape_pauses(
 def interval(*, adjusts: bool = False, language: str = "en", resting: bool = False) -> TaskPage:
     at = 2 if adjusts or resting else 1
     announced = "Next: the second" if resting else ("First of 2", "Second of 2")[at - 1]
-    task = lasting(follow(), 60.0) if adjusts else follow()
+    task = follow().lasting(60.0) if adjusts else follow()
     question = words(language).design_questions["adjustment"]
     return replace(task_page(task, question=question, interval=Interval(at, 2, resting, announced)), adjusts=adjusts)
 

@@ -10,7 +10,6 @@ from PySide6.QtCore import QPointF, QRectF, QTimer
 from PySide6.QtWidgets import QWidget
 
 from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, ShowIf, SliderView, TextView
-from study_app.protocol.trials.tasks import lasting
 from study_app.session.pages import (
     ChoicePage,
     EndPage,
@@ -84,7 +83,7 @@ NUMBER = NumberPage(1, NumberView("strength", 1, "The first is 10. How strong wa
 
 def interval(number: int, *, resting: bool = False, adjusts: bool = False) -> TaskPage:
     announced = "Next: the second" if resting else ("First of 2", "Second of 2")[number - 1]
-    task = lasting(follow(), 60.0) if adjusts else follow()
+    task = follow().lasting(60.0) if adjusts else follow()
     page = task_page(task, question="Make both equal.", interval=Interval(number, 2, resting, announced))
     return replace(page, adjusts=adjusts)
 

@@ -7,7 +7,6 @@ import pytest
 from study_app.protocol.describe import describe
 from study_app.protocol.trials.methods import START_SHARE, Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.trials.tasks import lasting
 from study_app.protocol.trials.tracks import adjusting_of, method_of
 from tests.protocol.trials.level_studies import key_of, run
 from tests.protocol.trials.matching import ALONE, DELAY, matching
@@ -83,6 +82,6 @@ def test_a_task_goes_on_for_as_long_as_a_setting_may_take() -> None:
     protocol = matching()
     method = method_of(protocol, protocol.blocks["matching"])
     assert isinstance(method, Adjustment)
-    followed = lasting(protocol.tasks["stir"], method.most_s)
+    followed = protocol.tasks["stir"].lasting(method.most_s)
     assert followed.limit_s == 60.0
     assert followed.start_m == protocol.tasks["stir"].start_m

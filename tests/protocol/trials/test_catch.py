@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import pytest
 
-from study_app.protocol.blocks import Catch
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.methods import TrialResult
@@ -58,7 +57,9 @@ def test_levels_and_arrangements_of_the_other_trials_are_those_without_catch_tri
 @pytest.mark.parametrize("share", [0.05, 0.13, 0.3, 1 / 3, 0.5])
 @pytest.mark.parametrize("trials", [8, 24, 60, 100])
 def test_stretches_cover_the_track_in_order(share: float, trials: int) -> None:
-    rule = Catch(share=share)
+    (block,) = study(LONG, (CATCH[0], CATCH[1].replace("0.1", str(share)))).blocks.values()
+    rule = block.catch
+    assert rule is not None
     stretches = [rule.stretch(number) for number in range(rule.count(trials))]
     assert abs(len(stretches) - trials * share) < 1
     for before, after in pairwise(stretches):

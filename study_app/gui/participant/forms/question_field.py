@@ -228,7 +228,7 @@ class QuestionField(QWidget):
         self.grid.addWidget(answer, 0, self.ANSWER, Qt.AlignmentFlag.AlignVCenter)
 
     def show_answer(self, value: Value) -> None:
-        raise NotImplementedError
+        self.kept(value)
 
     def spoken(self) -> str:
         return str(self.value)
@@ -298,7 +298,7 @@ class QuestionField(QWidget):
         self._tell()
 
     def clear(self) -> None:
-        raise NotImplementedError
+        """Show no answer; what is painted follows from `value`."""
 
     def kept(self, value: Value) -> None:
         """Have an answer without saying so."""

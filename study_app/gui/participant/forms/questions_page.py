@@ -10,6 +10,7 @@ from PySide6.QtCore import QRect, QRectF, Qt, QTimer
 from PySide6.QtGui import QAccessible, QColor, QFont, QFontMetrics, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QLayout, QPushButton, QStyle, QWidget
 
+from study_app.discovery import by_name
 from study_app.gui.participant.forms.question_field import MARGIN, QuestionField, question_of, target_px
 from study_app.gui.participant.pages.page_widget import (
     GoButton,
@@ -460,7 +461,7 @@ class FormWidget(QuestionsPage):
     """Questions of any kind, each as high as it needs."""
 
     def made_field(self, item: ItemView) -> QuestionField:
-        return FIELDS[item.widget](item, self._words, self)
+        return by_name(FIELDS, item.widget)(item, self._words, self)
 
     def missing_words(self, numbers: Sequence[int]) -> str:
         return self._words.questions_missing(numbers)

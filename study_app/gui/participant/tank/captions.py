@@ -19,8 +19,6 @@ from study_app.gui.participant.pages.page_widget import (
 )
 from study_app.gui.participant.tank.frame import Placed, TaskShown
 from study_app.gui.theme.theme import PARTICIPANT, font
-from study_app.protocol.model import Reach
-from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.pages import TaskPage
 
 if TYPE_CHECKING:
@@ -79,7 +77,7 @@ class Captions:
         scale, margin = self._scale, 64 * caption_scale(width, height)
         head, small = 58 * scale, QFontMetricsF(self._small).height()
         count = 300 * scale
-        across = width - 2 * margin - (count if isinstance(self._page.task, Reach) else 0)
+        across = width - 2 * margin - (count if self._page.task.targets_m else 0)
         if self._page.interval is not None:
             marks = interval_width(self._page.interval, self._words, self._head_scale)
             across = min(across, (width - marks) / 2 - margin - 24 * scale)
@@ -144,7 +142,7 @@ class Captions:
             draw_progress(painter, self._head, page.progress, words, scale=self._head_scale, share=0.5)
         if page.interval is not None:
             draw_interval(painter, self._width, self._head.center().y(), page.interval, words, self._head_scale)
-        if isinstance(page.task, Reach) and region.intersects(self._count.toAlignedRect()):
+        if page.task.targets_m and region.intersects(self._count.toAlignedRect()):
             self._draw_count(painter, task)
         if region.intersects(self._instruction.toAlignedRect()):
             rest = page.interval if page.interval is not None and page.interval.resting else None
@@ -193,9 +191,9 @@ class Captions:
         words = self._words
         counted = words.seconds_left.format(seconds=999)
         both = words.seconds_left.format(seconds=COUNTED_DOWN_S)
-        if isinstance(self._page.task, Reach):
+        if self._page.task.targets_m:
             return tuple(f"{away} · {both}" for away in (words.further_away, words.nearer, words.time_is_up))
-        if isinstance(self._page.task, Follow):
+        if self._page.task.paced:
             return words.back_to_target, words.further_away, words.nearer
         return f"{words.continue_now} · {both}", words.continue_in.format(seconds=999), counted, words.time_is_up
 
@@ -212,25 +210,25 @@ class Captions:
         todo, words = self._page.task, self._words
         if self._page.adjusts:
             return hint
-        if isinstance(todo, Follow) or (self._page.interval is not None and self._page.interval.resting):
+        if todo.paced or (self._page.interval is not None and self._page.interval.resting):
             return hint  # a count would distract from the pace, whose end is no surprise
         elapsed_s = task.elapsed_s if task else 0.0  # before the first view nothing has happened yet
         left = math.ceil(todo.limit_s - elapsed_s)
         if left <= 0:
             return words.time_is_up
         counted = words.seconds_left.format(seconds=left)
-        if isinstance(todo, Explore):
-            wait = math.ceil(todo.min_s - elapsed_s)
+        if todo.least_s is not None:
+            wait = math.ceil(todo.least_s - elapsed_s)
             if wait > 0:
                 return words.continue_in.format(seconds=wait)
             return words.continue_now if left > COUNTED_DOWN_S else f"{words.continue_now} · {counted}"
-        counts = todo.duration_s is not None or left <= COUNTED_DOWN_S
+        counts = todo.wanted is None or left <= COUNTED_DOWN_S
         return " · ".join(filter(None, (hint, counted if counts else "")))
 
     def _counted(self, task: TaskShown | None) -> tuple[int, int | None]:
         if task is not None:
             return task.reached, task.of
-        return 0, self._page.task.count if isinstance(self._page.task, Reach) else None
+        return 0, self._page.task.wanted
 
     def _draw_count(self, painter: QPainter, task: TaskShown | None) -> None:
         reached, of = self._counted(task)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from study_app.analysis.figures.page_layout import Drawing, Look, Picture, Sheet
-from study_app.analysis.findings.finding import Absent, Answer, BlockAnswers, Finding, alone, judged_row
+from study_app.analysis.findings.finding import ALONE, Absent, Answer, BlockAnswers, Finding, in_family, judged_row
 from study_app.analysis.findings.statement_tests import table_of_tests
 from study_app.analysis.results import BlockResult, NotTested, Tested, short
 from study_app.analysis.statistics.outcome import Outcome, clopper_pearson
@@ -29,11 +29,11 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
 
     @classmethod
     def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
-        tests = []
+        outcomes = {}
         for item, values in answers.single.items():
             given = values[~np.isnan(values)]
             count, n = int((given == HIGHEST).sum()), len(given)
-            outcome = Outcome(
+            outcomes[item] = Outcome(
                 test="binomial",
                 n=n,
                 dropped=0,
@@ -46,8 +46,8 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
                 effect=count / n,
                 interval=clopper_pearson(count, n),
             )
-            tests.append(alone(outcome, item, answers, f"{found.id}: highest answers"))
-        return tuple(tests), (NotTested("count of lowest answers", "nobody asked for it"),)
+        tests = in_family(outcomes, answers, f"{found.id}: highest answers", tuple, ALONE, primary=False)
+        return tests, (NotTested("count of lowest answers", "nobody asked for it"),)
 
     def rows(self) -> Iterator[dict[str, object]]:
         return (judged_row(self.found, "the highest answer is given", one) for one in self.value)

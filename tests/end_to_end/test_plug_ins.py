@@ -1,0 +1,318 @@
+"""Plug-ins: the template of all kinds is installed, used and uninstalled; one that fails ends nothing but itself."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import venv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from study_app import cli
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.outlets.session_outlets import Outlets
+from study_app.protocol.load import load
+from study_app.protocol.wording.languages import words
+from study_app.session.pages import QuestionnairePage
+from study_app.session.transitions.events import Chosen
+from study_app.store.receipt import plug_ins_of
+from tests.compiled import needs_servo
+from tests.designer.support.designer import Designer
+from tests.gui.small import ManualClock
+from tests.plug_in_packages import EXAMPLES, forget, install
+
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
+
+TEMPLATE = EXAMPLES / "liquid_study_plug_ins"
+STUDY = TEMPLATE / "example.toml"
+PACKAGE = "liquid-study-template"
+PIP = ("--disable-pip-version-check", "-q")
+
+
+def pip(*arguments: str) -> None:
+    subprocess.run([sys.executable, "-m", "pip", *arguments], check=True, capture_output=True)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the wheel of the template."""
+    folder = tmp_path_factory.mktemp("wheel")
+    pip("wheel", *PIP, "--no-deps", "--no-build-isolation", "--no-index", "-w", str(folder), str(TEMPLATE))
+    return next(folder.glob("*.whl"))
+
+
+@pytest.fixture(scope="module")
+def installed(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    pip("install", *PIP, "--no-deps", "--no-index", "--target", str(folder), str(built))
+    return folder
+
+
+@pytest.fixture
+def template(installed: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Have the template installed."""
+    monkeypatch.syspath_prepend(installed)
+    forget()
+    yield
+    forget("liquid_study_template")
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Return a folder that packages can be installed into."""
+    folder = tmp_path / "packages"
+    folder.mkdir()
+    monkeypatch.syspath_prepend(folder)
+    forget()
+    yield folder
+    forget("toy_")
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
+    """Return a function that runs a command: its exit code, output and errors."""
+
+    def command(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["liquid-study", *map(str, arguments)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        return (int(ended.value.code or 0), *capsys.readouterr())
+
+    return command
+
+
+def test_it_is_installed_and_uninstalled(built: Path, tmp_path: Path) -> None:
+    venv.create(tmp_path / "venv", with_pip=False, symlinks=os.name == "posix")
+    python = str(next((tmp_path / "venv").glob("[bS]*/python*")))
+    around = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+
+    def program(*arguments: str) -> tuple[int, list[str]]:
+        command = [python, "-m", "study_app", *arguments]
+        done = subprocess.run(command, env=around, capture_output=True, text=True, check=False)
+        return done.returncode, (done.stdout + done.stderr).splitlines()
+
+    none = program("plugins")
+    assert none == (0, ["No plug-in is installed; docs/plug-ins.md says how to make one."])
+    pip("--python", python, "install", *PIP, "--no-deps", "--no-index", str(built))
+    code, (where, *lines) = program("plugins")
+    assert (code, where.partition("  (")[0]) == (0, f"{PACKAGE} 1.0")
+    assert [line.split() for line in lines] == [
+        ["device", "light-hand"],
+        ["question", f"{PACKAGE}:grid"],
+        ["task", f"{PACKAGE}:circle"],
+        ["method", f"{PACKAGE}:limits"],
+        ["finding", f"{PACKAGE}:ends_of_scale"],
+        ["outlet", "udp"],
+    ]
+    assert program("check", str(STUDY))[0] == 0
+    pip("--python", python, "uninstall", *PIP, "-y", PACKAGE)
+    assert program("plugins") == none
+    code, (_, *problems) = program("check", str(STUDY))
+    assert code == 2
+    assert [line.partition(": ")[2] for line in problems] == [
+        f'{place}.kind: "{PACKAGE}:{name}" is a {kind} of the plug-in {PACKAGE}, which is not installed '
+        f"(pip install {PACKAGE})"
+        for place, kind, name in (
+            ("methods.limits", "method", "limits"),
+            ("tasks.circle", "task", "circle"),
+            ("questionnaires.mood.items.1", "question", "grid"),
+        )
+    ]
+
+
+@pytest.mark.usefixtures("template")
+class TestTemplate:
+    def test_its_keys_are_rows_of_the_designer_and_of_the_schema(
+        self, run: Any, qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        schema = json.loads(run("check", "--schema", "protocol")[1])["$defs"]
+        assert {f"{PACKAGE}:{name}" for name in ("grid", "circle", "limits")} <= {
+            one["title"] for one in schema.values()
+        }
+        monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+        designer = Designer(tmp_path)
+        designer.file.write_text(STUDY.read_text().replace('name = "plugins"', 'name = "kitchen"'))
+        designer.open()
+        labels = {}
+        for path in (("questionnaires", "mood", "items", 0), ("tasks", "circle"), ("methods", "limits")):
+            designer.go_to(*path)
+            labels[path[0]] = {row.row.row.label for row in designer.place.form.rows}
+        assert {"Left", "Right", "Lower", "Upper", "Cells"} <= labels["questionnaires"]
+        assert {"Circle", "Turns", "Turn", "Instruction"} <= labels["tasks"]
+        assert {"Levels", "Series"} <= labels["methods"]
+        designer.form_row("methods", "limits", "levels").field.line.setFocus()
+        QTest.keyClick(designer.keyboard, Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+        QTest.keyClicks(designer.keyboard, "7")
+        QTest.keyClick(designer.keyboard, Qt.Key.Key_Tab)
+        assert designer.value("methods", "limits", "levels") == 7
+        assert designer.study.problems == ()
+        designer.close()
+
+    def test_its_question_is_answered_by_mouse_and_keys(self, qtbot: Any) -> None:
+        study = load(str(STUDY))
+        form = study.forms["mood"]
+        items = tuple(item.view(number, form.context(study.scales, "en")) for number, item in enumerate(form.items, 1))
+        window = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True)
+        qtbot.addWidget(window)
+        told: list[Any] = []
+        window.event.connect(told.append)
+        window.resize(1366, 768)
+        window.show()
+        window.show_page(QuestionnairePage(None, "Mood", "Choose.", items, (), None, None, form="mood"))
+        QApplication.processEvents()
+        cells = window.widget.fields[0].cells  # type: ignore[union-attr]
+        square = cells.place()
+        QTest.mouseClick(cells, Qt.MouseButton.LeftButton, pos=QPoint(int(square.left()) + 3, int(square.bottom()) - 3))
+        for key in (Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Down):
+            QTest.keyClick(cells, key)
+        assert [one.value for one in told if isinstance(one, Chosen)] == ["1 1", "2 1", "2 2", "2 1"]
+        window.may_close = True
+        window.close()
+
+    @needs_servo
+    def test_a_session_has_all_of_it_and_outlives_it(
+        self, run: Any, tmp_path: Path, installed: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        folder = tmp_path / "results"
+        code, _, said = run("rehearse", STUDY, "--participants", 2, "--device", "light-hand", "--results", folder)
+        assert (code, said) == (0, "")
+        names = f"device light-hand, method {PACKAGE}:limits, question {PACKAGE}:grid, task {PACKAGE}:circle"
+        line = f"plug-in {PACKAGE} 1.0: {names}\n"
+        assert run("verify", folder)[:2] == (0, f"{line}2 sessions: sound\n")
+        assert run("unblind", folder, "--by", "AK", "--reason", "test")[0] == 0
+        page, document = tmp_path / "report" / "report.html", tmp_path / "report" / "report.json"
+        assert run("report", folder, "--to", page.parent)[::2] == (0, "")
+        html = page.read_text("utf-8")
+        for text in ("mean column", "Answers at the ends of the scale", f"Plug-in {PACKAGE} 1.0", "Thresholds"):
+            assert text in html
+        (used,) = json.loads(document.read_bytes())["plug_ins"].values()
+        assert used == [*names.split(", "), f"finding {PACKAGE}:ends_of_scale"]
+        exported = {path.name: path.read_bytes() for path in page.parent.glob("*trials*.csv")}
+        monkeypatch.setattr(sys, "path", [path for path in sys.path if path != str(installed)])
+        forget("liquid_study_template")
+        code, said, _ = run("verify", folder)
+        assert (code, said.count("warning")) == (0, 1)
+        assert f"of {PACKAGE} 1.0, which is not installed" in said
+        assert run("report", folder, "--to", tmp_path / "later")[::2] == (0, "")
+        assert {path.name: path.read_bytes() for path in (tmp_path / "later").glob("*trials*.csv")} == exported
+        assert run("export", folder, "--to", tmp_path / "tables")[0] == 0
+        code, _, said = run("reproduce", folder / "data" / "sub-P001" / "ses-01")
+        assert (code, said.count("\n")) == (2, 1)
+        assert f"the plug-in {PACKAGE}, which is not installed: pip install {PACKAGE}" in said
+
+    def test_its_outlet_is_fed(self) -> None:
+        class Servo:
+            rate_hz, telemetry = 1000.0, None
+
+            def now_ns(self) -> int:
+                return 0
+
+        from study_app.outlets.markers import marker_of
+
+        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(10)
+        outlets = Outlets((f"udp:127.0.0.1:{receiver.getsockname()[1]}", "udp:nowhere"), "off", Servo(), "double")
+        marker = marker_of("trial_started", 1.5, 0, {"trial": 3})
+        assert marker is not None
+        outlets.mark(marker)
+        assert receiver.recv(1000).decode() == marker.text
+        outlets.close()
+        receiver.close()
+        assert outlets.lost == {"UDP markers": "udp:nowhere is no address: write udp:HOST:PORT"}
+        (used,) = plug_ins_of(load("demo"), "mouse", ["UDP markers", "LSL markers"])
+        assert used == {"kind": "outlet", "name": "udp", "package": PACKAGE, "version": "1.0"}
+
+
+QUESTION = """
+    from typing import ClassVar, Literal
+    from study_app.protocol.questions import Text
+
+    class Toy(Text):
+        measure: ClassVar[str] = "toy_plug:MEASURE"
+        kind: Literal["toy-plug:toy"] = "toy-plug:toy"
+
+        def problem(self, answer, context):
+            {problem}
+
+    class MEASURE:
+        id = "toy"
+
+        @staticmethod
+        def of(asked, answers):
+            {measure}
+
+        @staticmethod
+        def cells(asked, numbers):
+            return {{"n": "1"}}
+"""
+TOY_STUDY = (
+    STUDY.read_text()
+    .replace(f'kind = "{PACKAGE}:limits"\nlevels = 5\nseries = 2', 'kind = "constant"\nlevels = 2\nrepetitions = 1')
+    .replace(f'kind = "{PACKAGE}:circle"\nturns = 1', 'kind = "explore"\nmin_s = 0.2\nmax_s = 1')
+    .replace(f'kind = "{PACKAGE}:grid"', 'kind = "toy-plug:toy"')
+    .replace('left = "unpleasant"\nright = "pleasant"\nlower = "sleepy"\nupper = "awake"\n', "")
+)
+
+
+@needs_servo
+def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
+    run: Any, site: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    study, folder = tmp_path / "toy.toml", tmp_path / "results"
+    study.write_text(TOY_STUDY)
+    points = {"toy": "toy_plug:Toy"}
+    install(site, "toy-plug", "question", points, toy_plug=QUESTION.format(problem="1 / 0", measure="1 / 0"))
+    code, _, said = run("rehearse", study, "--participants", 1, "--results", folder)
+    line = "the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero): update or uninstall the plug-in"
+    assert (code, said.splitlines()[-1]) == (2, f"liquid-study: {line}")
+    (logged,) = caplog.records  # with its trace, which no terminal shows
+    assert (logged.getMessage(), bool(logged.exc_info)) == (line, True)
+    caplog.clear()
+    code, said, _ = run("verify", folder)
+    assert (code, said.splitlines()[-1]) == (0, "1 session: sound")
+    assert len((folder / "data/sub-P001/ses-01").glob("*responses*").__next__().read_text().splitlines()) == 3
+    (site / "toy_plug.py").write_text((site / "toy_plug.py").read_text().replace("1 / 0", "return None", 1))
+    forget("toy_")
+    other = tmp_path / "others"
+    assert run("rehearse", study, "--participants", 1, "--results", other)[0] == 0
+    assert run("unblind", other, "--by", "AK", "--reason", "test")[0] == 0
+    code, _, said = run("report", other, "--to", tmp_path / "report")
+    assert said.count("the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero)") == said.count("\n") == 1
+    assert "Smooth" in (tmp_path / "report" / "report.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("source", "reason"),
+    [
+        ("raise RuntimeError('no such\\nlibrary')", "RuntimeError: no such library"),
+        ("Toy = 3", "toy_plug:Toy is not a class that extends Question"),
+        (QUESTION.replace("toy-plug:toy", "mood"), "its kind is 'mood': call it 'toy-plug:' and"),
+        (QUESTION.replace("Literal[", "Liberal["), "NameError: name 'Liberal' is not defined"),
+        (QUESTION.replace("def problem", "x: slice\n\n        def problem"), "PydanticSchemaGenerationError"),
+    ],
+)
+def test_what_cannot_be_used_is_a_line_and_hides_no_other(
+    run: Any, site: Path, tmp_path: Path, source: str, reason: str
+) -> None:
+    whole = source.format(problem="return None", measure="return {}") if "MEASURE" in source else source
+    install(site, "toy-plug", "question", {"toy": "toy_plug:Toy"}, toy_plug=whole)
+    code, said, _ = run("plugins")
+    (_, line) = said.splitlines()
+    assert code == 3
+    assert line.startswith(f"    question  toy: {reason}")
+    assert line.endswith("; update or uninstall the plug-in")
+    study = tmp_path / "toy.toml"
+    study.write_text(TOY_STUDY)
+    code, _, said = run("check", study)
+    assert code == 2
+    assert f'"toy-plug:toy" is a question that the plug-in toy-plug 1.0 does not give: {reason}' in said
+    assert run("check", "demo")[0] == 0
