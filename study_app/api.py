@@ -301,7 +301,8 @@ def open_session(
         A device that moves by itself.
     answer : callable, optional
         An observer: called with a `Question`, it returns the answer, answers by item id, or None for those of the
-        built-in simulated participant. It is not called for levels that are adjusted, which have no page of questions.
+        built-in simulated participant. Where a level is set (adjustment) it is called twice a second with the task, and
+        returns by how many steps the level is changed, above 0 towards more, or 0 to confirm it.
     recordings : bool
         Whether every tick of the servo is stored.
 

@@ -20,7 +20,7 @@ from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.documented import ROOT, blocks
 from tests.golden import compare
-from tests.protocol.trials import level_studies
+from tests.protocol.trials import level_studies, matching
 
 HERE = Path(__file__).parent
 
@@ -158,6 +158,32 @@ def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_
     assert verify(parted).errors == ()
     with pytest.raises(StudyError, match="completed"), api.open_session(short, "P001", results=whole, seed=5):
         pass
+
+
+def to_twice_the_standard(question: Any) -> int:
+    """Adjust until what is felt resists twice as much as the standard did."""
+    standard, now = (one.force_mean_n / one.speed_rms_mps for one in question.felt)
+    return 0 if abs(now / standard - 2) < 0.1 else 1 if now < 2 * standard else -1
+
+
+@pytest.mark.slow
+@needs_servo
+def test_an_own_observer_sets_levels(tmp_path: Path) -> None:
+    study = tmp_path / "matching.toml"
+    study.write_text(matching.TEXT, encoding="utf-8")
+    with api.open_session(study, "P001", results=tmp_path / "r", seed=3, answer=to_twice_the_standard) as session:
+        session.run()
+    with (
+        pytest.raises(SessionError, match="'more' is no number of steps"),
+        api.open_session(study, "P002", results=tmp_path / "r", seed=3, answer=lambda _: "more") as session,
+    ):
+        session.run()
+    assert verify(tmp_path / "r").errors == ()
+    api.unblind(tmp_path / "r", by="AK", reason="a test")
+    rows = api.read(tmp_path / "r")["intervals"]
+    settings = rows.loc[rows["participant"] == "P001", "setting"].dropna()
+    assert len(settings) == 4
+    assert settings.between(10, 13).all()  # the standard is 6
 
 
 @pytest.mark.slow
