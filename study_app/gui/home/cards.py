@@ -167,12 +167,13 @@ NONE = {
 
 
 class SessionsCard(Card):
-    """The table, newest first; a row that needs care stands above all.
+    """The table, newest first; a row that needs care stands above all. Where no row is shown it is one line.
 
-    ``all_asked`` is for all results, ``open_asked`` carries the `SessionFacts` of a session.
+    ``open_asked`` carries the `SessionFacts` of a session; ``emptied`` comes when the table may have come or gone.
     """
 
     open_asked = Signal(object)
+    emptied = Signal()
 
     def __init__(self) -> None:
         super().__init__(gap=8, padding=20)
@@ -187,11 +188,10 @@ class SessionsCard(Card):
         self.kind.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToContents)
         self.details = ActionButton("file", "Details", role="plain", height=34)
         self.all = ActionButton("chevron", "All results", role="plain", height=34)
-        self.nothing = label(NONE[EVERY], "body", "text2")
+        self.nothing = label("", "body", "text2", wraps=True)
         parts = (label("Sessions", "card"), (self.nothing, 1), self.kind, (self.where, 1), self.details, self.all)
         self.rows = SessionsTable(COLUMNS, NONE[""])
         add_parts(self.column, hbox(*parts, spacing=12, margins=(12, 0, 12, 0)), (self.rows, 1))
-        self.none = self.rows.none
         self.kind.currentIndexChanged.connect(self._filter)
         self.rows.opened.connect(self.open_asked)
         self.rows.chosen_changed.connect(lambda: self.details.setEnabled(self.rows.chosen is not None))
@@ -199,18 +199,11 @@ class SessionsCard(Card):
         self.details.setEnabled(False)
         self.details.setAccessibleName("Details of the selected session")
         self._show_kinds()
-        self._show_emptiness()
+        self._filter()
 
     @property
     def is_empty(self) -> bool:
-        return not self._found
-
-    def _show_emptiness(self) -> None:
-        """Be one line where there is no session at all."""
-        self.nothing.setVisible(self.is_empty)
-        for part in (self.kind, self.where, self.details, self.all, self.rows):
-            part.setVisible(not self.is_empty)
-        self.setMinimumHeight(0 if self.is_empty else LEAST_HEIGHT)
+        return not self.shown
 
     @property
     def shown(self) -> tuple[SessionFacts, ...]:
@@ -221,7 +214,6 @@ class SessionsCard(Card):
         self._found, self._now = tuple(found), now
         self.where.show_text(f"in {where}")
         self._show_kinds()
-        self._show_emptiness()
         self.rows.show_rows(self._found, now)
         self._filter()
 
@@ -240,14 +232,21 @@ class SessionsCard(Card):
             self.kind.setCurrentIndex(self.kind.findData(chosen))
 
     def _filter(self) -> None:
-        kind = str(self.kind.currentData() or "")
+        kind = str(self.kind.currentData() or "") if self._found else EVERY
         self.rows.show_matching(lambda one: kind in (one.kind, EVERY))
         hidden = [
             counted(count, f"{other or 'participant'} session")
             for other in KINDS
             if (count := sum(one.kind == other for one in self._found))
         ]
-        self.none.setText(f"{NONE[kind]} Not shown: {', '.join(hidden)}." if hidden else NONE[kind])
+        self.nothing.setText(f"{NONE[kind]} Not shown: {', '.join(hidden)}." if hidden else NONE[kind])
+        self.nothing.setVisible(self.is_empty)
+        for part in (self.where, self.details, self.rows):
+            part.setVisible(not self.is_empty)
+        for part in (self.kind, self.all):
+            part.setVisible(bool(self._found))
+        self.setMinimumHeight(0 if self.is_empty else LEAST_HEIGHT)
+        self.emptied.emit()
 
 
 LEAST_WIDTH = 330

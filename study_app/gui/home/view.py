@@ -116,6 +116,7 @@ class HomePlace(Place):
         self.banner.resume_asked.connect(self._resume)
         self.sessions.all.clicked.connect(lambda: self.go_asked.emit("results"))
         self.sessions.open_asked.connect(self._open_session)
+        self.sessions.emptied.connect(self._arrange)
         self.device.devices.clicked.connect(lambda: self.go_asked.emit("devices"))
         self.device.display.clicked.connect(lambda: self.go_asked.emit("machine"))
         self.lab.open.clicked.connect(lambda: self.go_asked.emit("lab"))
@@ -275,7 +276,6 @@ class HomePlace(Place):
         results, found, stopped = read
         self.sessions.show_sessions(found, str(results), datetime.now().astimezone())
         self._show_last(found)
-        self._arrange()
         self.banner.show_interrupted(stopped)
         for card in self.grid.cards:
             if isinstance(card, StudyCard):
@@ -353,6 +353,8 @@ class HomePlace(Place):
         down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
         self._below.setDirection(down if stacked else right)
         self._beside.setDirection(right if stacked else down)
+        for at, stretch in enumerate((stacked, stacked, not stacked)):  # the cards share a row, and stand above each other
+            self._beside.setStretch(at, int(stretch))
         for card in (self.device, self.lab):
             card.setMinimumWidth(0 if stacked else COLUMN_PX)
             card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else COLUMN_PX)

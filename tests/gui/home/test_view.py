@@ -49,6 +49,20 @@ def test_the_demo_is_first_until_a_session_exists_then_what_was_run_last(qtbot, 
     assert first_study(open_home(qtbot, tmp_path)) == "slime", "another day, too"
 
 
+def test_where_only_samples_exist_sessions_are_one_line_until_they_are_asked_for(qtbot, tmp_path):
+    hold(tmp_path / "sample-demo", "P001", simulated=True)
+    home = open_home(qtbot, tmp_path)
+    card = home.sessions
+    qtbot.waitUntil(lambda: card.kind.isVisible())
+    assert card.height() < 80, "one line, for no row is shown"
+    qtbot.waitUntil(lambda: home.device.y() == home.lab.y() > 0)  # below it, side by side
+    assert "1 sample session" in card.nothing.text()
+    card.show_kind("sample")
+    qtbot.waitUntil(lambda: card.height() >= 200)
+    assert card.rows.table.isVisible()
+    qtbot.waitUntil(lambda: home.device.y() < home.lab.y())
+
+
 @pytest.mark.parametrize("size", [(1024, 640), (1366, 768), (1600, 1000)])
 @pytest.mark.parametrize("held", [True, False])
 def test_no_scroll_bar_stands_in_a_scroll_area(qtbot, tmp_path, size, held):
