@@ -53,7 +53,7 @@ def test_where_only_samples_exist_sessions_are_one_line_until_they_are_asked_for
     hold(tmp_path / "sample-demo", "P001", simulated=True)
     home = open_home(qtbot, tmp_path)
     card = home.sessions
-    qtbot.waitUntil(lambda: card.kind.isVisible())
+    qtbot.waitUntil(card.kind.isVisible)
     assert card.height() < 80, "one line, for no row is shown"
     qtbot.waitUntil(lambda: home.device.y() == home.lab.y() > 0)  # below it, side by side
     assert "1 sample session" in card.nothing.text()

@@ -1,13 +1,15 @@
 """The operator's view as a value: pure, neutral, and true to the journal."""
 
 import dataclasses
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from study_app.gui.operator.operator_view import MEASURES, stages
+from study_app.gui.operator.operator_view import MEASURES, UNDELIVERED, stages
 from study_app.gui.operator.servo_health import ForceFigures, ServoHealth
 from study_app.number_text import duration, duration_range, duration_words, grouped, minutes
+from study_app.protocol.load import load
 from study_app.protocol.model import Limits
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.delivered import beyond_limits
@@ -98,21 +100,68 @@ def test_a_view_after_each_event_is_the_reviewed_one(told, blinding, ended, pyte
     compare(Path(__file__).parent / "golden" / f"operator_{blinding}_{ended}.txt", lines, pytestconfig)
 
 
-def test_time_in_a_trial_of_intervals_has_no_limit_of_a_single_interval(told):
+def pair(told, number, answer, seconds=1.0, attempt=1):
+    """Let a pair of intervals be answered."""
+    told.tell("trial_started", 10.0, trial=number, attempt=attempt, sealed="00")
+    told.tell("trial_ended", 4.0, trial=number, attempt=attempt, outcome="complete")
+    item = {"item": "choice_2ifc", "value": answer, "onset_s": 5.0, "first_s": 5.0 + seconds}
+    told.tell("responses", 2.0, trial=number, attempt=attempt, items=[item])
+
+
+def undelivered(told, number, attempt, *limits):
+    """Present a pair whose first interval broke limits."""
+    told.tell("trial_started", 1.0, trial=number, attempt=attempt, sealed="00")
+    told.tell("interval_ended", 2.0, trial=number, attempt=attempt, interval=1, outcome="complete", invalid=limits)
+    told.tell("trial_ended", 3.0, trial=number, attempt=attempt, outcome="invalid")
+
+
+PAIRS = (
+    *(partial(pair, number=n, answer=a, seconds=n / 2) for n, a in enumerate(("first", "first", "second", "first"), 1)),
+    *(partial(pair, number=number, answer="second", seconds=0.29) for number in range(5, 20)),
+    *(partial(pair, number=number, answer="second", seconds=0.1) for number in range(20, 30)),
+    lambda it: it.tell("trial_started", 1.0, trial=30, attempt=1, sealed="00"),
+    lambda it: it.tell("trial_ended", 2.0, trial=30, attempt=1, outcome="interrupted"),
+    partial(pair, number=30, answer="first", attempt=2),
+    lambda it: it.tell("repeat", 20.0, trial=30, reason="hand slipped"),
+    partial(pair, number=30, answer="second", attempt=3),
+    lambda it: it.tell("trial_started", 25.0, trial=31, attempt=1, sealed="00"),
+    lambda it: it.tell("session_resumed", 50.0),
+    partial(pair, number=31, answer="first", attempt=2),
+    lambda it: undelivered(it, 32, 1, "pace_error_percent"),
+    lambda it: undelivered(it, 32, 2, "pace_error_percent", "force_limit_n"),
+    partial(pair, number=32, answer="first", attempt=3),
+    *(lambda it, attempt=attempt: undelivered(it, 33, attempt, "level_error_ms") for attempt in (1, 2, 3)),
+    partial(pair, number=34, answer="first"),
+    lambda it: it.tell("trial_started", 10.0, trial=35, attempt=1),
+    lambda it: it.tell("session_ended", 5.0, status="completed", fingerprint="abcd"),
+)
+
+
+def test_tracks_after_each_event_are_the_reviewed_ones(told, pytestconfig):
     protocol = study()
     schedule = build_schedule(protocol, "P001", 1)
     session = dataclasses.replace(told.session, protocol=protocol, schedule=schedule, stages=stages(protocol, schedule))
-    paired = dataclasses.replace(told, protocol=protocol, schedule=schedule, session=session)
-    paired.tell("trial_started", 10.0, trial=1, attempt=1, sealed="00")
-    paired.now_s += 12.0
-    assert paired.view().trial_time.words == "0:12"
+    told = dataclasses.replace(told, protocol=protocol, schedule=schedule, session=session)
+    lines, before = list[str](), list[str]()
+    for number, event in enumerate(PAIRS):
+        event(told)
+        view = told.view()
+        after = [*view.track, view.setting_line, f"time: {view.trial_time and view.trial_time.words}"]
+        lines += [f"== {number}", *changed(before, after)]
+        before = after
+    compare(Path(__file__).parent / "golden" / "operator_tracks.txt", lines, pytestconfig)
+    assert set(UNDELIVERED) == {*Limits.model_fields, "force_limit_n"} - {"attempts"}
 
 
-def test_an_ended_session_says_how_many_trials_were_not_delivered(told):
-    told.tell("interval_ended", 5.0, trial=2, attempt=1, interval=1, outcome="complete", invalid=["delay_error_ms"])
-    told.tell("session_ended", 5.0, status="completed", fingerprint="abcd")
-    line = "All answers are on disk  ·  1 trial unanswered: no attempt was delivered  ·  Fingerprint abcd"
-    assert told.view().setting_line == line
+def test_rows_cover_every_step_once_and_name_no_condition_and_no_liquid():
+    protocol = load("rek2024")
+    schedule = build_schedule(protocol, "P001", 1)
+    rows = stages(protocol, schedule)
+    assert [step for stage in rows for step in range(stage.first, stage.last + 1)] == list(range(len(schedule.steps)))
+    labels = [stage.label for stage in rows]
+    assert {"Liquid setting 1", "Liquid setting 3", "Delay setting 1 to 7"} <= set(labels)  # long blocks are one row
+    conditions = {name for block in protocol.main_blocks for name in block.conditions}
+    assert not {*conditions, "water", "honey", "oil", "ms"} & set(" ".join(labels).lower().split())
 
 
 def test_every_limit_of_a_trial_has_a_name_for_the_operator(told):
