@@ -243,8 +243,8 @@ class SessionsCard(Card):
         self.nothing.setVisible(self.is_empty)
         for part in (self.where, self.details, self.rows):
             part.setVisible(not self.is_empty)
-        for part in (self.kind, self.all):
-            part.setVisible(bool(self._found))
+        self.kind.setVisible(bool(self._found))
+        self.all.setVisible(bool(self._found))
         self.setMinimumHeight(0 if self.is_empty else LEAST_HEIGHT)
         self.emptied.emit()
 

@@ -353,7 +353,7 @@ class HomePlace(Place):
         down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
         self._below.setDirection(down if stacked else right)
         self._beside.setDirection(right if stacked else down)
-        for at, stretch in enumerate((stacked, stacked, not stacked)):  # the cards share a row, and stand above each other
+        for at, stretch in enumerate((stacked, stacked, not stacked)):  # two cards share a row
             self._beside.setStretch(at, int(stretch))
         for card in (self.device, self.lab):
             card.setMinimumWidth(0 if stacked else COLUMN_PX)
