@@ -48,8 +48,7 @@ from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage
 from study_app.session.resume import FIRST
 from study_app.session.start import NewSession, open_store
-from study_app.session.tasks import TaskView
-from study_app.session.trial import TankView
+from study_app.session.tasks import TankView, TaskView
 from study_app.store.recordings import read_frames
 from study_app.store.sessions.open_session import SessionStore
 

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from study_app.designer.place.view import DesignerPlace
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.sessions.session_facts import SessionFacts
+    from study_app.gui.sessions.session_page import SessionPage
     from study_app.lab.ab_comparison import Setting, Side
 
 
@@ -449,6 +450,7 @@ class MainController(QObject):
         made.edit_asked.connect(self.open_designer)
         made.new_asked.connect(self.begin_study)
         made.device.display.clicked.connect(self._test_display)
+        made.watch_asked.connect(_watch)
         made.show_machine(self.machine.settings, self.devices.preferred)
         self._home_place = made
         return made
@@ -574,6 +576,12 @@ class MainController(QObject):
     def _leave(self) -> None:
         if self.live is None:
             self.loop.quit()
+
+
+def _watch(page: SessionPage) -> None:
+    from study_app.gui.watch.window import watch  # noqa: PLC0415 - pyqtgraph: only once it is needed
+
+    watch(page)
 
 
 def _draft_words() -> DraftWords:

@@ -36,6 +36,7 @@ from study_app.gui.application import open_here
 from study_app.gui.results.figures import ResultsView, Trouble, unblinded_words
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.sessions.session_facts import session_facts
+from study_app.gui.watch.window import watch
 from study_app.store.folders import StudyFolder
 from study_app.store.sites.merged import FOLDER, folders_of
 from study_app.workers.server import Crashed, Refused
@@ -109,6 +110,7 @@ class ResultsController(QObject):
         place.report_asked.connect(lambda to, _extras: self._write(WriteReport, to))
         place.stop_asked.connect(self._stop_writing)
         place.open_asked.connect(self._opener)
+        place.watch_asked.connect(watch)
 
     @property
     def busy(self) -> bool:

@@ -37,7 +37,7 @@ from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store import receipt, recordings
 from study_app.store.atomic import is_there
 from study_app.store.blinded import blinding
-from study_app.store.blinded.blinding import Key, as_recorded, opened, whole_protocol
+from study_app.store.blinded.blinding import Key, as_recorded, opened, reading_what_ran, whole_protocol
 from study_app.store.delivered import Delivered, delivered, delivered_error, judged
 from study_app.store.folders import locate
 from study_app.store.journals import journal
@@ -453,7 +453,7 @@ def _ran(
 
     Devices are by the time at which they were opened again; that of the session's beginning is under None.
     """
-    try:
+    with reading_what_ran(path):
         described = {None: kept["device"]} | {entry["at"]: entry["device"] for entry in kept.get("resumed", ())}
         described |= {line.at: line.described for line in lines if isinstance(line, events.DeviceReconnected)}
         devices = {
@@ -462,9 +462,3 @@ def _ran(
         }
         whose = kept["seed"], kept["participant"]
         return as_recorded(whole_protocol(kept["protocol"], key), kept, key), devices, whose
-    except KeyError as lacking:
-        raise StoreError(f"{path} lacks {lacking}: restore it from a copy") from lacking
-    except (AttributeError, TypeError, ValueError):  # said without the reason, which would tell conditions
-        raise StoreError(
-            f"{path} and the study's key give no protocol that this version can run: restore them from a copy"
-        ) from None

@@ -29,11 +29,11 @@ from study_app.protocol.trials.stimuli import DELAY
 from study_app.session.device_buttons import DeviceButtons
 from study_app.session.ports import Ports
 from study_app.session.resume import FIRST, Start
-from study_app.session.tasks import Outcome, TaskView
+from study_app.session.tasks import Outcome, TankView, TaskView
 from study_app.session.transitions import events
 from study_app.session.transitions.state import FINAL, Phase, SessionState, Stall
 from study_app.session.transitions.table import advance, open_session
-from study_app.session.trial import Recording, RunningTrial, TankView, ball_is_back, resting_view
+from study_app.session.trial import Recording, RunningTrial, ball_is_back, resting_view
 from study_app.store.delivered import broken_limits, delivered, undelivered
 from study_app.store.journals.journal_events import TargetReached
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.protocol.trials.tasks import Point, Reach, Task
+from study_app.video.frames import VideoFrame
 
 Outcome: TypeAlias = Literal["complete", "timeout"]
 
@@ -40,6 +41,20 @@ class TaskView:
     dwell: float
     elapsed_s: float
     target_m: Point | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TankView:
+    """What is drawn in the tank: the proxy's place [m, hand frame] (3,), the task, and the time all this is of [ns].
+
+    ``ball_hidden`` is whether the proxy is not drawn; ``video`` is the frame of a video behind it, None without one.
+    """
+
+    position_m: NDArray[np.float64]
+    task: TaskView
+    sample_time_ns: int
+    ball_hidden: bool = False
+    video: VideoFrame | None = None
 
 
 @dataclass(frozen=True, slots=True)

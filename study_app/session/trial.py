@@ -8,19 +8,17 @@ computed again from the recording alone. Measures name no requested delay: only 
 
 import math
 from collections import deque
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NAMES, SAMPLE
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.telemetry import timing
 from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.ports import RecorderPort, ServoPort
-from study_app.session.tasks import Outcome, TargetReached, TaskView, track
+from study_app.session.tasks import Outcome, TankView, TargetReached, TaskView, track
 from study_app.session.transitions.events import StartTrial
 from study_app.store.delivered import JUDGED, delivered_error, judged
 from study_app.video.frames import VideoFrame, VideoSource, VideoStatistics
@@ -169,20 +167,6 @@ def sample_columns(samples: Any, rate_hz: float, samples_dropped: int, worst_gap
             for bit, name in enumerate(LIMITER_NAMES)
         },
     }
-
-
-@dataclass(frozen=True, slots=True)
-class TankView:
-    """What is drawn in the tank: the proxy's place [m, hand frame] (3,), the task, and the time all this is of [ns].
-
-    ``ball_hidden`` is whether the proxy is not drawn; ``video`` is the frame of a video behind it, None without one.
-    """
-
-    position_m: NDArray[np.float64]
-    task: TaskView
-    sample_time_ns: int
-    ball_hidden: bool = False
-    video: VideoFrame | None = None
 
 
 class RunningTrial:

@@ -8,8 +8,7 @@ from study_app.protocol.load import load
 from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, ShowIf, SliderView, TextView
 from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
 from study_app.session.pages import Progress, QuestionnairePage, TaskPage, TextPage
-from study_app.session.tasks import TaskView
-from study_app.session.trial import TankView
+from study_app.session.tasks import TankView, TaskView
 
 THESIS = load("rek2024")
 LABELS, DUTCH_LABELS = (THESIS.scales["agreement"].labels[language] for language in ("en", "nl"))

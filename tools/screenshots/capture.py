@@ -27,7 +27,7 @@ class Camera:
     """
 
     def __init__(self, to: Path, progress: Callable[[str], object], sizes: tuple[tuple[int, int], ...] = ()) -> None:
-        self._to, self._progress, self._sizes = to, progress, sizes
+        self._to, self._progress, self.sizes = to, progress, sizes
         self.taken: list[Path] = []
 
     def until(self, found: Callable[[], T | None], what: str) -> T:
@@ -64,7 +64,7 @@ class Camera:
         if not at_once:
             self.wait(SETTLED_MS)
         self._keep(window, name)
-        for width, height in () if isinstance(window, QDialog) or at_once else self._sizes:
+        for width, height in () if isinstance(window, QDialog) or at_once else self.sizes:
             before = window.size()
             window.resize(width, height)
             self.wait(SETTLED_MS)

@@ -6,11 +6,15 @@ from typing import Final
 
 from study_app.protocol.load import load, source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded import blinding
+from study_app.store.blinded.unblinding import unblind
 from study_app.store.journals.journal_events import PageShown
 from study_app.store.sessions.begin import SessionStart, begin
 
 STUDY: Final = "rek2024"
+WATCHED: Final = "watched"
+"""Folder of a study whose trials are watched again."""
 PARTICIPANTS: Final = 12
 SEED: Final = 357711
 QUICK: Final = (("min_s", "12"),)
@@ -39,6 +43,11 @@ def rehearsed(folder: Path) -> Path:
         store.append(PageShown(page="consent"))
         store.close()
     return results
+
+
+def recorded() -> None:
+    """Rehearse a session of the demo with its recordings, and open its key."""
+    unblind(rehearse("demo", participants=1, seed=SEED, results=Path(WATCHED, "demo")), "AK", "to watch it again")
 
 
 def quick(folder: Path, *, blinding: str = "double") -> Path:

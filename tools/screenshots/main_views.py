@@ -7,15 +7,21 @@ from PySide6.QtWidgets import QDialog
 
 from study_app.app.main_controller import MainController
 from study_app.devices.registry import all_devices
+from study_app.gui.application import open_here
 from study_app.gui.home.study_facts import StudyFacts, study_facts
+from study_app.gui.sessions.session_facts import sessions
+from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.settings.display_test import DisplayTest
 from study_app.gui.theme.theme import Theme
+from study_app.gui.watch.window import watch
 from tools.screenshots.capture import Camera, shown
-from tools.screenshots.example_study import STUDY
+from tools.screenshots.example_study import STUDY, WATCHED
 
 HOME: Final = (1440, 900)
 WIDE: Final = (1600, 900)
 FELT_MS: Final = 4300
+WATCHED_S: Final = 1.6
+WATCHED_SIZE: Final = (1180, 800)
 TESTED_MS: Final = 2500
 PATH: Final = "zigzag"
 KEPT_IN: Final = "~/.config/liquid-study/machine.json"  # in place of a folder that is gone afterwards
@@ -35,6 +41,7 @@ def take_places(camera: Camera, results: Path, theme: Theme) -> None:
         camera.take(window, f"home-{theme.name}", HOME)
         _take_questions(camera, home, theme)
         _take_results(camera, controller, theme)
+        _take_watched(camera, controller, theme)
         _take_lab(camera, controller, theme)
         _take_devices(camera, controller, theme)
         _take_machine(camera, controller, theme)
@@ -63,6 +70,23 @@ def _take_results(camera: Camera, controller: MainController, theme: Theme) -> N
         lambda: place.view.figures and place.view.drawing is None and place.view.testing is None, "the figures"
     )
     camera.take(controller.window, f"results-{theme.name}", HOME)
+
+
+def _take_watched(camera: Camera, controller: MainController, theme: Theme) -> None:
+    below = controller.window.place("results")
+    page = SessionPage(below, theme, sessions(Path(WATCHED).resolve(), {})[0], open_here)
+    page.show()
+    camera.until(lambda: page.record, "the session's page")
+    camera.take(page, f"session-{theme.name}")
+    window: Any = watch(page)
+    stage = camera.until(lambda: window.stage, "the trial")
+    stage.show_moment(WATCHED_S)
+    camera.take(window, f"watch-{theme.name}", WATCHED_SIZE)
+    for size in camera.sizes:
+        window.resize(size[0] - 40, size[1] - 60)
+        camera.take(window, f"watch-{theme.name}-{size[0]}x{size[1]}")
+    window.close()
+    page.close()
 
 
 def _take_lab(camera: Camera, controller: MainController, theme: Theme) -> None:

@@ -17,7 +17,7 @@ from study_app.user_folder import FOLDER_VARIABLE
 from study_app.workspace import FOLDER_NAME, WORKSPACE_VARIABLE
 from tools.screenshots.capture import Camera
 from tools.screenshots.designer_pictures import take_designer, write_studies
-from tools.screenshots.example_study import STUDY, quick, rehearsed
+from tools.screenshots.example_study import STUDY, quick, recorded, rehearsed
 from tools.screenshots.main_views import take_places
 from tools.screenshots.session_pictures import take_session, take_single_blind
 
@@ -53,6 +53,7 @@ def screenshots(
     with tempfile.TemporaryDirectory(prefix="liquid-study-") as held, _at_home_in(Path(held)), collecting_here():
         if only in (None, "places"):
             results = rehearsed(Path(FOLDER_NAME))
+            recorded()
             for theme in (LIGHT, DARK):
                 take_places(camera, results, theme)
         if only in (None, "designer"):

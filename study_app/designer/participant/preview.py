@@ -77,9 +77,9 @@ from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.wording.languages import language_name, words
 from study_app.session.pages import DesignPage, Page, QuestionnairePage, TaskPage
 from study_app.session.simulated.observers import ProgrammedBall
+from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Chosen, Continue, LanguageChosen, Retracted, Submitted
 from study_app.session.transitions.page_builder import Moment, moments, preview, previewed_page, tested_condition
-from study_app.session.trial import TankView
 from study_app.store.study_settings import keep_setting, kept_language
 
 FRAME_MS: Final = 33

@@ -43,7 +43,7 @@ class Command:
 
     def action(self, place: QWidget, run: Callable[[], object]) -> QAction:
         """Return its action, added to a widget: its keys act anywhere in the window while the widget is shown."""
-        made = QAction(self.words, place, toolTip=tip(self.id), shortcutContext=Qt.ShortcutContext.WindowShortcut)
+        made = QAction(self.words, place, toolTip=_with_keys(self), shortcutContext=Qt.ShortcutContext.WindowShortcut)
         made.setShortcuts([QKeySequence(keys) for keys in self.keys])
         made.triggered.connect(lambda _checked=False: run())
         place.addAction(made)
@@ -130,7 +130,11 @@ def key_cap(action: str) -> str:
 
 def with_key(words: str, action: str) -> str:
     """Return words followed by the key of an action, for a tip: "Duplicate (Ctrl+D)"."""
-    return f"{words} ({_OF[action].shown[0]})"
+    return _with_keys(_OF[action], words)
+
+
+def _with_keys(command: Command, words: str = "") -> str:
+    return f"{words or command.words} ({command.shown[0]})"
 
 
 def tip(action: str) -> str:

@@ -30,6 +30,7 @@ from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 
 from study_app.gui.lab.lab_state import Floats, LabView, Point
 from study_app.gui.participant.tank import sprites
+from study_app.gui.participant.tank.arrows import HEIGHTS, Arrow, draw_head, paint_arrows
 from study_app.gui.participant.tank.frame import BallPlace, BallPlacer, Box, Camera
 from study_app.gui.participant.tank.layers import Backdrop, backdrop
 from study_app.gui.participant.window import PointerCapture
@@ -120,18 +121,6 @@ def draw_ring(painter: QPainter, place: QPointF) -> None:
     painter.drawEllipse(place, RING_PX, RING_PX)
 
 
-def draw_head(painter: QPainter, tip: QPointF, turn: float, ink: QColor, size: float) -> None:
-    """Paint an arrow head whose middle is at ``tip``, pointing ``turn`` [rad] from the right, downwards."""
-    corners = [(0.55, 0.0), (-0.45, 0.46), (-0.45, -0.46)]
-    cos, sin = math.cos(turn), math.sin(turn)
-    shape = QPolygonF([tip + QPointF(cos * u - sin * v, sin * u + cos * v) * size for u, v in corners])
-    edge = QColor(TANK.shadow)
-    edge.setAlphaF(0.55)
-    painter.setPen(QPen(edge, 1.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin))
-    painter.setBrush(ink)
-    painter.drawPolygon(shape)
-
-
 @lru_cache(maxsize=SHADES)
 def shade_style(shade: int) -> tuple[QColor, float]:
     """Return colour and width of a step of age, 0 the newest."""
@@ -191,10 +180,8 @@ Words: TypeAlias = tuple[str, str]
 
 MARGIN_X, MARGIN_TOP, MARGIN_BOTTOM = 36.0, 26.0, 22.0
 CHIP_HEIGHT, CHIP_EDGE = 30.0, 14.0
-ARROW_HEIGHTS = 0.55  # of the water, for a force at the limit and for the wake below
 WAKE_MPS = 2.0
 PITCH = math.radians(27)  # higher than the participant's eye: wakes are mostly horizontal
-LEAST_ARROW_PX = 9.0
 
 
 class LabTank(Themed, QWidget):
@@ -218,7 +205,6 @@ class LabTank(Themed, QWidget):
         self._wanted: object = None
         self._painting = Background(self)
         self._painting.done.connect(self._take_still)
-        self._name_font = font("label", weight=600)
         self.pointer = PointerCapture(self)
         self.pointer.moved.connect(self.moved)
         self.pointer.pressed.connect(self._press)
@@ -310,7 +296,7 @@ class LabTank(Themed, QWidget):
             paint_tail(painter, places)
         if ball is not None:
             if open_view is not None:
-                self._paint_arrows(painter, camera, open_view)
+                paint_arrows(painter, camera, self._arrows(open_view))
             sprite = sprites.ball(ball.radius, self.devicePixelRatioF(), ball.haze)
             sprites.draw(painter, sprite, ball.middle)
         painter.drawImage(still.front_at.topLeft(), still.front)
@@ -345,43 +331,19 @@ class LabTank(Themed, QWidget):
         painter.setPen(QPen(ink, 1.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawPoints(ball.feet)
 
-    def _paint_arrows(self, painter: QPainter, camera: Camera, view: LabView) -> None:
+    def _arrows(self, view: LabView) -> list[Arrow]:
         if view.now is None:
-            return
-        high = ARROW_HEIGHTS * (self.box.water - self.box.floor)
+            return []
+        high = HEIGHTS * (self.box.water - self.box.floor)
+        start = view.now.position_m
         limit_n = max(view.workbench.in_hand.scene.force_limit_n, 1e-9)
-        taken = QRectF()
-        for word, vector, most, colour in (
-            ("force", view.now.force_n, limit_n, TANK.proxy_light),
-            ("wake", view.now.wake_mps, WAKE_MPS, TANK.wake),
-        ):
-            start = view.now.position_m
-            end = _beyond(start, vector, high / most)
-            from_px, to_px = QPointF(*camera.point(start)), QPointF(*camera.point(end))
-            taken = self._paint_arrow(painter, from_px, to_px, QColor(colour), word, taken)
-
-    def _paint_arrow(
-        self, painter: QPainter, start: QPointF, tip: QPointF, ink: QColor, word: str, taken: QRectF
-    ) -> QRectF:
-        """Paint an arrow with its name beyond its head, not on the place ``taken``; return the name's place."""
-        along = tip - start
-        length = math.hypot(along.x(), along.y())
-        if length < LEAST_ARROW_PX:
-            return taken
-        for colour, width in ((QColor(TANK.shadow), 6.0), (ink, 3.2)):
-            painter.setPen(QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-            painter.drawLine(start, tip - along * (5.0 / length))
-        draw_head(painter, tip, math.atan2(along.y(), along.x()), ink, 13.0)
-        wide = QFontMetricsF(self._name_font).horizontalAdvance(word)
-        middle = tip + along * ((12.0 + wide / 2) / length)
-        place = QRectF(middle.x() - wide / 2, middle.y() - 9, wide, 18)
-        if place.intersects(taken):
-            place.moveTop(taken.bottom() + 2 if middle.y() >= taken.center().y() else taken.top() - 20)
-        letters = QPainterPath()
-        letters.addText(place.left(), place.bottom() - 4.5, self._name_font, word)
-        painter.strokePath(letters, QPen(QColor(TANK.shadow), 2.6))
-        painter.fillPath(letters, ink)
-        return place
+        return [
+            Arrow(word, start, (high * u / most, high * v / most, high * w / most), colour)
+            for word, (u, v, w), most, colour in (
+                ("force", view.now.force_n, limit_n, TANK.proxy_light),
+                ("wake", view.now.wake_mps, WAKE_MPS, TANK.wake),
+            )
+        ]
 
     def _first_words(self) -> str:
         view = self._view
@@ -447,11 +409,6 @@ class LabTank(Themed, QWidget):
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(PARTICIPANT.accent), 2))
             painter.drawRoundedRect(whole.adjusted(2, 2, -2, -2), RADIUS_CARD - 2, RADIUS_CARD - 2)
-
-
-def _beyond(start: Point, vector: Point, scale: float) -> Point:
-    x, y, z = (a + scale * v for a, v in zip(start, vector, strict=True))
-    return x, y, z
 
 
 @lru_cache(maxsize=64)

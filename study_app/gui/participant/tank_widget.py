@@ -51,7 +51,7 @@ from study_app.session.tasks import track
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words
-    from study_app.session.trial import TankView
+    from study_app.session.tasks import TankView
 
 # Where the tank lies in the window, in shares of it.
 AREA = (0.075, 0.122, 0.85, 0.712)

@@ -47,7 +47,7 @@ from study_app.session.pages import (
 from study_app.session.transitions.events import Continue, ForceStopped, PauseRequested
 
 if TYPE_CHECKING:
-    from study_app.session.trial import TankView
+    from study_app.session.tasks import TankView
 
 SHARE_OF_SCREEN = 0.6  # of the screen's height that moves the hand through the height of the workspace
 NOTCHES = 24  # of the wheel through the depth of the workspace

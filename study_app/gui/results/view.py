@@ -228,7 +228,8 @@ class ResultsPlace(Place):
     Signals: ``entered`` and ``left``; ``study_asked`` (folder); ``remedy_asked`` (a `Remedy`); ``leave_out_asked``
     and ``take_back_asked`` (participant, session, trial or None, by, reason); ``unblind_asked`` (by, reason);
     ``tables_asked`` and ``report_asked`` (folder, extras); ``stop_asked`` (giving up what is being written);
-    ``open_asked`` (path); ``version_asked`` (the `SessionFacts` of a session, to compare the study with its version).
+    ``open_asked`` (path); ``version_asked`` (the `SessionFacts` of a session, to compare the study with its version);
+    ``watch_asked`` (the `SessionPage` whose chosen trial is to be watched).
     """
 
     entered = Signal()
@@ -243,6 +244,7 @@ class ResultsPlace(Place):
     stop_asked = Signal()
     open_asked = Signal(object)
     version_asked = Signal(object)
+    watch_asked = Signal(object)
 
     def __init__(self, *, handed_to: Path, no_sav: str = "") -> None:
         super().__init__()
@@ -376,6 +378,7 @@ class ResultsPlace(Place):
     def _open_session(self, session: SessionFacts) -> None:
         page = SessionPage(self, self.theme, session, self.open_asked.emit)
         page.changed.connect(self.entered)
+        page.watch_asked.connect(self.watch_asked)
         self._open(page)
 
     def _ask_leave_out(self) -> None:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDialog, QScrollArea, QStackedWidget, QWidget
 
-from study_app.devices.registry import DEVICES
 from study_app.errors import StoreError
 from study_app.gui.kit.dialogs import REASON, Question
 from study_app.gui.kit.fields import Field, choice
@@ -35,6 +34,7 @@ from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.live_plots import NAMES, TracePlot
 from study_app.gui.widgets.row_table import CHIP_ROLE, Rows, Table
 from study_app.number_text import counted
+from study_app.session.watch import motion_hidden
 from study_app.store.blinded.blinding import opened, opened_key
 from study_app.store.delivered import beyond_limits
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include
@@ -56,7 +56,6 @@ LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
     "targets_reached": ("targets reached, at least", "%"),
 }
 """Of every measure that a limit judges: what it is, and its unit."""
-MOTION_HIDDEN = "Hidden while the study is blinded: with this device, the recorded motion would reveal the liquid."
 NO_MOTION = "This trial has no recording."
 
 
@@ -117,8 +116,6 @@ def read_record(folder: Path) -> SessionRecord:
     start = start_of(lines)
     rows = session_tables.SessionRows(lines).trials
     trials = _trials(session, rows, lines, start.limits, own)
-    device = DEVICES.get(start.device or "")
-    measured = device is not None and not device.motion_shows_force
     return SessionRecord(
         facts=facts,
         about=_about(lines, incidents(facts)),
@@ -131,7 +128,7 @@ def read_record(folder: Path) -> SessionRecord:
             if path.is_file()
         ),
         left_out=own,
-        motion_hidden="" if measured or key is not None else MOTION_HIDDEN,
+        motion_hidden=motion_hidden(start, key),
     )
 
 
@@ -433,9 +430,14 @@ def trial_words(trial: TrialRecord) -> str:
 
 
 class SessionPage(Themed, QDialog):
-    """One session in full, read in a thread; ``changed`` comes when something was left out or taken back."""
+    """One session in full, read in a thread.
+
+    ``changed`` comes when something was left out or taken back, ``watch_asked`` with the page when the trial that is
+    chosen is to be watched again.
+    """
 
     changed = Signal()
+    watch_asked = Signal(object)
 
     def __init__(self, parent: QWidget, theme: Theme, facts: SessionFacts, opener: Callable[[Path], object]) -> None:
         super().__init__(parent)
@@ -453,6 +455,7 @@ class SessionPage(Themed, QDialog):
         self.trial = label("", "label", "text2", wraps=True)
         self.motion = MotionPlot()
         self.notes, self.files = (label("", "label", "text2", wraps=True) for _ in range(2))
+        self.watch = ActionButton("play", "Watch again", height=36)
         self.leave_out = ActionButton("minus", "Exclude …", height=36)
         self.folder = ActionButton("file", "Open the folder", role="plain", height=34)
         self.close_button = ActionButton("", "Close", role="primary", height=40)
@@ -460,15 +463,19 @@ class SessionPage(Themed, QDialog):
         self.lines: list[QWidget] = []
         self._lay_out()
         self.trials.selectionModel().selectionChanged.connect(lambda *_changes: self._choose_trial())
+        for asks in (self.watch.clicked, self.trials.opened):
+            asks.connect(lambda _how: self.watch_asked.emit(self))
         self.leave_out.clicked.connect(self._ask_leave_out)
         self.folder.clicked.connect(lambda: opener(facts.folder))
         self.close_button.clicked.connect(self.accept)
-        for button in (self.leave_out, self.folder):
+        for button in (self.watch, self.leave_out, self.folder):
             button.setAutoDefault(False)
-        self.leave_out.setEnabled(False)
+        for button in (self.watch, self.leave_out):
+            button.setEnabled(False)
         apply_theme(self, theme)
         available = self.screen().availableSize()
         self.resize(min(SIZE[0], available.width() - 40), min(SIZE[1], available.height() - 60))
+        self.trials.setFocus()
         self.read()
 
     def read(self) -> None:
@@ -478,7 +485,7 @@ class SessionPage(Themed, QDialog):
         kind = f"  ·  {self.facts.kind}" if self.facts.kind else ""
         title = label(f"{self.facts.name}  ·  {self.facts.study}{kind}", "title_dense")
         head = hbox(title, self.status, self.validity, STRETCH, spacing=12)
-        trials = Card("Trials", padding=16, gap=8)
+        trials = Card("Trials", self.watch, padding=16, gap=8)
         add_parts(trials.column, (self.trials, 1), self.trial, self.motion)
         left = vbox((trials, 1))
         out = Card("Excluded", self.leave_out, padding=16, gap=8)
@@ -546,6 +553,7 @@ class SessionPage(Themed, QDialog):
 
     def _choose_trial(self) -> None:
         trial = self.chosen
+        self.watch.setEnabled(trial is not None)
         if trial is None or self.record is None:
             self.trial.setText("")
             self.motion.show_sentence("No trials yet.")

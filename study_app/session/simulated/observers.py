@@ -22,8 +22,7 @@ from study_app.protocol.simulated import Rater, TrialFeatures, judgements
 from study_app.protocol.trials.tasks import Reach, Task
 from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage
-from study_app.session.tasks import track
-from study_app.session.trial import TankView
+from study_app.session.tasks import TankView, track
 from study_app.store.delivered import LONGEST_S
 
 Floats: TypeAlias = NDArray[np.float64]

@@ -58,8 +58,8 @@ from study_app.session.resume import (
 from study_app.session.runner import Runner
 from study_app.session.simulated.observers import Choice, Draw, SensedTrial, choices, hand_for, reading_s, rest
 from study_app.session.simulated.participant import LOOK_AT_SETTING_S, AdjustingObserver, SimulatedParticipant
+from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeRequested, Stepped, Submitted
-from study_app.session.trial import TankView
 from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.blinding import Key

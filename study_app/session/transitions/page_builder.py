@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal, TypeAlias
 
+from study_app.haptics.model.scene import Body
 from study_app.protocol.model import PageText, Protocol, Questionnaire
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Trial, build_schedule, draw_key, stream
@@ -89,17 +90,23 @@ def consent_hash(state: SessionState, text: PageText) -> str:
 
 def _task_page(state: SessionState, trial: Trial) -> pages.TaskPage:
     protocol = state.plan.protocol
+    return task_page(protocol, state.plan.language, trial, protocol.scene_for(_drawn_condition(state, trial)).body)
+
+
+def task_page(protocol: Protocol, language: str, trial: Trial, body: Body) -> pages.TaskPage:
+    """Return the tank of a trial in a session's own protocol with a ball, before anything is presented."""
     block = protocol.blocks[trial.block]
     task, questionnaire = protocol.tasks[block.task], protocol.questionnaire_of(block.id)
     set_by_hand = block.design is not None and design_of(protocol, block).adjusts
+    follows = words(language).follow_target
     return pages.TaskPage(
         trial=trial.number,
-        instruction=_words(state).follow_target if task.instruction is None else _text(state, task.instruction),
+        instruction=follows if task.instruction is None else protocol.text(task.instruction, language),
         task=task,
         workspace_m=protocol.device.workspace_m,
-        body_radius_m=protocol.scene_for(_drawn_condition(state, trial)).body.diameter_m / 2 / protocol.scene.scale,
-        progress=_progress(state, trial),
-        question=_text(state, questionnaire.intro) if set_by_hand and questionnaire is not None else "",
+        body_radius_m=body.diameter_m / 2 / protocol.scene.scale,
+        progress=_among(protocol, trial, trial.label(protocol, language), trial.index),
+        question=protocol.text(questionnaire.intro, language) if set_by_hand and questionnaire is not None else "",
     )
 
 
@@ -190,7 +197,7 @@ def _label(state: SessionState, trial: Trial) -> str:
 
 
 def _progress(state: SessionState, trial: Trial) -> pages.Progress:
-    return _among(state, trial, _label(state, trial), trial.index)
+    return _among(state.plan.protocol, trial, _label(state, trial), trial.index)
 
 
 def _progress_between(state: SessionState) -> pages.Progress | None:
@@ -203,20 +210,19 @@ def _progress_between(state: SessionState) -> pages.Progress | None:
     if done is not None and (coming is None or state.plan.protocol.pages[state.page_id].kind == "break"):
         designed = state.plan.protocol.blocks[done.block].design is not None
         if designed and coming is not None:
-            return _among(state, done, _label(state, done), done.index + 1)
-        return None if done.part is None else _among(state, done, "", done.index + 1)
+            return _among(state.plan.protocol, done, _label(state, done), done.index + 1)
+        return None if done.part is None else _among(state.plan.protocol, done, "", done.index + 1)
     if coming is None or coming.part is None:
         return None
-    return _among(state, coming, "", coming.index)
+    return _among(state.plan.protocol, coming, "", coming.index)
 
 
 def _coming(state: SessionState) -> Trial | None:
     return next((step for step in state.plan.schedule.steps[state.index + 1 :] if isinstance(step, Trial)), None)
 
 
-def _among(state: SessionState, trial: Trial, label: str, index: int) -> pages.Progress:
+def _among(protocol: Protocol, trial: Trial, label: str, index: int) -> pages.Progress:
     """Return where trial ``index`` of a trial's block is; a block with a criterion may end early."""
-    protocol = state.plan.protocol
     at_most = protocol.blocks[trial.block].until is not None
     return pages.Progress(trial.part, protocol.parts, label, index, trial.of, at_most)
 

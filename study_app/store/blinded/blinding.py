@@ -495,6 +495,19 @@ def as_recorded(protocol: Protocol, receipt: Mapping[str, Any], key: Key) -> Pro
     return protocol.model_copy(update={"liquids": liquids, "scene": scene})
 
 
+@contextlib.contextmanager
+def reading_what_ran(receipt: Path) -> Iterator[None]:
+    """Turn what goes wrong while a receipt and the key are made a protocol into a `StoreError`."""
+    try:
+        yield
+    except KeyError as lacking:
+        raise StoreError(f"{receipt} lacks {lacking}: restore it from a copy") from lacking
+    except (AttributeError, TypeError, ValueError):  # said without the reason, which would tell conditions
+        raise StoreError(
+            f"{receipt} and the study's key give no protocol that this version can run: restore them from a copy"
+        ) from None
+
+
 def _resolved(protocol: Protocol) -> dict[str, Any]:
     chosen = [effect.name for effect in EFFECTS if effect.choose is not None]
     found = {}

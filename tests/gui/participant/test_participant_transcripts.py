@@ -21,7 +21,7 @@ from study_app.session.pages import (
     TaskPage,
     TroublePage,
 )
-from study_app.session.trial import TankView
+from study_app.session.tasks import TankView
 from study_app.video.frames import VideoFrame
 from tests.golden_values import changed
 from tests.gui.drawn import shown

@@ -12,13 +12,15 @@ from PySide6.QtWidgets import QWidget
 from study_app.analysis.worker_messages import FigureDrawn, Progress
 from study_app.errors import StoreError
 from study_app.gui.results.figures import Trouble, unblinded_words
-from study_app.gui.sessions.session_page import MOTION_HIDDEN, SessionPage, SessionRecord, TrialRecord
+from study_app.gui.sessions.session_page import SessionPage, SessionRecord, TrialRecord
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
 from study_app.store.exclusions import Exclusion
 from tests.gui.results.sample import LEFT_OUT, SVG, facts, view
 from tests.gui.transcript import Actions, clicked, in_turn
 from tests.gui.windows import results, shown
+
+HIDDEN = "Hidden while the study is blinded: with this device, the recorded motion would reveal the liquid."
 
 NOW = datetime(2026, 11, 24, 12, tzinfo=UTC)
 STARTED = NOW - timedelta(days=1)
@@ -147,7 +149,7 @@ PAGE: Actions = {
     **{f"trial {row + 1}": lambda made, row=row: made.trials.selectRow(row) for row in (1, 2, 3)},  # type: ignore[misc]
     "motion unread": lambda made: (READ.update(motion=StoreError("it is cut")), made.trials.selectRow(0)),
     "excluding": lambda made: made.leave_out.click(),
-    "sealed": read_again(record=replace(RECORD, motion_hidden=MOTION_HIDDEN, left_out=(), notes=())),
+    "sealed": read_again(record=replace(RECORD, motion_hidden=HIDDEN, left_out=(), notes=())),
     "session excluded": read_again(
         record=replace(
             RECORD,

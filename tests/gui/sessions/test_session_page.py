@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 
 from study_app.gui.sessions.session_facts import sessions
-from study_app.gui.sessions.session_page import MOTION_HIDDEN, SessionPage, read_record
+from study_app.gui.sessions.session_page import SessionPage, read_record
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
 from study_app.protocol.source.files import source_bytes
@@ -122,7 +122,7 @@ def test_choices_that_were_not_confirmed_stay_visible(qtbot, tmp_path):
 
 def test_a_page_shows_the_motion_of_a_trial_once_it_may_be_seen(qtbot, study):
     sealed = page_of(qtbot, study)
-    assert sealed.motion.accessibleDescription() == MOTION_HIDDEN
+    assert sealed.motion.accessibleDescription().startswith("Hidden while the study is blinded")
     assert "once the study is unblinded" in sealed.limits.text()
     unblind(study, by="AK", reason="over")
     page = page_of(qtbot, study)

@@ -25,8 +25,7 @@ from study_app.session.simulated import rehearsal
 from study_app.session.simulated.observers import RATE_HZ, SensedTrial, exploration
 from study_app.session.simulated.rehearsal import RehearsedSession, condition_features
 from study_app.session.simulated.rehearsal_worker import RehearsalOrder, carry_out
-from study_app.session.tasks import TaskView
-from study_app.session.trial import TankView
+from study_app.session.tasks import TankView, TaskView
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Responses

@@ -1,0 +1,93 @@
+"""Named arrows from the ball in a tank: force, wake, velocity. Participants never see them."""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPainterPath, QPen, QPolygonF
+
+from study_app.gui.participant.tank.frame import Camera, Point
+from study_app.gui.theme.theme import TANK, font
+
+HEIGHTS = 0.55
+"""Length of the longest arrow, in heights of the water."""
+LEAST_PX = 9.0
+NAME_PX = 18
+
+
+class Arrow(NamedTuple):
+    """A vector that begins at a point [m, hand], in metres of the tank, with its name and colour."""
+
+    name: str
+    start_m: Point
+    vector_m: Point
+    colour: str
+
+    def ends(self, camera: Camera) -> tuple[QPointF, QPointF]:
+        """Return both ends on the screen [px]."""
+        x, y, z = (start + way for start, way in zip(self.start_m, self.vector_m, strict=True))
+        return QPointF(*camera.point(self.start_m)), QPointF(*camera.point((x, y, z)))
+
+
+def arrows_place(camera: Camera, arrows: Sequence[Arrow]) -> QRectF:
+    """Return a place that holds arrows with their names [px]."""
+    whole = QRectF()
+    for start, tip in (arrow.ends(camera) for arrow in arrows):
+        whole |= QRectF(start, tip).normalized()
+    return whole.adjusted(-110, -50, 110, 50) if arrows else whole
+
+
+def paint_arrows(painter: QPainter, camera: Camera, arrows: Sequence[Arrow]) -> None:
+    """Paint arrows, none of their names on another; those that are too short to have a direction are left out."""
+    taken = QRectF()
+    for arrow in arrows:
+        start, tip = arrow.ends(camera)
+        along = tip - start
+        length, ink = math.hypot(along.x(), along.y()), QColor(arrow.colour)
+        if length < LEAST_PX:
+            continue
+        for colour, width in ((QColor(TANK.shadow), 6.0), (ink, 3.2)):
+            painter.setPen(QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+            painter.drawLine(start, tip - along * (5.0 / length))
+        draw_head(painter, tip, math.atan2(along.y(), along.x()), ink, 13.0)
+        ratio = painter.device().devicePixelRatio()
+        letters = _name(arrow.name, arrow.colour, ratio)
+        wide = letters.width() / ratio
+        middle = tip + along * ((12.0 + wide / 2) / length)
+        place = QRectF(middle.x() - wide / 2, middle.y() - NAME_PX / 2, wide, NAME_PX)
+        if place.intersects(taken):
+            place.moveTop(taken.bottom() + 2 if middle.y() >= taken.center().y() else taken.top() - NAME_PX - 2)
+        painter.drawImage(place.topLeft(), letters)
+        taken = place
+
+
+def draw_head(painter: QPainter, tip: QPointF, turn: float, ink: QColor, size: float) -> None:
+    """Paint an arrow head whose middle is at ``tip``, pointing ``turn`` [rad] from the right, downwards."""
+    corners = [(0.55, 0.0), (-0.45, 0.46), (-0.45, -0.46)]
+    cos, sin = math.cos(turn), math.sin(turn)
+    shape = QPolygonF([tip + QPointF(cos * u - sin * v, sin * u + cos * v) * size for u, v in corners])
+    edge = QColor(TANK.shadow)
+    edge.setAlphaF(0.55)
+    painter.setPen(QPen(edge, 1.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin))
+    painter.setBrush(ink)
+    painter.drawPolygon(shape)
+
+
+@lru_cache(maxsize=16)
+def _name(word: str, colour: str, ratio: float) -> QImage:
+    """Return a word with a dark edge, for a screen of pixel ratio ``ratio``."""
+    face = font("label", weight=600)
+    wide = QFontMetricsF(face).horizontalAdvance(word) + 4
+    image = QImage(math.ceil(wide * ratio), math.ceil(NAME_PX * ratio), QImage.Format.Format_ARGB32_Premultiplied)
+    image.setDevicePixelRatio(ratio)
+    image.fill(Qt.GlobalColor.transparent)
+    letters = QPainterPath()
+    letters.addText(2, NAME_PX - 4.5, face, word)
+    painter = QPainter(image)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.strokePath(letters, QPen(QColor(TANK.shadow), 2.6))
+    painter.fillPath(letters, QColor(colour))
+    painter.end()
+    return image

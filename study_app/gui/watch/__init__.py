@@ -1,0 +1,1 @@
+"""A recorded trial, watched again: the participant's tank, both forces, and what happened when."""

@@ -1,0 +1,251 @@
+"""A trial or interval to watch again: what its recording and its session's journal say of every moment of it.
+
+The key opens a recording only once the study is unblinded. While it is sealed, the key gives the task in memory alone,
+and a recording of an earlier version, which is not encrypted, shows the motion without forces, delay and condition.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.devices.registry import DEVICES
+from study_app.errors import StoreError
+from study_app.haptics.model.layout import LIMITER_GLITCH
+from study_app.protocol.orders.durations import own_protocol
+from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.streams import group_of
+from study_app.protocol.trials.tracks import design_of
+from study_app.session.pages import Interval, TaskPage
+from study_app.session.tasks import TankView, Tracker, track
+from study_app.session.transitions.page_builder import task_page
+from study_app.store import receipt
+from study_app.store.blinded.blinding import Key, opened, opened_key, read_key, reading_what_ran, whole_protocol
+from study_app.store.folders import StudyFolder, locate
+from study_app.store.journals import journal
+from study_app.store.journals import journal_events as events
+from study_app.store.progress import progress_of
+
+MOTION_HIDDEN: Final = (
+    "Hidden while the study is blinded: with this device, the recorded motion would reveal the liquid."
+)
+_ASSUMED_FRAME_S: Final = 1 / 60  # of a session whose frames are not known
+Kind: TypeAlias = Literal["target", "answer", "event"]
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something that happened ``at_s`` after the task began [s]."""
+
+    at_s: float
+    kind: Kind
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """A recorded trial, or one of its ``intervals`` (0: it has none); times are since its task began [s].
+
+    ``presented`` is the condition, or what the interval was, "" while the study is ``blinded``: then forces and delay
+    are not shown either. ``samples`` (n,), at ``times_s``, have positions that are believed. Frames were painted at
+    ``painted_s`` (k,) and showed the hand of ``shown_s`` (k,).
+    """
+
+    page: TaskPage
+    language: str
+    blinded: bool
+    presented: str
+    intervals: int
+    samples: Any
+    times_s: NDArray[np.float64]
+    tracker: Tracker
+    marks: tuple[Mark, ...]
+    painted_s: NDArray[np.float64] = field(default_factory=partial(np.empty, 0))
+    shown_s: NDArray[np.float64] = field(default_factory=partial(np.empty, 0))
+
+    @property
+    def begins_s(self) -> float:
+        """The time of the first sample, which comes before the task."""
+        return float(self.times_s[0])
+
+    @property
+    def ends_s(self) -> float:
+        """The time of the last sample or event."""
+        return max(float(self.times_s[-1]), *(mark.at_s for mark in self.marks), 0.0)
+
+    def index(self, at_s: float) -> int:
+        """Return the number of the newest sample at a time."""
+        return max(int(np.searchsorted(self.times_s, at_s, "right")) - 1, 0)
+
+    def drawn_s(self, at_s: float) -> float:
+        """Return of which time the hand was that was seen at a time; before the first frame that time."""
+        frame = int(np.searchsorted(self.painted_s, at_s, "right")) - 1
+        return at_s if frame < 0 else float(self.shown_s[frame])
+
+    def view(self, at_s: float) -> TankView:
+        """Return the tank with hand and task of a time; between two samples the hand's position is interpolated."""
+        places = self.samples["position_m"]
+        position_m = np.array([np.interp(at_s, self.times_s, places[:, axis]) for axis in range(3)])
+        time_ns = int(self.samples["time_ns"][0]) + round((at_s - self.begins_s) * 1e9)
+        return TankView(position_m, self.tracker.at(time_ns), time_ns)
+
+    def steps_s(self, kind: Literal["sample", "frame"]) -> NDArray[np.float64]:
+        """Return the times of samples, or of painted frames."""
+        if kind == "sample":
+            return self.times_s
+        if len(self.painted_s) > 1:
+            return self.painted_s
+        return np.arange(self.begins_s, self.ends_s, _ASSUMED_FRAME_S)
+
+
+def motion_hidden(start: events.SessionStarted, key: Key | None) -> str:
+    """Return why no motion of a session is shown, "" where it may be: ``key`` is the study's, None while sealed."""
+    device = DEVICES.get(start.device or "")
+    seen = device is not None and not device.motion_shows_force
+    return "" if seen or key is not None else MOTION_HIDDEN
+
+
+def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 1) -> Watched:
+    """Read an attempt at a trial; of a trial of intervals the one with this number.
+
+    Raises
+    ------
+    StoreError
+        It has no recording, or that, the journal, receipt or key cannot be read; `SealedRecording` says that it can
+        once the study is unblinded.
+    """
+    from study_app.store import recordings  # noqa: PLC0415 - pyarrow: only once it is needed
+
+    study, session = locate(session_folder)
+    shown, lines = opened_key(study), journal.read(session.journal)
+    named = f"trial {trial}"
+    begun = [at for at, line in enumerate(lines) if isinstance(line, events.TrialStarted)]
+    first = next((at for at in begun if lines[at].which[:2] == (trial, attempt)), None)  # type: ignore[attr-defined]
+    if first is None:
+        raise StoreError(f"{session.journal} has no attempt {attempt} at {named}: choose another trial")
+    _, *own = opened([lines[0], *lines[first : next((at for at in begun if at > first), None)]], shown)
+    started = own[0]
+    assert isinstance(started, events.TrialStarted)  # noqa: S101 - it was looked for
+    which: events.Which = (trial, attempt, interval if started.has_intervals else None)
+    stored = next((one for one in lines if isinstance(one, _STORED) and one.which == which), None)
+    if not isinstance(stored, events.Recorded):
+        why = "none was requested, or it was interrupted" if stored is None else stored.reason
+        raise StoreError(f"{named} has no recording ({why}): choose another trial")
+    secret = None if shown is None else shown.nonce
+    recorded = recordings.read_samples(session.path / stored.recording, secret)
+    if why := motion_hidden(events.start_of(lines), shown):
+        raise StoreError(why.rstrip("."))
+    begins = [line for line in own if isinstance(line, _BEGINS)][started.has_intervals :]
+    at = next(number for number, one in enumerate(begins) if one.which == which)
+    ended = next((line for line in own if isinstance(line, _ENDS) and line.which == which), None)
+    samples, times_s = _timed(recorded, own, last=at + 1 == len(begins))
+    if not len(samples):
+        raise StoreError(f"the recording of {named} holds no sample: choose another trial")
+    page = _page(study, session.receipt, lines, started, which[-1])
+    lasted_s = None if ended is None else ended.others.get("duration_s")
+    tracker = track(page.task)
+    tracker.feed(samples[(times_s >= 0) & (times_s <= (np.inf if lasted_s is None else lasted_s))])
+    until_s = begins[at + 1].t_s if at + 1 < len(begins) else np.inf
+    found = Watched(
+        page=page,
+        language=progress_of(lines).language,
+        blinded=shown is None,
+        presented=_presented(started, which[-1], shown),
+        intervals=len(begins) if started.has_intervals else 0,
+        samples=samples,
+        times_s=times_s,
+        tracker=tracker,
+        marks=tuple(sorted(_marks(own, begins[at], ended, until_s), key=lambda mark: mark.at_s)),
+    )
+    if shown is None:  # the delay between a sample and its frame is sealed
+        return found
+    frames = recordings.read_frames(session.path / stored.recording_frames, secret)
+    start_ns = samples["time_ns"][0] - round(found.begins_s * 1e9)
+    painted_s, shown_s = ((frames[name] - start_ns) * 1e-9 for name in ("painted_ns", "sample_ns"))
+    return replace(found, painted_s=painted_s, shown_s=shown_s)
+
+
+_STORED: Final = events.Recorded | events.RecordingLost
+_BEGINS: Final = events.TrialStarted | events.IntervalStarted
+_ENDS: Final = events.TrialEnded | events.IntervalEnded
+
+
+def _timed(recorded: Any, own: Sequence[events.Event], *, last: bool) -> tuple[Any, NDArray[np.float64]]:
+    """Return the samples that are believed, with their times since the first one of the task's scene [s].
+
+    An adjustment, of the ``last`` interval, gives the scene other numbers from its first step on.
+    """
+    samples = recorded[np.isfinite(recorded["position_m"]).all(axis=1)]
+    samples = samples[samples["limiters"] & LIMITER_GLITCH == 0]
+    steps = [line.scene - 1 for line in own if isinstance(line, events.Stepped) and line.scene is not None and last]
+    first = samples["scene"] >= min([*steps, samples["scene"].max(initial=0)])
+    start_ns = samples["time_ns"][int(first.argmax())] if len(samples) else 0
+    return samples, (samples["time_ns"] - start_ns) * 1e-9
+
+
+def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s: float) -> Iterator[Mark]:
+    """Yield what happened between two times [s, session's clock]; targets are on the task's own clock.
+
+    The task begins with its first frame, which is known to some milliseconds.
+    """
+    gap_ms = (ended.others.get("first_frame_gap_ms") if ended is not None else None) or 0.0
+    for line in own:
+        if begun.n < line.n and line.t_s < until_s and (told := _told(line)) is not None:
+            at_s = line.t_s - begun.t_s - gap_ms * 1e-3
+            if isinstance(line, events.TargetReached) and line.t_task_s is not None:
+                at_s = line.t_task_s
+            if line is ended or not isinstance(line, _ENDS):
+                yield Mark(at_s, *told)
+
+
+def _told(line: events.Event) -> tuple[Kind, str] | None:
+    """Return what a mark says of a line; None of a line without one."""
+    match line:
+        case events.TargetReached():
+            return "target", f"target {line.target + 1} reached"
+        case events.Stepped():
+            return "answer", f"set {line.steps:+d} steps"
+        case events.Choice():
+            return "answer", f"{line.item}: {'cannot judge' if line.value is None else line.value}"
+        case events.AnswerRemoved():
+            return "answer", f"{line.item}: answer removed"
+        case events.Responses():
+            return "answer", "answers confirmed"
+        case events.TrialEnded() | events.IntervalEnded():
+            return "event", f"task ended: {line.outcome}"
+        case events.Note():
+            return "event", f"note: {line.text or 'marked'}"
+        case events.Paused() | events.Resumed() | events.ForceStopped() | events.ForceRestored():
+            return "event", line.event.replace("_", " ")
+    return None
+
+
+def _page(
+    study: StudyFolder, path: Path, lines: Sequence[events.Event], started: events.TrialStarted, interval: int | None
+) -> TaskPage:
+    """Return the tank of a trial, or of its interval; while the study is sealed the ball has the scene's own size."""
+    start, key = events.start_of(lines), read_key(study.path)
+    group = None if start.entry is None else group_of(key.groups, key.nonce, start.entry)
+    with reading_what_ran(path):
+        protocol = own_protocol(whole_protocol(receipt.read(path)["protocol"], key), group, start.session)
+    body = protocol.scene.body
+    if opened_key(study) is not None:
+        named = key.condition(started.block, started.code) if interval is None else None
+        body = protocol.scene_for(named or protocol.conditions_in(started.block)[0]).body
+    about = {name: getattr(started, name) for name in ("block", "phase", "part", "index", "of", "code")}
+    trial = Trial(started.trial, **about, items=())
+    page = task_page(protocol, progress_of(lines).language, trial, body)
+    if interval is None:
+        return page
+    of = design_of(protocol, protocol.blocks[started.block]).intervals
+    return replace(page, interval=Interval(interval, of, resting=False, announced=""))
+
+
+def _presented(started: events.TrialStarted, interval: int | None, key: Key | None) -> str:
+    if key is None or interval is None:
+        return "" if key is None else key.condition(started.block, started.code)
+    return {"S": "standard", "C": "comparison"}.get((started.arrangement or "")[interval - 1], "")
