@@ -5,7 +5,11 @@ import subprocess
 from datetime import date
 from pathlib import Path
 
+import pytest
+
 from tests.benchmarks.project.old_numbers import old_numbers
+
+pytestmark = pytest.mark.slow
 
 PAGE = """# Page
 
