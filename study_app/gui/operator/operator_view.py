@@ -12,7 +12,7 @@ from typing import Final, Literal
 
 from study_app.devices.descriptor import Icon
 from study_app.gui.operator.servo_health import ForceFigures, Tile, Vitals, force_rows, health_tiles
-from study_app.gui.sessions.session_facts import operator_language, step_title
+from study_app.gui.sessions.session_facts import broken_words, operator_language, step_title
 from study_app.number_text import counted, grouped, minutes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, Schedule, Step, Trial
@@ -25,17 +25,6 @@ from study_app.store.tables.columns import SEALED
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
 StepState = Literal["done", "now", "open"]
-
-MEASURES = {
-    "lateness_p99_ms": "servo lateness, p99,",
-    "worst_gap_ms": "longest gap of the servo",
-    "delay_error_p95_ms": "delay error, p95,",
-    "targets_reached": "targets reached, at least,",
-    "first_frame_gap_ms": "time to the first frame",
-    "worst_frame_gap_ms": "longest gap between frames",
-    "withheld_share": "force withheld",
-}
-"""What is judged in a trial, as the operator's window calls it."""
 
 NOTES_SHOWN = 3
 
@@ -406,18 +395,10 @@ def _beyond(session: Session, progress: Progress) -> tuple[str, ...]:
     """Return a sentence for every finished trial that broke a limit, the newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
-        f"{labels[number]} out of limits: "
-        + "; ".join(
-            f"{MEASURES[measure]} {value:.3g} {_unit(measure)}, limit {limit:g} {_unit(measure)}"
-            for measure, value, limit in beyond
-        )
+        f"{labels[number]} out of limits: " + "; ".join(broken_words(*one) for one in beyond)
         for number, beyond in reversed(session.broken(progress).items())
         if beyond
     )
-
-
-def _unit(measure: str) -> str:
-    return "%" if measure in {"withheld_share", "targets_reached"} else "ms"
 
 
 def stages(protocol: Protocol, schedule: Schedule) -> tuple[Stage, ...]:

@@ -23,6 +23,7 @@ from study_app.gui.widgets.live_plots import (
     Plot,
     TracePlot,
     draw_quickly,
+    lateness_histogram,
     number,
     step_for,
     time_ticks,
@@ -188,9 +189,8 @@ class LatenessCard(Card):
         add_parts(self.column, (self.plot, 1), axes)
 
     def show_health(self, health: ServoHealth) -> None:
-        edges, counts = health.lateness_histogram()
         p99 = health.vitals().lateness_p99_s
-        self.plot.show_histogram(edges, counts, None if p99 is None else p99 * 1e6)
+        self.plot.show_histogram(*lateness_histogram(health.latenesses_us), None if p99 is None else p99 * 1e6)
         self.plot.paint_now()
 
 

@@ -17,8 +17,6 @@ LATENESS_WINDOW_S = 60
 RATE_WINDOW_TICKS = 2000
 TRACE_WINDOW_S = 10.0
 TRACE_STEP_S = 0.02
-BINS_PER_DECADE = 14
-LOWEST_US, LEAST_HIGHEST_US = 1.0, 1000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,14 +125,10 @@ class ServoHealth:
             first_delay_ticks=self._first_delay_ticks,
         )
 
-    def lateness_histogram(self) -> tuple[Floats, NDArray[np.int64]]:
-        """Return bin edges [µs] (bins + 1,), even in their logarithm, and ticks per bin (bins,) of the last minute."""
-        micros = np.clip(self._kept() * 1e-3, LOWEST_US, None)
-        highest = max(LEAST_HIGHEST_US, float(micros.max(initial=0.0)))
-        decades = int(np.ceil(np.log10(highest / LOWEST_US) - 1e-9))
-        edges = np.logspace(np.log10(LOWEST_US), decades, decades * BINS_PER_DECADE + 1)
-        counts, _ = np.histogram(np.log10(micros), np.log10(edges))
-        return edges, counts
+    @property
+    def latenesses_us(self) -> Floats:
+        """How late the ticks of the last minute began [µs] (n,)."""
+        return self._kept() * 1e-3
 
     def trace(self, now_s: float) -> tuple[Floats, Floats]:
         """Return times before now [s] (n,), oldest first, and positions [m] (n, 3) of the last ten seconds."""

@@ -2,7 +2,7 @@
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QLabel, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.kit.commands import key_cap
 from study_app.gui.operator.operator_view import OperatorView, State, StepRow
@@ -11,7 +11,7 @@ from study_app.gui.theme.theme import RADIUS_CARD, Tone, TypeRole, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import SHADOW, Bar, Card, Chip, Icon, Logo, Rule, scrolled, smooth_painter
-from study_app.gui.widgets.controls import ActionButton, CompactStop
+from study_app.gui.widgets.controls import ActionButton, CompactStop, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
 from study_app.number_text import minutes
 
@@ -38,20 +38,15 @@ def shown_state(view: OperatorView) -> tuple[Tone, str, str]:
     return tone, icon, view.state_word
 
 
-class ThemeButton(Themed, QPushButton):
+class ThemeButton(IconButton):
     """Changes between light and dark; a moon in light, a sun in dark."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setFixedSize(40, 40)
-        self.setProperty("role", "plain")
-        self.setToolTip("Light or dark")
-        self.setAccessibleName("Switch between light and dark theme")
+        super().__init__("moon", "Switch between light and dark theme", "Light or dark", size=40, role="plain")
 
     def paintEvent(self, event: QPaintEvent) -> None:
+        self._icon = "sun" if self.theme.dark else "moon"
         super().paintEvent(event)
-        name = "sun" if self.theme.dark else "moon"
-        draw_icon(QPainter(self), name, QRectF(10, 10, 20, 20), self.theme.text2)
 
 
 class PartsBar(Themed, QWidget):

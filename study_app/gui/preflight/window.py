@@ -23,7 +23,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hb
 from study_app.gui.widgets.cards import Bar, Card, Chip, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, Number
 from study_app.gui.widgets.labels import Ink, figures, label
-from study_app.gui.widgets.live_plots import LatenessPlot
+from study_app.gui.widgets.live_plots import LatenessPlot, lateness_histogram
 from study_app.protocol.describe import spread
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
@@ -34,7 +34,6 @@ from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of
 
 WAITING = "measuring …"
-BINS_PER_DECADE = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,14 +122,6 @@ def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Event])
         here = "the end" if step is None else step_title(protocol, step, language)
     kept = f"{sum(progress_of(journal).answered.values())} of {orders_of(protocol).answers} answers"
     return ("Continues at", here), ("Kept", kept)
-
-
-def histogram(lateness_us: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64], float | None]:
-    """Return edges [µs], counts and the 99th percentile [µs] of latenesses; what is below 1 µs counts as 1 µs."""
-    highest = max(1e3, float(lateness_us.max(initial=0.0)))
-    edges = np.logspace(0, np.ceil(np.log10(highest) + 1e-9), int(3 * BINS_PER_DECADE) + 1)
-    counts, _ = np.histogram(np.maximum(lateness_us, 1.0), edges)
-    return edges, counts.astype(np.int64), float(np.percentile(lateness_us, 99)) if len(lateness_us) else None
 
 
 def _rows(
@@ -336,8 +327,8 @@ class PreflightWindow(QWidget):
         self._busy = view.busy
         self._show_checks(view)
         self._show_rows(view)
-        edges, counts, p99_us = histogram(view.lateness_us)
-        self.plot.show_histogram(edges, counts, p99_us)
+        p99_us = float(np.percentile(view.lateness_us, 99)) if len(view.lateness_us) else None
+        self.plot.show_histogram(*lateness_histogram(view.lateness_us), p99_us)
 
     def _show_chip(self, view: PreflightView) -> None:
         if view.busy:

@@ -187,6 +187,24 @@ VALIDITY: dict[str | None, Chipped] = {
 LOST: Chipped = ("warn", "warning", "Recording lost")
 
 
+LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
+    "lateness_p99_ms": ("lateness of ticks (99th percentile)", "ms"),
+    "worst_gap_ms": ("longest time between two ticks", "ms"),
+    "delay_error_p95_ms": ("error of the delay (95th percentile)", "ms"),
+    "first_frame_gap_ms": ("time before the first frame", "ms"),
+    "worst_frame_gap_ms": ("longest time between two frames", "ms"),
+    "withheld_share": ("share of the force withheld", "%"),
+    "targets_reached": ("targets reached, at least", "%"),
+}
+"""Of every measure that a limit judges: what it is, and its unit."""
+
+
+def broken_words(measure: str, value: float, limit: float) -> str:
+    """Return a sentence on a limit that was broken."""
+    what, unit = LIMIT_WORDS[measure]
+    return f"{what}: {value:.3g} {unit}, limit {limit:g} {unit}"
+
+
 class Column(NamedTuple):
     """What a column holds, its heading, and its share of the width; at least ``least`` px of it."""
 

@@ -18,6 +18,7 @@ from study_app.gui.kit.fields import Field, choice
 from study_app.gui.sessions.session_facts import (
     VALIDITY,
     SessionFacts,
+    broken_words,
     incidents,
     session_facts,
     status_chip,
@@ -46,16 +47,6 @@ from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import row_of
 
 MOST_POINTS = 2000  # of a drawn curve
-LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
-    "lateness_p99_ms": ("lateness of ticks (99th percentile)", "ms"),
-    "worst_gap_ms": ("longest time between two ticks", "ms"),
-    "delay_error_p95_ms": ("error of the delay (95th percentile)", "ms"),
-    "first_frame_gap_ms": ("time before the first frame", "ms"),
-    "worst_frame_gap_ms": ("longest time between two frames", "ms"),
-    "withheld_share": ("share of the force withheld", "%"),
-    "targets_reached": ("targets reached, at least", "%"),
-}
-"""Of every measure that a limit judges: what it is, and its unit."""
 NO_MOTION = "This trial has no recording."
 
 
@@ -205,12 +196,6 @@ def _choices(given: Mapping[str, Answer]) -> tuple[str, ...]:
 def _row_notes(row: Mapping[str, Any]) -> list[str]:
     said = [("recording lost", row["recording_lost"]), ("marked", row["marked"])]
     return [word for word, holds in said if holds] + (row["notes"] or "").splitlines()
-
-
-def broken_words(measure: str, value: float, limit: float) -> str:
-    """Return a sentence on a limit that was broken."""
-    what, unit = LIMIT_WORDS[measure]
-    return f"{what}: {value:.3g} {unit}, limit {limit:g} {unit}"
 
 
 def _words(row: Mapping[str, Any]) -> str:

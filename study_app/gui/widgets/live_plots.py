@@ -31,6 +31,8 @@ HALF_TICK_PX = 24.0  # half of "10 000" under the end of an axis
 DIGIT_PX = 8.5  # a digit of the longest number along an axis, with its share of the gap to the next
 MOST_FOR_NAMES = 0.5  # of that plot's height
 P99_ABOVE = 0.1  # the highest the 99th percentile's line ends above the top grid line [decades]
+BINS_PER_DECADE = 14
+LOWEST_US, LEAST_HIGHEST_US = 1.0, 1000.0
 NAMES = ("x right", "y up", "z near")
 
 
@@ -287,6 +289,15 @@ class LatenessPlot(Plot):
         self.p99_name.setColor(QColor(theme.text))
         self.limit_line.setPen(self.stroke(theme.bad, 1.4, (4.0, 3.0)))
         self.limit_name.setColor(QColor(theme.bad))
+
+
+def lateness_histogram(lateness_us: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """Return bin edges [µs] (bins + 1,), even in their logarithm, and counts (bins,); below 1 µs counts as 1 µs."""
+    micros = np.maximum(lateness_us, LOWEST_US)
+    decades = int(np.ceil(np.log10(max(LEAST_HIGHEST_US, float(micros.max(initial=0.0)))) - 1e-9))
+    edges = np.logspace(0, decades, decades * BINS_PER_DECADE + 1)
+    counts, _ = np.histogram(np.log10(micros), np.log10(edges))
+    return edges, counts
 
 
 def draw_quickly(curve: pg.PlotCurveItem, *, solid: bool) -> None:

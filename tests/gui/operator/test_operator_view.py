@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from study_app.gui.operator.operator_view import MEASURES, UNDELIVERED, stages
+from study_app.gui.operator.operator_view import UNDELIVERED, stages
 from study_app.gui.operator.servo_health import ForceFigures, ServoHealth
+from study_app.gui.sessions.session_facts import LIMIT_WORDS
 from study_app.number_text import duration, duration_range, duration_words, grouped, minutes
 from study_app.protocol.load import load
 from study_app.protocol.model import Limits
@@ -168,7 +169,7 @@ def test_every_limit_of_a_trial_has_a_name_for_the_operator(told):
     bad = dict.fromkeys(header(TRIALS), 1000000000.0) | {"targets_reached": 0.0}
     limits = Limits(targets_percent=50).model_dump()
     judged = {measure for measure, _, _ in beyond_limits(bad, limits)}
-    assert judged == set(MEASURES)
+    assert judged == set(LIMIT_WORDS)
 
 
 def test_no_word_of_a_view_names_a_condition_a_force_or_a_limiter(told, health):
