@@ -169,7 +169,7 @@ NONE = {
 class SessionsCard(Card):
     """The table, newest first; a row that needs care stands above all. Where no row is shown it is one line.
 
-    ``open_asked`` carries the `SessionFacts` of a session; ``emptied`` comes when the table may have come or gone.
+    ``open_asked`` carries the `SessionFacts` of a session; ``emptied`` comes when the table has come or gone.
     """
 
     open_asked = Signal(object)
@@ -240,13 +240,15 @@ class SessionsCard(Card):
             if (count := sum(one.kind == other for one in self._found))
         ]
         self.nothing.setText(f"{NONE[kind]} Not shown: {', '.join(hidden)}." if hidden else NONE[kind])
+        emptied = self.rows.isHidden() != self.is_empty
         self.nothing.setVisible(self.is_empty)
         for part in (self.where, self.details, self.rows):
             part.setVisible(not self.is_empty)
         self.kind.setVisible(bool(self._found))
         self.all.setVisible(bool(self._found))
         self.setMinimumHeight(0 if self.is_empty else LEAST_HEIGHT)
-        self.emptied.emit()
+        if emptied:
+            self.emptied.emit()
 
 
 LEAST_WIDTH = 330
