@@ -128,7 +128,7 @@ class ServoHealth:
     @property
     def latenesses_us(self) -> Floats:
         """How late the ticks of the last minute began [µs] (n,)."""
-        return self._kept() * 1e-3
+        return self._kept().astype(np.float64) * 1e-3
 
     def trace(self, now_s: float) -> tuple[Floats, Floats]:
         """Return times before now [s] (n,), oldest first, and positions [m] (n, 3) of the last ten seconds."""
