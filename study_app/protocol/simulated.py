@@ -8,11 +8,12 @@ thesis reports something (Rek 2024, §5: honey and water recognised, honey confu
 delays noticed from about 125 ms) the opinions agree with it.
 
 *Trials of intervals* are answered by an `Observer`, who compares resistances (mean force over speed) or delays, with
-Gaussian noise: in proportion to the resistance (Weber's law), of constant spread for a delay. Estimates follow a power
-law with exponent 1/2 (Stevens 1957, Psychological Review 64, 153) unless another is planted.
+Gaussian noise: in proportion to the resistance (Weber's law), of constant spread for a delay. Observers are people, who
+differ in more than their threshold (`people.Person`). Estimates follow a power law with exponent 1/2 (Stevens 1957,
+Psychological Review 64, 153) unless another is planted.
 
 Shapes and constants are plausible, not measured **[choice]**. Only sums, products, quotients and square roots of
-uniform numbers are used, but for planted exponents, so that answers are the same on every machine.
+uniform numbers are used, but for exponents, so that answers are the same on every machine.
 """
 
 from __future__ import annotations
@@ -27,28 +28,22 @@ from numpy.random import Generator
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import build_schedule, draw_key
+from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key
 from study_app.protocol.questions import POINTS
 from study_app.protocol.streams import Draw, Key, draw_secret, stream
-from study_app.protocol.trials.designs import Design, Rated
+from study_app.protocol.trials.designs import Design, ForcedChoice, Rated
 from study_app.protocol.trials.methods import TrialResult
 from study_app.protocol.trials.presentation import arrangement_text, next_level, trial_result
 from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK, Stimulated
 from study_app.protocol.trials.tracks import design_of, stimulus_of
 from study_app.psychophysics.families import Floats
+from study_app.psychophysics.people import ASSUMED, UNIFORM, Person, drawn, normal
 
-UNIFORM: Final = 12
-"""A nearly normal number is the sum of so many uniform ones, less six."""
 NO_OPINION: Final = 4.0
 LEAST_SPEED_MPS: Final = 0.01
 MODULUS: Final = 10.0
 """The number that the first stimulus is given."""
 _Z_75: Final = 0.6745
-
-
-def normal(draw: Draw) -> float:
-    """Return a nearly normal number, mean 0, deviation 1."""
-    return sum(draw() for _ in range(UNIFORM)) - UNIFORM / 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,8 +223,8 @@ class Observer:
         Of resistance, at 75 % correct in two intervals without lapses.
     delay_jnd_s : float
         Of a delay, likewise [s].
-    lapses : float
-        So often an answer is given at random.
+    person : Person
+        In what else the observer differs from others.
     estimates : tuple of float, optional
         Exponent of estimates over resistance, and the standard deviation of their logarithm; None: 1/2 of the noisy
         resistance.
@@ -237,7 +232,7 @@ class Observer:
 
     weber_fraction: float = 0.24
     delay_jnd_s: float = 0.025
-    lapses: float = 0.02
+    person: Person = ASSUMED
     estimates: tuple[float, float] | None = None
 
     @property
@@ -252,6 +247,21 @@ class Observer:
 
 
 OBSERVER: Final = Observer()
+
+
+def observer_of(draw: Draw) -> Observer:
+    """Return the observer that a simulated participant is, one of people drawn at random."""
+    return Observer(person=drawn(draw))
+
+
+class Course(NamedTuple):
+    """How far an observer is in a block: the share of the trials that is done, and the last answer to its design."""
+
+    done: float = 0.5
+    last: str | int | float | None = None
+
+
+MIDDLE: Final = Course()
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,15 +305,43 @@ class Comparison:
         observer = self.observer
         return abs(difference) > (observer.delay_jnd_s if self.delays else observer.weber_fraction * abs(about))
 
-    def choose(self, design: Design, sensed: Sequence[float], mean: float, draw: Draw) -> str:
+    def choose(self, design: Design, sensed: Sequence[float], mean: float, draw: Draw, course: Course = MIDDLE) -> str:
         """Return the answer of a design with choices to what was sensed; ``mean`` is that of the block so far."""
-        taken = [self.noisy(one, draw) for one in sensed]
-        if draw() < self.observer.lapses:
+        taken: Sequence[float] = [self.noisy(one, draw) for one in self._apart(sensed, course)]
+        if draw() < self.observer.person.lapse:
             return design.answers[int(len(design.answers) * draw())]
+        if isinstance(design, ForcedChoice):
+            taken = self._preferring(design, taken, course)
         return design.simulated(taken, mean, self)
 
+    def _apart(self, sensed: Sequence[float], course: Course) -> Sequence[float]:
+        """Return what an observer of width one would sense in place of these intervals, of which one is the least."""
+        person, least = self.observer.person, (max if self.smallest else min)(sensed)
+        if (person.width, person.change) == (1.0, 1.0) or (least == 0.0 and not self.delays):
+            return sensed
+        threshold = self.observer.delay_jnd_s if self.delays else self.observer.weber_fraction * abs(least)
+        shares = [(one - least) / threshold for one in sensed]
+        return [least + threshold * math.copysign(person.sensed(abs(one), course.done), one) for one in shares]
+
+    def _preferring(self, design: Design, taken: Sequence[float], course: Course) -> Sequence[float]:
+        """Return what intervals are taken for by who prefers the first one, and the one of the last answer."""
+        person, noise = self.observer.person, self.observer.delay_noise_s
+        if not self.delays:
+            noise = self.observer.resistance_noise * sum(taken) / len(taken)
+        unit = -math.sqrt(2) * noise if self.smallest else math.sqrt(2) * noise
+        return [
+            one + unit * (person.criterion * (place == 0) + person.repeats * (answer == course.last))
+            for place, (answer, one) in enumerate(zip(design.answers, taken, strict=True))
+        ]
+
     def answer(
-        self, protocol: Protocol, design: Design, sensed: Sequence[float], before: Sequence[float], draw: Draw
+        self,
+        protocol: Protocol,
+        design: Design,
+        sensed: Sequence[float],
+        before: Sequence[float],
+        draw: Draw,
+        course: Course = MIDDLE,
     ) -> str | int | float:
         """Return the answer to a trial: one of the design's answers, a point of its scale, or a number.
 
@@ -312,7 +350,7 @@ class Comparison:
         known = [*before, *sensed]
         mean, first = sum(known) / len(known), known[0]
         if design.reply == "choice":
-            return self.choose(design, sensed, mean, draw)
+            return self.choose(design, sensed, mean, draw, course)
         if isinstance(design, Rated):
             taken, points = self._taken(sensed, draw), protocol.scales[design.scale].points
             ratio = taken / mean if mean > 0 and first > 0 else 1.0
@@ -353,6 +391,18 @@ def as_requested(presented: Stimulated) -> float:
     return presented.value / 1000 if presented.vary in DELAYS else presented.value
 
 
+def courses_of(schedule: Schedule) -> dict[int, float]:
+    """Return by the number of each trial what share of its block is done then, from 0 to 1."""
+    blocks: dict[str, list[int]] = {}
+    for trial in schedule.trials:
+        blocks.setdefault(trial.block, []).append(trial.number)
+    return {
+        number: place / (len(numbers) - 1) if len(numbers) > 1 else 0.5
+        for numbers in blocks.values()
+        for place, number in enumerate(numbers)
+    }
+
+
 def simulate_study(
     protocol: Protocol,
     people: Mapping[str, Observer],
@@ -381,6 +431,8 @@ def simulate_study(
         schedule = build_schedule(protocol, person, seed)
         heard: dict[str, list[TrialResult]] = {}
         sensed_in: dict[str, list[float]] = {}
+        courses = courses_of(schedule)
+        said: dict[str, str | int | float] = {}
         for trial in schedule.trials:
             block = protocol.blocks[trial.block]
             if block.stimulus is None:
@@ -390,7 +442,9 @@ def simulate_study(
                 continue
             design, sensed = design_of(protocol, block), [sense(one) for one in due.intervals]
             draw = stream(int.from_bytes(key.secret[:4], "big"), f"observer/{person}/{trial.number}").random
-            given = Comparison.of(protocol, block, observer).answer(protocol, design, sensed, before, draw)
+            course = Course(courses[trial.number], said.get(block.id))
+            given = Comparison.of(protocol, block, observer).answer(protocol, design, sensed, before, draw, course)
+            said[block.id] = given
             before += sensed
             what = (trial.number, trial.code, due.level, due.arrangement, str(given))
             answered.append(trial_result(protocol, block, *what, catch=due.catch))

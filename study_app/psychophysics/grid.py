@@ -7,6 +7,7 @@ stall on busy cores; only `adaptive` multiplies matrices, too small for threads.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Final
@@ -104,6 +105,11 @@ class Posterior:
         """The weight of each threshold."""
         return np.asarray(np.einsum("abcd->a", self.weights), float)
 
+    def with_widths(self, prior: NDArray[np.float64]) -> Posterior:
+        """Return the posterior under a prior on the widths, (widths,), from this one, under a flat one."""
+        weights = self.weights * prior[:, None, None]
+        return Posterior(self.grid, weights / weights.sum())
+
     def quantile(self, share: float) -> float:
         """Return a quantile of the threshold [u]."""
         return quantile(self.grid.thresholds, self.marginal, share)
@@ -196,6 +202,42 @@ def tables(grid: Grid, levels: Values) -> tuple[NDArray[np.float64], ...]:
     """Return ψ, log ψ and log(1 − ψ) at each level in each cell, each of shape (levels, …)."""
     psi = grid.success(levels)
     return psi, np.log(psi), np.log1p(-psi)
+
+
+ALIKE: Final = 1 / 3
+"""Of the standard deviation of log widths so much is between people of one group; the rest is shared. [choice]"""
+APART: Final = (0.05, 0.1, 0.2)
+"""Standard deviations of the thresholds of people of one group [range of thresholds]. [choice]"""
+
+
+def group_widths(flat: Sequence[Posterior], width_prior: tuple[float, float]) -> NDArray[np.float64]:
+    """Return the prior on each person's width, (people, widths), that follows from the answers of the others.
+
+    Widths of a group are log-normal about a centre, which is log-normal itself; thresholds are normal about a mean, all
+    means being equally likely. One person has `width_prior`, but for its share beyond the grid.
+
+    Parameters
+    ----------
+    flat : sequence of Posterior
+        Of each person, over the same grid, under a flat prior on the width.
+    width_prior : tuple of float
+        Median and factor of the width of one person of whom nothing is known.
+    """
+    grid = flat[0].grid
+    thresholds, widths = np.array(grid.thresholds), np.log(grid.widths)
+    median, log_factor = math.log(width_prior[0]), math.log(width_prior[1])
+    own = np.exp(-0.5 * ((widths - widths[:, None]) / (ALIKE * log_factor)) ** 2)  # (centres, widths)
+    own /= own.sum(axis=1, keepdims=True)
+    log_centres = -0.5 * ((widths - median) / log_factor) ** 2 / (1.0 - ALIKE**2)
+    apart = np.array(APART)[:, None, None] * np.ptp(thresholds)
+    about = np.exp(-0.5 * ((thresholds - thresholds[::2, None]) / apart) ** 2).reshape(-1, len(thresholds))
+    about /= about.sum(axis=1, keepdims=True)  # (means and spreads, thresholds)
+    joint = np.array([np.einsum("abcd->ab", one.weights) for one in flat])
+    evidence = np.einsum("pmw,cw->pmc", np.einsum("ma,paw->pmw", about, joint), own)
+    evidence = np.log(np.maximum(evidence, 1e-300))
+    of_others = log_centres + evidence.sum(axis=0) - evidence
+    weights = np.exp(of_others - of_others.max(axis=(1, 2), keepdims=True)).sum(axis=1)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True) @ own, float)
 
 
 def _median(values: Values, weights: NDArray[np.float64]) -> float:

@@ -11,7 +11,7 @@ from scipy.stats import t as student
 from study_app.psychophysics.adaptive import RATIOS, Staircase, converges_to
 from study_app.psychophysics.families import CLIP, KAPPA, level_at, position, rise, success
 from study_app.psychophysics.grid import FREE_GUESSES, Grid, evenly, fit, geometric, quantile
-from study_app.psychophysics.precision import Expected, student_975
+from study_app.psychophysics.people import Expected, student_975
 
 LEVELS = evenly(-1.5, 0.0, 6)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.psychophysics import adaptive, delivery, detection, families, grid, precision
+from study_app.psychophysics import adaptive, delivery, detection, families, grid, people
 from tests.golden import compare
 from tests.golden_values import one_line as told
 
@@ -90,12 +90,12 @@ def of_delivery() -> Iterator[str]:
     for errors in ([0.1, 0.3], [None, 0.2], [None, None], [0.1, 0.2, 0.5, None]):
         yield f"difference {errors} {told(delivery.difference(errors, [bool(one % 2) for one in range(len(errors))]))}"
     for spacing, half in product(("log", "linear"), (0.2, math.inf)):
-        one = precision.Expected(spacing, 40, 2, (half,), half / 2, 0.3)
+        one = people.Expected(spacing, 40, 2, (half,), half / 2, 0.3)
         groups = [one.of_group(people, trials) for people in (1, 2, 8) for trials in (None, 80.0)]
         yield f"{told(one)}: {one.measured} {told(groups)}"
         for within in (0.05, 0.3):
             yield f"  {within}: {one.participants_for(within)} {one.trials_for(within, 12)} {one.trials_for(within, 2)}"
-    yield told([precision.student_975(number) for number in (1, 2, 8, 300)])
+    yield told([people.student_975(number) for number in (1, 2, 8, 300)])
 
 
 def test_functions_of_usual_and_extreme_arguments(pytestconfig: pytest.Config) -> None:

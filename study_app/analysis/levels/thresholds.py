@@ -55,7 +55,7 @@ from study_app.analysis.statistics.thresholds import (
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
-from study_app.psychophysics.grid import Grid, Posterior
+from study_app.psychophysics.grid import ALIKE, Grid, Posterior, group_widths
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
@@ -176,11 +176,9 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
     if assumed is None or stimulus is None:
         return
     for standard, at_standard in _answered(block, opened).groupby("standard", dropna=False, sort=True):
-        own = [
-            _own(block, stimulus, assumed, standard, person, one)
-            for person, one in at_standard.groupby("participant")
-            if one["analysed"].any()
-        ]
+        fits = _fits(block, stimulus, assumed, at_standard[at_standard["analysed"]])
+        heard = dict(list(at_standard.groupby("participant")))
+        own = [_own(block, stimulus, standard, one, heard[one.person]) for one in fits]
         if own:
             yield _group(stimulus, standard, own)
         yield from own
@@ -213,36 +211,62 @@ def fit_answers(stimulus: Stimulus, rows: pd.DataFrame, grid: Grid, *, two_inter
     return counts, found
 
 
-def _fitted(
-    block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.DataFrame
-) -> tuple[Counts, Posterior, float]:
-    """Return a participant's answers, what they say about the person, and the change of the threshold [decades].
+@dataclass(frozen=True, slots=True)
+class PersonFit:
+    """What the ``rows`` of a participant at a standard say, and how the threshold changes over them [decades].
+
+    ``flat`` is the posterior under a flat prior on the width, ``width_prior`` the prior of the other one.
+    """
+
+    person: Any
+    rows: pd.DataFrame
+    counts: Counts
+    flat: Posterior
+    width_prior: Array
+    posterior: Posterior
+    change: float
+
+
+def _fits(block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.DataFrame) -> list[PersonFit]:
+    """Return the fit of each participant from the analysed rows of one standard.
 
     A threshold that changed is uncertain by the standard deviation of one that changes evenly, in addition to how far
     it is from one session to the next.
     """
-    session_sd, successes = SESSION_SD / math.sqrt(rows["session"].nunique()), rows["success"].to_numpy(dtype=bool)
-    grid = analysis_grid(stimulus, block.design, assumed, session_sd)
     two = block.design.kind == "2ifc" and block.has_correct_answer
-    counts, found = fit_answers(stimulus, rows, grid, two_intervals=two)
+    grid = analysis_grid(stimulus, block.design, assumed)
+    of_people = list(rows.groupby("participant"))
+    counts = [fit_answers(stimulus, own, grid, two_intervals=two)[0] for _, own in of_people]
+    flat = [one.fit(replace(grid, width_prior=None)) for one in counts]
+    found = []
+    for (person, own), one, unknown, prior in zip(
+        of_people, counts, flat, group_widths(flat, assumed.width_prior) if flat else (), strict=True
+    ):
+        session_sd = SESSION_SD / math.sqrt(own["session"].nunique())
+        widened = unknown.with_widths(prior)
+        change = _change(stimulus, own, one, widened)
+        session_sd = math.hypot(session_sd, change / math.sqrt(12))
+        widened = replace(widened, grid=analysis_grid(stimulus, block.design, assumed, session_sd))
+        found.append(PersonFit(person, own, one, unknown, prior, widened, change))
+    return found
+
+
+def _change(stimulus: Stimulus, rows: pd.DataFrame, counts: Counts, found: Posterior) -> float:
+    """Return by how much the threshold changes from first to last trial [decades]; 0 where that may be chance."""
     at = counts.places
-    score, information = change_score(successes, counts.levels[at], found, counts.shifts[at])
+    score, information = change_score(rows["success"].to_numpy(dtype=bool), counts.levels[at], found, counts.shifts[at])
     if score**2 <= CHANGED**2 * information:
-        return counts, found, 0.0
+        return 0.0
     decade = 1.0 if stimulus.spacing == "log" else abs(found.threshold) * math.log(10)
-    change = score * decade / (information * decade**2 + math.log10(CHANGE_PRIOR) ** -2)
-    grid = analysis_grid(stimulus, block.design, assumed, math.hypot(session_sd, change / math.sqrt(12)))
-    return counts, replace(found, grid=grid), change
+    return score * decade / (information * decade**2 + math.log10(CHANGE_PRIOR) ** -2)
 
 
 def _own(
-    block: LevelBlock, stimulus: Stimulus, assumed: Assumed, standard: Any, person: Any, heard: pd.DataFrame
+    block: LevelBlock, stimulus: Stimulus, standard: Any, fitted: PersonFit, heard: pd.DataFrame
 ) -> ThresholdEstimate:
-    """Return a participant's threshold; of the rows those that are analysed enter the fit."""
-    rows = heard[heard["analysed"]]
-    counts, found, change = _fitted(block, stimulus, assumed, rows)
+    """Return a participant's threshold; ``heard`` are also the rows that are not analysed."""
+    counts, found, rows = fitted.counts, fitted.posterior, fitted.rows
     grid = found.grid
-    flat = counts.fit(replace(grid, width_prior=None))
     level_of, threshold, (low, high) = stimulus.level_of, found.threshold, found.interval
     width, guess, lapse = found.others
     psi, shown = counts.expected(found), counts.levels[np.isfinite(counts.levels)]
@@ -250,7 +274,7 @@ def _own(
     if percent is not None:
         compared = level_at(grid.family, percent, threshold, *found.others)
     return ThresholdEstimate(
-        participant=str(person),
+        participant=str(fitted.person),
         standard=number_or_none(standard),
         n=len(rows),
         threshold=level_of(threshold),
@@ -259,12 +283,12 @@ def _own(
         width=width,
         lapse=lapse,
         guess=guess,
-        flat_width=level_of(flat.threshold),
+        flat_width=level_of(fitted.flat.threshold),
         beyond="above" if threshold > shown.max() else "below" if threshold < shown.min() else None,
         variance=found.variance,
         fit_p=p_of_fit(counts.successes, counts.successes + counts.failures, psi),
         drift=drift(rows["success"].to_numpy(dtype=bool), psi[counts.places]),
-        change=10.0**change - 1.0,
+        change=10.0**fitted.change - 1.0,
         reversal_mean=_reversal_mean(block, stimulus, heard),
         target_percent=None if block.method is None else block.method.target_percent,
         compared=None if math.isnan(compared) else level_of(compared),
@@ -312,11 +336,9 @@ def psychometric_bands(
     if assumed is None or stimulus is None:
         return {}
     u = np.linspace(*ends, PLACES)
-    rows, found = _answered(block, opened), {}
-    for person, own in rows[rows["analysed"] & rows["participant"].isin(people)].groupby("participant"):
-        _, posterior, _ = _fitted(block, stimulus, assumed, own)
-        found[str(person)] = np.array([u, *posterior.band(u)])
-    return found
+    rows = _answered(block, opened)
+    fits = _fits(block, stimulus, assumed, rows[rows["analysed"]])
+    return {str(one.person): np.array([u, *one.posterior.band(u)]) for one in fits if one.person in people}
 
 
 Flags = NDArray[np.bool_]
@@ -348,20 +370,22 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
         return
-    grid = analysis_grid(stimulus, block.design, assumed)
     rows = _answered(block, opened)
-    for _, own in list(rows[rows["analysed"]].groupby(["participant", "standard"], dropna=False))[:most]:
-        standard = own["standard"].iloc[0]
-        counts, _, _ = _fitted(block, stimulus, assumed, own)
+    at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
+    fits: list[tuple[Any, PersonFit]] = [
+        (standard, one) for standard, own in at_standards for one in _fits(block, stimulus, assumed, own)
+    ]
+    for standard, fitted in sorted(fits, key=lambda one: one[1].person)[:most]:
+        own, counts, grid = fitted.rows, fitted.counts, fitted.flat.grid
         successes, ends = own["success"].to_numpy(dtype=bool), []
         so_far = np.zeros((2, len(counts.levels)))
         for place, right in zip(counts.places, successes, strict=True):
             so_far[0 if right else 1, place] += 1
-            interval = replace(counts, successes=so_far[0], failures=so_far[1]).fit(grid).interval
-            ends.append([stimulus.level_of(end) for end in interval])
+            flat = replace(counts, successes=so_far[0], failures=so_far[1]).fit(grid)
+            ends.append([stimulus.level_of(end) for end in flat.with_widths(fitted.width_prior).interval])
         low, high = np.array(ends).T
         yield TrackCourse(
-            participant=str(own["participant"].iloc[0]),
+            participant=str(fitted.person),
             standard=None if pd.isna(standard) else float(standard),
             tracks=np.array([int(name.rpartition("/")[2]) for name in own["track"]], np.int64),
             levels=own["level"].to_numpy(dtype=float),
@@ -567,7 +591,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 f"{SETS} simulated sets of answers, and drift is the correlation of trial number and deviance residual "
                 "(Wichmann & Hill 2001). Intervals include that a person’s threshold differs between sessions by a "
                 f"factor of {10**SESSION_SD:.2f} (one standard deviation; from data of Jäkel & Wichmann 2006), and "
-                f"how far it changed over the trials where that exceeded {CHANGED:g} standard errors. Group means are "
+                f"how far it changed over the trials where that exceeded {CHANGED:g} standard errors. Of the standard "
+                f"deviation of log widths {100 * ALIKE:.0f} % was taken to be between participants, so that each "
+                "participant’s width follows from the answers of all. Group means are "
                 "random-effects means with the between-person variance of Paule and Mandel (1982) and, from "
                 f"{FEWEST} participants on, the interval of Hartung and Knapp (2001)."
             )

@@ -27,7 +27,7 @@ from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
 from study_app.protocol.trials.stimuli import assumed_for
 from study_app.protocol.trials.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
-from study_app.psychophysics.precision import BETWEEN_PEOPLE
+from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.store.exclusions import named
 from study_app.store.sites.merged import DASH, folders_of
 

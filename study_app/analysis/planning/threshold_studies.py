@@ -32,7 +32,7 @@ from study_app.protocol.checks.expected_precision import (
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.table import text_in
 from study_app.protocol.trials.tracks import standards_of
-from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
+from study_app.psychophysics.people import BETWEEN_PEOPLE, ESTIMATE_NOISE
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
 BATCH: Final = 10
@@ -117,12 +117,8 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
     own = means + apart / math.log(10) if log else means * np.exp(apart)
     shape = (BATCH, people, plan.standards)
     each, truth = plan.each_standard(), np.broadcast_to(own, shape)
-    parts = [
-        _estimates(one, part.reshape(-1), rng) for one, part in zip(each, np.split(truth, len(each), 2), strict=True)
-    ]
-    medians, variances = (
-        np.concatenate([one.reshape(BATCH, people, -1) for one in it], 2) for it in zip(*parts, strict=True)
-    )
+    parts = [_estimates(one, part, rng) for one, part in zip(each, np.split(truth, len(each), 2), strict=True)]
+    medians, variances = (np.concatenate(it, 2) for it in zip(*parts, strict=True))
     errors = (medians - truth) * (math.log(10) if log else 1 / truth)
     found = PrecisionResult()
     full = plan.measures(means)
@@ -159,10 +155,16 @@ def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Pr
 
 
 def _estimates(plan: ThresholdPlan, truth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return posterior medians and variances of observers with these thresholds [u]."""
-    starts = range(0, len(truth), TRACKS_AT_ONCE)
-    found = [plan.simulate(truth[first : first + TRACKS_AT_ONCE], rng, WIDTHS) for first in starts]
-    return np.concatenate([one.medians for one in found]), np.concatenate([one.variances for one in found])
+    """Return posterior medians and variances of observers with these thresholds (studies, people, standards) [u]."""
+    studies, people, standards = truth.shape
+    own, at_once = truth.transpose(0, 2, 1).reshape(-1), max(1, TRACKS_AT_ONCE // people) * people
+    starts = range(0, len(own), at_once)
+    found = [plan.simulate(own[first : first + at_once], rng, WIDTHS, people) for first in starts]
+    medians, variances = (
+        np.concatenate(it).reshape(studies, standards, people).transpose(0, 2, 1)
+        for it in zip(*((one.medians, one.variances) for one in found), strict=True)
+    )
+    return medians, variances
 
 
 def sweep(

@@ -22,7 +22,7 @@ from study_app.protocol.orders.sequences import row_count
 from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.trials.presented_levels import clipping
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.precision import BETWEEN_PEOPLE
+from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.workers.client import WorkerClient
 from study_app.workers.server import Send, Stop, Stopped
 

@@ -21,6 +21,7 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.measures import Array
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.levels.thresholds import estimate_slope, estimated_exponents, jnd_slope, thresholds
 from study_app.analysis.levels.tracks import tracks
@@ -31,11 +32,20 @@ from study_app.haptics.model.overrides import override
 from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.simulated import OBSERVER, Observer, as_requested, normal, simulate_study
+from study_app.protocol.simulated import OBSERVER, Observer, as_requested, simulate_study
 from study_app.protocol.streams import Draw, stream
-from study_app.protocol.trials.stimuli import DELAYS, MEASURED_SESSION_SD
+from study_app.protocol.trials.stimuli import DELAYS, SESSION_SD
 from study_app.protocol.trials.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
-from study_app.psychophysics.precision import BETWEEN_PEOPLE, ESTIMATE_NOISE
+from study_app.psychophysics.people import (
+    BETWEEN_PEOPLE,
+    ESTIMATE_NOISE,
+    KINDS,
+    LAPSES_MOST,
+    MIXED,
+    Person,
+    normal,
+    of_kind,
+)
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
@@ -57,8 +67,7 @@ NAMES: Final = (*SHIPPED, "thickness")
 EXPONENT: Final = 0.44
 """Of perceived thickness over viscosity (Stevens & Guirao 1964)."""
 POINTS: Final = 64
-LAPSES_MOST: Final = 0.05
-BETWEEN_SESSIONS: Final = 10**MEASURED_SESSION_SD
+BETWEEN_SESSIONS: Final = 10**SESSION_SD
 """Factor between a person's thresholds of several sessions, as measured."""
 
 PEOPLE: Final = 10
@@ -71,6 +80,8 @@ SLOPE_ERROR_MOST: Final = 0.15
 EXPONENT_ERROR_MOST: Final = 0.03
 DELIVERED_LEAST: Final = 0.99
 SPREADS: Final = 3
+KIND_SHARE: Final = 10
+"""For each kind of people there is one study to so many others."""
 
 
 class Verdict(NamedTuple):
@@ -170,22 +181,23 @@ class KnownThreshold(KnownValue):
         """Return the mean of ln value over threshold."""
         return sum(math.log(value / self.threshold) for value in values) / len(values)
 
-    def people(self, number: int, seed: int) -> Iterator[tuple[Observer, float]]:
-        """Yield the people of a study, with their thresholds: they differ in them, and in lapses up to `LAPSES_MOST`.
+    def people(self, number: int, seed: int, kind: str = "") -> Iterator[tuple[Observer, float]]:
+        """Yield the people of a study, with their thresholds, in which they differ.
 
-        In the study's session the threshold is another one than on average over sessions.
+        In the study's session the threshold is another one than on average over sessions. ``kind`` is one of `KINDS`
+        or `MIXED`; by default they differ in lapses up to `LAPSES_MOST`.
         """
         apart, draw = self._apart(PEOPLE, seed, number)
         name = "delay_jnd_s" if self._of_delay else "weber_fraction"
         for one in apart:
-            own = replace(self.observer, lapses=LAPSES_MOST * draw())
+            own = replace(self.observer, person=of_kind(kind, draw) if kind else Person(lapse=LAPSES_MOST * draw()))
             own = replace(own, **{name: getattr(own, name) * math.exp(one)})
             today = getattr(own, name) * BETWEEN_SESSIONS ** normal(draw)
             yield replace(own, **{name: today}), self._threshold(own)
 
-    def simulate(self, number: int, seed: int, observers: Sequence[Observer] = ()) -> StudyFound:
+    def simulate(self, number: int, seed: int, kind: str = "", observers: Sequence[Observer] = ()) -> StudyFound:
         """Return what a study finds of ``observers``, by default of `people`."""
-        people = [(one, self._threshold(one)) for one in observers] or [*self.people(number, seed)]
+        people = [(one, self._threshold(one)) for one in observers] or [*self.people(number, seed, kind)]
         rows = self._simulated([one for one, _ in people], seed, number)
         frame = rows.assign(session=1, level_delivered=rows["level"], analysed=True)
         frame = frame.astype({"level_delivered": "Float64", "success": "boolean"})
@@ -208,11 +220,15 @@ class KnownThreshold(KnownValue):
         group = tuple(found.pop(None))
         return StudyFound(group, tuple(map(tuple, found.values())))
 
-    def verdicts(self, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
-        """Yield error and, with several standards, the slope of ln JND over ln standard."""
+    def errors(self, studies: Sequence[StudyFound]) -> Array:
+        """Return the error of the group's ln threshold in each study, beyond that of the people in it."""
         truths = [[one.truth for person in found.own for one in person] for found in studies]
         of_groups = [self.error([one.value for one in found.group]) for found in studies]
-        errors = np.array(of_groups) - [self.error(of_people) for of_people in truths]
+        return np.array(of_groups) - [self.error(of_people) for of_people in truths]
+
+    def verdicts(self, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
+        """Yield error and, with several standards, the slope of ln JND over ln standard."""
+        errors = self.errors(studies)
         mean = math.expm1(float(errors.mean()))
         what = "mean error of the threshold"
         yield Verdict(self.name, what, f"{100 * mean:+.1f} %", "within ±5 %", abs(mean) <= ERROR_MOST)
@@ -400,7 +416,24 @@ def validate(
         verdicts += [*one.verdicts(found), *coverage(one.name, found)]
         progress(f"{one.name}: rehearsing {REHEARSED} participants", None)
         verdicts += judged(one, rehearsal.result(), one.spread(found, REHEARSED))
-    return [*verdicts, *coverage("all of them", every)]
+    verdicts += coverage("all of them", every)
+    of_thresholds = [one for _, one in known if isinstance(one, KnownThreshold)]
+    cases = cases[:: max(1, min(KIND_SHARE, len(cases) // 2))]
+    for kind in (*KINDS, MIXED) if of_thresholds else ():
+        progress(f"people: {kind}", None)
+        found_of = [run(one.simulate, [(*it, kind) for it in cases], executor) for one in of_thresholds]
+        errors = np.concatenate([one.errors(found) for one, found in zip(of_thresholds, found_of, strict=True)])
+        verdicts += [_of_kind(kind, errors), *coverage(kind, [one for found in found_of for one in found])]
+    return verdicts
+
+
+def _of_kind(kind: str, errors: Array) -> Verdict:
+    """Return whether the mean error of thresholds of one kind of people is within its limit, but for chance."""
+    mean, chance = float(errors.mean()), 2 * float(errors.std(ddof=1)) / math.sqrt(len(errors))
+    low, high = (100 * math.expm1(mean + end) for end in (-chance, chance))
+    holds = abs(mean) - chance <= math.log1p(ERROR_MOST)
+    value = f"{100 * math.expm1(mean):+.1f} % [{low:+.1f}, {high:+.1f}]"
+    return Verdict(kind, "mean error of the threshold", value, "reaches ±5 %", holds)
 
 
 def evidence(verdicts: Sequence[Verdict], heading: str) -> Evidence:

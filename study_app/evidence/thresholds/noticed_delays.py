@@ -20,10 +20,11 @@ from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.evidence.table import Evidence, Table
 from study_app.evidence.thresholds.known_values import KnownThreshold, known_value
 from study_app.protocol.load import load
-from study_app.protocol.simulated import NO_FEATURES, Observer, Rater, normal, rate, rater
+from study_app.protocol.simulated import NO_FEATURES, Observer, Rater, rate, rater
 from study_app.protocol.streams import Draw, stream
 from study_app.protocol.trials.stimuli import LINEAR_OBSERVER
 from study_app.psychophysics.families import success
+from study_app.psychophysics.people import normal
 
 JND_S: Final = 0.045
 """Of a delay, at 75 % correct in two intervals (Vogels 2004)."""
@@ -96,7 +97,7 @@ def detected(people: Sequence[Person], seed: int) -> tuple[float, float, float]:
     """Return the group's threshold in `FORCED_CHOICE` with the ends of its 95 % interval [ms]."""
     one = known_value(FORCED_CHOICE, load(FORCED_CHOICE))
     assert isinstance(one, KnownThreshold)  # noqa: S101 - it has forced choices alone
-    (group,) = one.simulate(0, seed, [person.observer for person in people]).group
+    (group,) = one.simulate(0, seed, observers=[person.observer for person in people]).group
     return group.value, group.low, group.high
 
 

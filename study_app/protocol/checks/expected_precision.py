@@ -35,8 +35,8 @@ from study_app.protocol.trials.tracks import (
 from study_app.psychophysics.adaptive import Answers, Observers
 from study_app.psychophysics.detection import NORMAL, rating
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.grid import Z_95, fit
-from study_app.psychophysics.precision import ESTIMATE_NOISE, Estimates, Expected
+from study_app.psychophysics.grid import Z_95, fit, group_widths
+from study_app.psychophysics.people import ESTIMATE_NOISE, Estimates, Expected
 
 D_PRIME: Final = 1.0
 """Of simulated participants. [choice]"""
@@ -178,6 +178,8 @@ def expected_mean(plan: MeanPlan) -> Expected:
 
 OBSERVERS: Final = 200
 """Of a simulated threshold."""
+PEOPLE: Final = 10
+"""Of a study, unless it is said how many."""
 SEED: Final = 1
 LAPSES: Final = 0.02
 WIDTHS: Final = (0.5, 1.0, 2.0)
@@ -292,8 +294,11 @@ class ThresholdPlan:
             np.array([yes, noise_trials * len(tracks) - yes]) if noise_trials else None,
         )  # fmt: skip
 
-    def estimates(self, answered: ObserverAnswers, most: int | None = None) -> Estimates:
-        """Return what the analysis estimates from answers, of each track the first ``most`` if that is given."""
+    def estimates(self, answered: ObserverAnswers, most: int | None = None, people: int = PEOPLE) -> Estimates:
+        """Return what the analysis estimates from answers, of each track the first ``most`` if that is given.
+
+        So many consecutive ``people`` are those of one study, whose widths are estimated together.
+        """
         stimulus, design = self.stimulus, self.design
         tracks = [one if most is None else one.first(most) for one in answered.tracks]
         high = stimulus.domain[1]
@@ -309,12 +314,21 @@ class ThresholdPlan:
             places = np.append(stimulus.coordinate(0.0), places)
         assumed = self.method.assumed(stimulus, design)
         grid = analysis_grid(stimulus, design, assumed)
-        fits = (fit(places, right, wrong, grid) for right, wrong in counts.transpose(1, 0, 2))
-        return Estimates(*np.array([(one.threshold, *one.interval, one.variance) for one in fits]).T)
+        flat = replace(grid, width_prior=None)
+        fits = [replace(fit(places, right, wrong, flat), grid=grid) for right, wrong in counts.transpose(1, 0, 2)]
+        found = []
+        for first in range(0, len(fits), people):
+            group = fits[first : first + people]
+            for one, prior in zip(group, group_widths(group, assumed.width_prior), strict=True):
+                own = one.with_widths(prior)
+                found.append((own.threshold, *own.interval, own.variance))
+        return Estimates(*np.array(found).T)
 
-    def simulate(self, thresholds: Floats, random: Generator, widths: Sequence[float] = (1.0,)) -> Estimates:
+    def simulate(
+        self, thresholds: Floats, random: Generator, widths: Sequence[float] = (1.0,), people: int = PEOPLE
+    ) -> Estimates:
         """Return what the analysis estimates of observers with these thresholds [u], as in `answers`."""
-        return self.estimates(self.answers(thresholds, random, widths=widths))
+        return self.estimates(self.answers(thresholds, random, widths=widths), people=people)
 
 
 def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:

@@ -211,29 +211,28 @@ RUNNING_THRESHOLDS: Final = 41
 RUNNING_WIDTHS: Final = 9
 WIDTHS: Final = (0.5, 4.0)
 """The smallest and the largest width, in decades."""
-LINEAR_OBSERVER: Final = (1.4, 1.5)
-"""Median and factor of the widths [decades] of observers whose d′ is proportional to the level."""
+LINEAR_OBSERVER: Final = (1.4, 2.0)
+"""Median and factor of people's widths [decades]; d′ of an observer of that median is proportional to the level."""
 LAPSES: Final = (0.0, 0.02, 0.04)
 LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
 ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.05)
 ANALYSIS_LAPSE_PRIOR: Final = (0.25, 0.3, 0.2, 0.15, 0.1)
-MEASURED_SESSION_SD: Final = 0.049
+SESSION_SD: Final = 0.049
 """Standard deviation of a person's threshold from one session to the next [decades], with [0.034, 0.077].
 
 Of six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) between series of 400 trials
 (``tests/benchmarks/analysis/people.py --spread``).
 """
-SESSION_SD: Final = 0.065
-"""What intervals allow for [decades]: people differ in it, so that it is more than the best estimate."""
 BEYOND_DECADES: Final = 0.2
 """How far beyond the ends of the levels a threshold is looked for."""
 
 
 @dataclass(frozen=True, slots=True)
 class Assumed:
-    """What is assumed about the psychometric function of a block, while levels are chosen and in the analysis.
+    """What is assumed about the psychometric function of a block.
 
-    ``widths`` are the smallest and the largest width, ``width_prior`` median and factor of its log-normal prior, in u.
+    ``widths`` are the smallest and the largest width while levels are chosen, ``width_prior`` median and factor of the
+    log-normal prior in the analysis, in u.
     """
 
     family: Family
@@ -276,12 +275,16 @@ def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:
 
 
 def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: tuple[float, ...]) -> Grid:
-    """Return the grid over which levels are chosen during a session."""
+    """Return the grid over which levels are chosen during a session.
+
+    All widths are equally likely, so that levels are at the threshold however wide a person's function is: with levels
+    above it the threshold would depend on the prior.
+    """
     return Grid(
         family=assumed.family,
         thresholds=evenly(*stimulus.domain, RUNNING_THRESHOLDS),
         widths=geometric(*assumed.widths, RUNNING_WIDTHS),
-        width_prior=assumed.width_prior,
+        width_prior=None,
         lapses=lapses,
         lapse_prior=LAPSE_PRIOR if lapses == LAPSES else (1.0 / len(lapses),) * len(lapses),
         guesses=guesses_of(stimulus, design),
@@ -300,7 +303,7 @@ def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, session_
     return Grid(
         family=assumed.family,
         thresholds=evenly(low - beyond, high + beyond, 81),
-        widths=geometric(0.8 * least, most, 15),
+        widths=geometric(0.7 * least, 1.4 * most, 17),
         width_prior=assumed.width_prior,
         lapses=ANALYSIS_LAPSES,
         lapse_prior=ANALYSIS_LAPSE_PRIOR,

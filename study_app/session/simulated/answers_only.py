@@ -23,7 +23,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.simulated import NO_FEATURES, OBSERVER, Comparison, TrialFeatures, as_requested
+from study_app.protocol.simulated import NO_FEATURES, Comparison, TrialFeatures, as_requested
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
@@ -158,7 +158,7 @@ class Answering(SimulatedParticipant):
         self._sensed_in: dict[int, list[float]] = {}  # by trial, interval by interval
         self._time = time_passed
         self._store = kept
-        super().__init__(study, state.plan.schedule, OBSERVER)
+        super().__init__(study, state.plan.schedule)
         self.state = state
 
     def run(self, until: int | None = None) -> None:

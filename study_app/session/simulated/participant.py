@@ -13,7 +13,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, stream
 from study_app.protocol.questions import Value, plain_number
-from study_app.protocol.simulated import Comparison, Observer, TrialFeatures, rater
+from study_app.protocol.simulated import Comparison, Course, Observer, TrialFeatures, courses_of, observer_of, rater
 from study_app.protocol.trials.tracks import design_of
 from study_app.session.pages import ChoicePage, DesignPage, Page, QuestionnairePage
 from study_app.session.simulated.observers import Choice, Draw, choices, filled_in, newly_shown
@@ -67,14 +67,16 @@ class AdjustingObserver:
 class SimulatedParticipant(ABC):
     """Answers the pages of a session; how time passes and where events go is the subclass's affair."""
 
-    def __init__(self, study: Protocol, schedule: Schedule, observer: Observer) -> None:
+    def __init__(self, study: Protocol, schedule: Schedule, observer: Observer | None = None) -> None:
         self.answers = 0
         self.page: Page | None = None
         self._study = study
         self._seed, self._who = schedule.seed, schedule.participant
         self._trials = {trial.number: trial for trial in schedule.trials}
-        self.observer = observer
+        self.observer = observer or observer_of(self._stream("observer"))
         self._person = rater(self._stream("person"))
+        self._courses = courses_of(schedule)
+        self._said: dict[int, str | int | float] = {}
 
     @abstractmethod
     def _seconds(self) -> float:
@@ -137,15 +139,27 @@ class SimulatedParticipant(ABC):
         draw, trial = self._stream(page.stream), page.trial
         block = None if trial is None else self._study.blocks[self._trials[trial].block]
         if trial is not None and block is not None and block.design is not None:
-            sensed = self._sensed(block)
-            before = [one for number in sorted(sensed) if number < trial for one in sensed[number]]
-            attended, design = self._attended(trial), design_of(self._study, block)
-            given = attended.answer(self._study, design, sensed[trial], before, draw)
+            given = self._judged(block, trial, draw)
             if isinstance(given, float):
                 given = plain_number(max(0.01, round(given, 2)))
             return choices(page.items, {page.items[0].id: given}, draw, changes_mind=not isinstance(page, ChoicePage))
         assert isinstance(page, QuestionnairePage)  # noqa: S101 - only designs have other pages
         return filled_in(page, self._felt(trial), self._person, draw)
+
+    def _judged(self, block: Block, trial: int, draw: Draw) -> str | int | float:
+        """Return the answer to a trial of a block with a design; earlier ones of a resumed session are given again."""
+        sensed, design = self._sensed(block), design_of(self._study, block)
+        before: list[float] = []
+        last: str | int | float | None = None
+        for number in sorted(one for one in sensed if one <= trial):
+            if number == trial or number not in self._said:
+                source = draw if number == trial else self._stream(f"{number}/answers")
+                course = Course(self._courses[number], last)
+                attended = self._attended(number)
+                self._said[number] = attended.answer(self._study, design, sensed[number], before, source, course)
+            last = self._said[number]
+            before += sensed[number]
+        return self._said[trial]
 
     def _notice_questions(
         self, page: QuestionnairePage | DesignPage, answers: Mapping[str, Value], seen: Collection[str]

@@ -32,7 +32,7 @@ from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
 from study_app.protocol.questions import Value, shown
-from study_app.protocol.simulated import NO_FEATURES, OBSERVER, Comparison, Observer, TrialFeatures
+from study_app.protocol.simulated import NO_FEATURES, Comparison, Observer, TrialFeatures
 from study_app.protocol.streams import Key as LevelKey
 from study_app.protocol.trials.presentation import delays_force, next_level
 from study_app.session.pages import (
@@ -166,7 +166,7 @@ class RehearsedSession(SimulatedParticipant):
         start: Start = FIRST,
         features: Callable[[int, tuple[TrialFeatures, ...]], object] | None = None,
         known: Mapping[int, tuple[TrialFeatures, ...]] | None = None,
-        observer: Observer = OBSERVER,
+        observer: Observer | None = None,
         answer: Answer | None = None,
     ) -> None:
         super().__init__(study, schedule, observer)
@@ -396,7 +396,7 @@ def rehearse(
     results: Path | None = None,
     recordings: bool = True,
     progress: Callable[[str], object] | None = None,
-    observer: Observer = OBSERVER,
+    observer: Observer | None = None,
 ) -> Path:
     """Run a session each of P001, P002 … and return the study folder.
 
@@ -417,7 +417,7 @@ def rehearse(
     progress : callable, optional
         Called with a line after each session.
     observer : Observer, optional
-        Discriminates the intervals of a trial.
+        Discriminates the intervals of a trial; by default each participant is one of people drawn at random.
 
     Raises
     ------
@@ -462,7 +462,7 @@ def open_session(
     session: int = 1,
     device: str = "scripted",
     recordings: bool = True,
-    observer: Observer = OBSERVER,
+    observer: Observer | None = None,
     answer: Answer | None = None,
 ) -> Iterator[tuple[RehearsedSession, SessionStore]]:
     """Begin a session with a simulated hand; yield it and its store. Left before its end, it stays unfinished.
@@ -486,7 +486,7 @@ def open_session(
     recordings : bool
         Whether every tick and frame of a trial is kept.
     observer : Observer, optional
-        Discriminates the intervals of a trial.
+        Discriminates the intervals of a trial; by default each participant is one of people drawn at random.
     answer : callable, optional
         Answers the pages of questions in place of the simulated participant.
 

@@ -13,7 +13,7 @@ from study_app.analysis.statistics.thresholds import group_mean, p_of_fit
 from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.methods import QuestPlus, TrackSetting, TrialResult, UpDown
-from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, assumed_for
+from study_app.protocol.trials.stimuli import SESSION_SD, Stimulus, analysis_grid, assumed_for
 from study_app.psychophysics.families import rise, success
 from study_app.psychophysics.grid import fit
 from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, arranged, block, rows
@@ -216,7 +216,7 @@ def test_answers_of_two_sessions_tell_more_about_a_person_than_those_of_one() ->
     two = one.assign(session=np.where(one["trial"] <= 200, "01", "02"))
     (_, alone), (_, both) = thresholds(block(), one), thresholds(block(), two)
     assert both.threshold == alone.threshold
-    assert both.variance == pytest.approx(alone.variance - 0.065**2 / 2, rel=0.01)
+    assert both.variance == pytest.approx(alone.variance - SESSION_SD**2 / 2, rel=0.01)
 
 
 def tracks_of_staircases(method: UpDown, trials: int) -> pd.DataFrame:

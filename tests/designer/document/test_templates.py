@@ -20,7 +20,7 @@ from study_app.protocol.checks.warnings import level_warnings
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
-from study_app.psychophysics.precision import BETWEEN_PEOPLE
+from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify

@@ -23,7 +23,7 @@ from study_app.evidence.thresholds.known_values import (
     validate,
 )
 from study_app.protocol.load import load, parse
-from study_app.protocol.simulated import OBSERVER, Comparison, Observer
+from study_app.protocol.simulated import Comparison, Observer
 from study_app.protocol.source.files import source_bytes
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.designs import default_design
@@ -77,7 +77,8 @@ def exponents(exponent: KnownExponent) -> list[StudyFound]:
 def test_an_observer_is_correct_in_75_percent_at_the_known_threshold(
     delays: bool, standard: float, difference: float
 ) -> None:
-    attended = Comparison(delays, smallest=False, observer=replace(OBSERVER, lapses=0.0))
+    observer = Observer(person=Observer().person._replace(lapse=0.0))
+    attended = Comparison(delays, smallest=False, observer=observer)
     comparison = standard + difference if delays else standard * (1 + difference)
     draw, design = stream(3, "observer").random, default_design("2ifc")
     n = 20_000

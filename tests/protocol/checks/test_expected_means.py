@@ -24,7 +24,7 @@ from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.methods import Constant
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.detection import NORMAL, two_intervals
-from study_app.psychophysics.precision import ESTIMATE_NOISE
+from study_app.psychophysics.people import ESTIMATE_NOISE
 
 DESIGNS = ("2ifc", "3ifc", "4ifc", "abx", "oddity", "samedifferent", "yesno")
 COMPARED = """

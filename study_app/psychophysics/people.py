@@ -1,9 +1,13 @@
-"""The expected precision of a threshold: one participant's interval, and that of a group's mean."""
+"""People: in what they differ from the observers that the analysis assumes, and how precisely a few are measured.
+
+Validation, `power`, `check`, rehearsals and benchmarks draw their observers from here.
+"""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Final, Literal, NamedTuple
@@ -17,6 +21,85 @@ BETWEEN_PEOPLE: Final = 1.2
 """Factor (one standard deviation of the logarithm) between the thresholds of people. [choice]"""
 ESTIMATE_NOISE: Final = 0.25
 """Standard deviation of the logarithm of a simulated magnitude estimate. [choice]"""
+WIDTHS: Final = (0.5, 2.5)
+LAPSES_MOST: Final = 0.05
+PREFERENCE_SD: Final = 0.25
+CHANGE: Final = 1.2
+"""Of people drawn at random: ends of log-uniform widths, the most lapses, standard deviation of a criterion and of a
+preference for the last answer, and factor (one standard deviation) of a change. [choice]"""
+UNIFORM: Final = 12
+"""A nearly normal number is the sum of so many uniform ones, less six."""
+
+
+class Person(NamedTuple):
+    """A person as an observer.
+
+    Attributes
+    ----------
+    width : float
+        Of the psychometric function, as a share of that of an observer whose d′ is proportional to the level.
+    lapse : float
+        Share of answers at random.
+    criterion, repeats : float
+        Preference for the first interval, and for the last answer [SD of the decision].
+    change : float
+        Threshold in the last trial of a block over that in the first.
+    """
+
+    width: float = 1.0
+    lapse: float = 0.02
+    criterion: float = 0.0
+    repeats: float = 0.0
+    change: float = 1.0
+
+    def at(self, done: float) -> float:
+        """Return the threshold as a share of its mean, when a share of the block is ``done``."""
+        return float(self.change ** (done - 0.5))
+
+    def sensed(self, level: float, done: float) -> float:
+        """Return what a level, as a share of the mean threshold, is to an observer of width one: 1 at the threshold."""
+        return float((level / self.at(done)) ** (1.0 / self.width))
+
+
+ASSUMED: Final = Person()
+KINDS: Final = {
+    "as assumed": ASSUMED,
+    "half as wide": Person(width=0.5),
+    "1.5 times as wide": Person(width=1.5),
+    "2.5 times as wide": Person(width=2.5),
+    "5 % at random": Person(lapse=0.05),
+    "criterion of 0.5": Person(criterion=0.5),
+    "last answer again": Person(repeats=0.5),
+    "learning": Person(change=1 / 1.5),
+    "fatigue": Person(change=1.5),
+}
+"""People who differ in one respect each."""
+MIXED: Final = "all of these"
+"""Of a group of people drawn at random."""
+
+
+def normal(draw: Callable[[], float]) -> float:
+    """Return a nearly normal number, mean 0, deviation 1, from uniform ones in [0, 1)."""
+    return sum(draw() for _ in range(UNIFORM)) - UNIFORM / 2
+
+
+def drawn(draw: Callable[[], float]) -> Person:
+    """Return a person drawn at random, who may differ in every respect, from uniform numbers in [0, 1)."""
+    low, high = WIDTHS
+    return Person(
+        width=low * (high / low) ** draw(),
+        lapse=LAPSES_MOST * draw(),
+        criterion=PREFERENCE_SD * normal(draw),
+        repeats=PREFERENCE_SD * normal(draw),
+        change=CHANGE ** normal(draw),
+    )
+
+
+def of_kind(kind: str, draw: Callable[[], float]) -> Person:
+    """Return one of the people of a kind: of `KINDS`, or `MIXED`."""
+    return drawn(draw) if kind == MIXED else KINDS[kind]
+
+
 _COVERED: Final = 0.95
 
 
