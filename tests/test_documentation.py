@@ -121,6 +121,16 @@ def test_every_page_is_in_one_section() -> None:
     assert list(sections) == ["begin", "do", "look-up"]
 
 
+def test_the_book_and_its_layers_are_as_short_as_they_are_to_be() -> None:
+    sections = documentation.sections()
+    assert len(sections["begin"]) <= 8
+    words = {page: len(documentation.source(page).split()) for page in sections["do"]}
+    assert not {page: count for page, count in words.items() if count > 600}
+    assert (
+        sum(len(path.read_text("utf-8").split()) for path in (ROOT / "README.md", *ROOT.glob("docs/**/*.md"))) <= 40_000
+    )
+
+
 def test_every_page_but_decisions_is_in_the_list_of_a_section() -> None:
     top = documentation.folder()
     shown = {link.partition("#")[0] for section in documentation.sections() for link in links(top / f"{section}.md")}
