@@ -282,19 +282,29 @@ def reproduce(session: Path) -> None:
     metavar="FILE",
     help="Compare with fingerprints kept elsewhere (a copy, or what proof made): what was changed or removed since?",
 )
-def verify(results: Path, fingerprints: Path | None) -> None:
+@click.option(
+    "--xdf",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Compare with a recording of its LSL streams: markers, lost samples, drift of the clocks; needs pyxdf.",
+)
+def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings."""
+    from study_app.store.verification.recorded_streams import check_recording
     from study_app.store.verification.verify_study import verify as verify_folder
 
     with progress() as show:
         show("checking every file")
         found = verify_folder(results, fingerprints)
+        measured = [] if xdf is None else check_recording(xdf, results, found)
     for finding in found.errors:
         click.echo(f"error: {finding}")
     for finding in sorted(found.warnings, key=lambda one: one.shares):
         click.echo(f"{'to share it' if finding.shares else 'warning'}: {finding}")
     for package, names in found.plug_ins.items():
         click.echo(f"plug-in {package}: {', '.join(names)}")
+    for line in measured:
+        click.echo(line)
     running = f", {found.running} running" if found.running else ""
     click.echo(f"{counted(found.sessions, 'session')}{running}: {'sound' if found.sound else 'not sound'}")
     end_if(not found.sound)

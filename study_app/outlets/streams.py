@@ -27,7 +27,10 @@ MEASURE_EVERY_S: Final = 5.0
 READINGS: Final = 8
 SEND_EVERY_S: Final = 0.01
 PATIENCE_S: Final = 1.0
-STREAMED: Final = tuple(field for field in SAMPLE_FIELDS if field.stream)
+STREAMED: Final = tuple(sorted((it for it in SAMPLE_FIELDS if it.stream), key=lambda it: it.name == "tick"))
+"""Fields of a sample in the order of their channels: the tick's number comes last, as it came last into the stream."""
+TICKS: Final = 2**24
+"""Ticks are numbered modulo this, the first integer beyond which 32-bit floats are not exact: after 4.7 h from 0 on."""
 CHANNELS: Final = tuple(f"{name} {field.unit}".rstrip() for field in STREAMED for name in field.named(field.stream))
 
 
@@ -117,7 +120,8 @@ class ClockMapping:
 
 def channels_of(samples: Any) -> NDArray[np.float32]:
     """Return the channels of the stream for samples (array of ``layout.SAMPLE``)."""
-    return np.column_stack([samples[field.name] for field in STREAMED]).astype(np.float32)
+    columns = [samples[it.name] % TICKS if it.name == "tick" else samples[it.name] for it in STREAMED]
+    return np.column_stack(columns).astype(np.float32)
 
 
 class SampleStream:
@@ -194,5 +198,5 @@ class SampleStream:
         self.sent += len(samples)
 
     def push(self, channels: NDArray[np.float32], times_s: NDArray[np.float64]) -> None:
-        """Push samples (n, 10), with their times on the clock of the Lab Streaming Layer [s]."""
+        """Push samples (n, 11), with their times on the clock of the Lab Streaming Layer [s]."""
         self._outlet.push_chunk(channels, times_s.tolist())

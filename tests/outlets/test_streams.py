@@ -58,15 +58,16 @@ def samples_of(count: int, first: int = 0) -> Any:
     return made
 
 
-def test_channels_are_position_velocity_force_sent_and_limiters() -> None:
+def test_channels_are_position_velocity_force_sent_limiters_and_tick() -> None:
     made = samples_of(2, first=1)
+    made["tick"] += 2**24  # as 32-bit floats, the last would be even
     made["command_n"], made["force_n"] = -5, -6
     expected = [
-        [0.001, 1.001, 2.001, 0.01, 10.01, 20.01, 0.1, 100.1, 200.1, LIMITER_ENERGY | LIMITER_SLEW],
-        [0.002, 1.002, 2.002, 0.02, 10.02, 20.02, 0.2, 100.2, 200.2, 0],
+        [0.001, 1.001, 2.001, 0.01, 10.01, 20.01, 0.1, 100.1, 200.1, LIMITER_ENERGY | LIMITER_SLEW, 1],
+        [0.002, 1.002, 2.002, 0.02, 10.02, 20.02, 0.2, 100.2, 200.2, 0, 2],
     ]
     np.testing.assert_allclose(channels_of(made), expected, rtol=1e-6)
-    assert len(CHANNELS) == 10
+    assert len(CHANNELS) == 11
 
 
 @slow

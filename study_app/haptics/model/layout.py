@@ -157,7 +157,7 @@ _FORCE: Final = partial(_VECTOR, unit="N", step=FORCE_STEP_N)
 _CODE: Final = partial(SampleField, stored=np.int32)
 
 SAMPLE_FIELDS: Final = (
-    SampleField("tick", "Number of the servo's tick since its start; gaps are lost samples."),
+    SampleField("tick", "Number of the servo's tick since its start; gaps are lost samples.", stream="tick"),
     SampleField("time_ns", "Time when the device was read, on the servo's clock.", unit="ns"),
     SampleField(
         "lateness_ns",

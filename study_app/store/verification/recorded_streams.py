@@ -1,0 +1,167 @@
+"""Whether a recording of the Lab Streaming Layer (XDF, as LabRecorder writes it) has what the sessions sent.
+
+Markers are compared with the journals by their text, which contains the event's time. Lost samples are gaps in the
+stream's tick numbers. Clocks are compared by the offsets that the recorder measured.
+"""
+
+import gzip
+import logging
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.errors import StoreError
+from study_app.number_text import counted
+from study_app.outlets.markers import marker_of
+from study_app.outlets.streams import MARKERS, SAMPLES, TICKS
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal
+from study_app.store.sites.merged import read_merged
+from study_app.store.verification.verify_session import Finding, Findings
+
+RESET_S: Final = 1.0
+"""A change of an offset between two measurements from which on a clock was set, not drifting."""
+LATE: Final = 1.5
+"""Intervals between successive ticks from so many periods on are late."""
+
+
+def check_recording(file: Path, folder: Path, found: Findings) -> list[str]:
+    """Compare the recording ``file`` with the study in ``folder``; add to ``found``, and return the measurements.
+
+    Raises
+    ------
+    StoreError
+        It cannot be read, or has no stream of this program.
+    """
+    streams = _read(file)
+    ours = [it for it in streams if it["info"]["name"][0] in {MARKERS, SAMPLES}]
+    if not ours:
+        names = ", ".join(repr(it["info"]["name"][0]) for it in streams) or "none"
+        raise StoreError(f"{file} has no stream '{MARKERS}' or '{SAMPLES}'; its streams: {names}")
+    merged = read_merged(folder)
+    places = [folder] if merged is None else [it for it in map(merged.folder, merged.names) if it.is_dir()]
+    sessions = [one for place in places for one in StudyFolder(place).sessions()]
+    expected: dict[SessionFolder, list[str]] = {}
+    for one in sessions:
+        with found.reading(one.path):
+            lines = journal.read(one.journal)
+            made = (marker_of(line.event, line.t_s, 0, line.fields()) for line in lines)
+            expected[one] = [it.text for it in made if it is not None]
+    said = []
+    for stream in ours:
+        is_markers = stream["info"]["name"][0] == MARKERS
+        said += [*(_markers(file, stream, expected, found) if is_markers else _samples(file, stream, found))]
+        said.append(f"clock of '{stream['info']['name'][0]}': {clock_drift(stream)}")
+    return said
+
+
+def _read(file: Path) -> list[Any]:
+    try:
+        import pyxdf  # noqa: PLC0415 - an extra
+    except ModuleNotFoundError as error:
+        raise StoreError("reading an XDF file needs pyxdf: pip install 'liquid-study[lsl]'") from error
+    logging.getLogger("pyxdf").setLevel(logging.CRITICAL)
+    if not file.is_file():
+        raise StoreError(f"{file} is not a file: give --xdf a recording, such as of LabRecorder")
+    try:
+        with gzip.open(file) if file.suffix in {".gz", ".xdfz"} else file.open("rb") as opened:
+            streams, _ = pyxdf.load_xdf(opened, synchronize_clocks=False, dejitter_timestamps=False)
+    except Exception as error:
+        raise StoreError(f"{file} cannot be read as XDF ({type(error).__name__}: {error})") from error
+    return list(streams)
+
+
+def _markers(
+    file: Path, stream: Mapping[str, Any], expected: Mapping[SessionFolder, Sequence[str]], found: Findings
+) -> Iterator[str]:
+    """Compare a stream of markers with the journals: none may lack, and none be added, between the first and last."""
+    texts = [row[0] for row in stream["time_series"]]
+    known = Counter(text for one in expected.values() for text in one)
+    unknown = sum(text not in known for text in texts)
+    for session, sent in expected.items():
+        at = {text: place for place, text in enumerate(texts) if text in set(sent)}
+        there = [number for number, text in enumerate(sent) if text in at]
+        name = f"{session.path.parent.name}/{session.path.name}"
+        if not there:
+            continue
+        first, last = there[0], there[-1]
+        if lost := [text for text in sent[first : last + 1] if text not in at]:
+            found.error(session.path, f"{len(lost)} of its markers are not in {file.name}; the first: {lost[0]}")
+        span = texts[min(at.values()) : max(at.values()) + 1]
+        if added := [text for text in span if text not in known]:
+            what = f"{len(added)} markers in {file.name} are not in its journal; the first: {added[0]}"
+            found.error(session.path, f"{what}. The journal was changed, or another program sent them")
+            unknown -= len(added)
+        if outside := len(sent) - 1 - (last - first):
+            when = f"{first} markers before the recording and {len(sent) - 1 - last} after it"
+            found.warning(session.path, f"{outside} of its {len(sent)} markers are outside {file.name}: {when}")
+        counts = f"{len(there)} of {len(sent)} recorded, {len(lost)} lost"
+        yield f"markers of {name}: {counts}; time within {_error_ms(session, stream, at):.2g} ms"
+    if unknown:
+        found.warnings += (Finding(file.name, f"{unknown} markers are of no session of this study"),)
+    if not any(text in known for text in texts):
+        found.errors += (Finding(file.name, "it has no marker of this study's sessions"),)
+
+
+def _error_ms(session: SessionFolder, stream: Mapping[str, Any], at: Mapping[str, int]) -> float:
+    """Return how far the markers' stamps are from the journal's times, less their median from each start or resume."""
+    parts: list[list[float]] = [[]]
+    for line in journal.read(session.journal):
+        marker = marker_of(line.event, line.t_s, 0, line.fields())
+        if line.event == "session_resumed":
+            parts.append([])
+        if marker is not None and marker.text in at:
+            parts[-1].append(float(stream["time_stamps"][at[marker.text]]) - line.t_s)
+    return max(1e3 * float(np.abs(np.array(part) - np.median(part)).max()) for part in parts if part)
+
+
+def _samples(file: Path, stream: Mapping[str, Any], found: Findings) -> Iterator[str]:
+    """Count lost and late samples of a stream."""
+    stamps_s = np.asarray(stream["time_stamps"], float)
+    labels = [one["label"][0] for one in stream["info"]["desc"][0]["channels"][0]["channel"]]
+    if "tick" not in labels:
+        yield f"samples: {len(stamps_s)} recorded; this version sent no tick numbers, by which losses are found"
+        return
+    if len(stamps_s) == 0:
+        yield "samples: none recorded"
+        return
+    ticks = np.asarray(stream["time_series"])[:, labels.index("tick")].astype(np.int64)
+    steps, intervals_s = np.diff(ticks) % TICKS, np.diff(stamps_s)
+    gaps = (steps > 1) & (steps < TICKS // 2)  # a greater one is a new start of the servo
+    lost = int((steps[gaps] - 1).sum())
+    if lost:
+        first_s = stamps_s[int(np.argmax(gaps))] - stamps_s[0]
+        words = f"{lost} samples were lost, in {int(gaps.sum())} gaps; the first after {first_s:.3f} s of the stream"
+        found.errors += (Finding(file.name, words),)
+    late_s = intervals_s[(steps == 1) & (intervals_s > LATE / float(stream["info"]["nominal_srate"][0]))]
+    worst = f", at most {1e3 * late_s.max():.3g} ms between two ticks" if len(late_s) else ""
+    yield f"samples: {len(stamps_s)} recorded, {lost} lost, {len(late_s)} late{worst}"
+
+
+def clock_drift(stream: Mapping[str, Any]) -> str:
+    """Return the drift of a stream's clock against the recorder's, by its measured offsets between two resets."""
+    times_s, values_s = (np.asarray(stream.get(name, ()), float) for name in ("clock_times", "clock_values"))
+    if len(times_s) < 2:
+        return f"{len(times_s)} offsets were measured: too few for its drift"
+    resets = np.flatnonzero((np.diff(times_s) < 0) | (np.abs(np.diff(values_s)) > RESET_S)) + 1
+    parts = zip(np.split(times_s, resets), np.split(values_s, resets), strict=True)
+    said = []
+    for t_s, v_s in parts:
+        slope, residual_s = _line(t_s, v_s)
+        if math.isfinite(slope):
+            span = f"over {np.ptp(t_s):.0f} s, offsets within {1e3 * residual_s:.2g} ms of a line"
+            said.append(f"drift {1e6 * slope:+.2g} ppm {span}")
+    return "; ".join([counted(len(resets), "reset"), *said])
+
+
+def _line(t_s: NDArray[np.float64], v_s: NDArray[np.float64]) -> tuple[float, float]:
+    """Return slope and greatest residual of a line through offsets; the slope is NaN with fewer than three."""
+    if len(t_s) < 3 or np.ptp(t_s) == 0:
+        return math.nan, math.nan
+    slope, start_s = np.polyfit(t_s - t_s[0], v_s, 1)
+    return float(slope), float(np.abs(v_s - start_s - slope * (t_s - t_s[0])).max())

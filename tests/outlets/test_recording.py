@@ -1,0 +1,111 @@
+"""A recording of real streams (XDF) beside the study that sent them: what is lost, added or late is found."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.outlets.markers import SinkThread
+from study_app.outlets.session_outlets import open_sink
+from study_app.outlets.streams import SampleStream
+from study_app.session.simulated.rehearsal import rehearse
+from tests.outlets.collector import collecting
+from tests.outlets.sinks import Recorder
+from tests.outlets.test_streams import Servo, samples_of
+from tests.outlets.xdf_file import write_xdf
+
+lsl = pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
+pytest.importorskip("pyxdf", reason="pyxdf is not installed: pip install 'liquid-study[lsl]'")
+pytestmark = pytest.mark.slow
+
+Rows = list[tuple[list[Any], float]]
+OFFSETS = [(100.0 + 5 * number, 0.25 + 2e-6 * 5 * number) for number in range(20)]
+LAST = 2**24
+
+
+@pytest.fixture(scope="module")
+def streamed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[str, Rows]]]:
+    """A rehearsed study, and what a recorder in another process received of its markers, and of 300 samples."""
+    study = tmp_path_factory.mktemp("streamed") / "study"
+    with collecting() as collector:
+        rehearse("demo", participants=1, seed=1, results=study)
+    servo = Servo()
+    thread = SinkThread(open_sink("lsl", servo.now_ns))
+    stream = SampleStream(servo.telemetry, servo.rate_hz, servo.now_ns)
+    recorders = [Recorder(f"liquid-study {n}", c) for n, c in (("markers", len(collector.markers)), ("samples", 300))]
+    for marker in collector.markers:
+        thread.mark(marker)
+    servo.telemetry.batches.append(samples_of(300, first=LAST - 100))
+    found = [recorder.found() for recorder in recorders]
+    thread.close(5)
+    stream.close()
+    return study, [(one["xml"], one["samples"]) for one in found]
+
+
+def without(first: int, last: int) -> Callable[[Rows], Rows]:
+    return lambda rows: rows[:first] + rows[last:]
+
+
+def late(rows: Rows) -> Rows:
+    return rows[:50] + [(row, stamp_s + 0.004) for row, stamp_s in rows[50:]]
+
+
+def added(rows: Rows) -> Rows:
+    return [*rows[:9], (['{"event":"note","t_s":0.5}'], rows[9][1]), *rows[9:]]
+
+
+@pytest.mark.parametrize(
+    ("markers", "samples", "said", "code"),
+    [
+        (list, list, "300 recorded, 0 lost, 0 late\n", 0),
+        (list, late, "300 recorded, 0 lost, 1 late, at most 5 ms between two ticks\n", 0),
+        (list, without(90, 110), "20 samples were lost, in 1 gaps; the first after 0.089 s of the stream\n", 3),
+        (without(12, 13), list, "1 of its markers are not in own.xdf; the first: {", 3),
+        (added, list, '1 markers in own.xdf are not in its journal; the first: {"event":"note","t_s":0.5}. The', 3),
+        (without(0, 4), list, "markers are outside own.xdf: 4 markers before the recording and 0 after it", 0),
+        (without(0, 9999), list, "own.xdf: it has no marker of this study's sessions", 3),
+    ],
+)
+def test_what_a_recording_lacks_is_found(
+    streamed: Any, tmp_path: Path, markers: Any, samples: Any, said: str, code: int
+) -> None:
+    study, ((first, texts), (second, values)) = streamed
+    file = write_xdf(tmp_path / "own.xdf", [(first, markers(texts), OFFSETS), (second, samples(values), OFFSETS)])
+    done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
+    assert said in done.output
+    assert done.exit_code == code
+    assert "clock of 'liquid-study samples': 0 resets; drift +2 ppm over 95 s, offsets within" in done.output
+    if markers is list:
+        assert f"{len(texts)} of {len(texts)} recorded, 0 lost; time within " in done.output
+
+
+def test_a_reset_clock_is_told(streamed: Any, tmp_path: Path) -> None:
+    study, ((first, texts), _) = streamed
+    offsets = [*OFFSETS, *((time_s - 99, offset_s + 60) for time_s, offset_s in OFFSETS)]
+    file = write_xdf(tmp_path / "own.xdf", [(first, texts, offsets)])
+    done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
+    assert "1 reset; drift +2 ppm over 95 s" in done.output
+    assert "drift +2 ppm" in done.output.split("drift +2 ppm", 1)[1]
+
+
+@pytest.mark.parametrize("content", [None, b"", b"XDF:\x01", b"no recording", "other"])
+def test_a_file_that_cannot_be_used_ends_in_one_line(streamed: Any, tmp_path: Path, content: Any) -> None:
+    study, ((xml, _), _) = streamed
+    file = tmp_path / "own.xdf"
+    if content == "other":
+        write_xdf(file, [(xml.replace("liquid-study markers", "EEG"), [(["1"], 1.0)], ())])
+    elif content is not None:
+        file.write_bytes(content)
+    done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
+    assert "own.xdf" in str(done.exception)
+    assert type(done.exception).__name__ == "StoreError"
+
+
+def test_without_the_reader_it_says_what_to_install(streamed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyxdf", None)
+    done = CliRunner().invoke(commands, ["verify", str(streamed[0]), "--xdf", "own.xdf"])
+    assert str(done.exception) == "reading an XDF file needs pyxdf: pip install 'liquid-study[lsl]'"
