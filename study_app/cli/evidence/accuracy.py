@@ -132,8 +132,14 @@ def motion_along(path: str, scene: Scene) -> Motion:
     is_flag=True,
     help="Only compare the drag in Herschel–Bulkley liquids; with --solve this takes half an hour.",
 )
+@click.option(
+    "--score",
+    is_flag=True,
+    help="Score the models by the benchmark that other engines can enter: error, time, energy given, delay borne; "
+    "takes about five minutes.",
+)
 @takes_workers
-def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, materials: bool) -> None:
+def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, materials: bool, score: bool) -> None:
     """Fit models of honey and glycerin to the force of a fluid solver; report the remaining error.
 
     A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
@@ -143,10 +149,16 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     from study_app.evidence.cfd.solver import solve as solve_all
     from study_app.evidence.cfd.stored_flows import held_out, steady, stored, training
 
-    exclude_each_other(refit=refit, materials=materials)
+    exclude_each_other(refit=refit, materials=materials, score=score)
+    exclude_each_other(solve=solve, score=score)
     if solve and to is None:
         raise click.UsageError("--solve needs --to: the folder for the solver's tables")
     prepare(to)
+    if score:
+        with progress(lambda text: click.echo(text, err=True)) as show:
+            scored = fits.score_all(show)
+        present(scored, to)
+        return
     if materials:
         _materials(to, workers, solve=solve)
         return

@@ -7,6 +7,7 @@ speed, where nothing is fitted any more: a parameter of a liquid must not change
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -15,17 +16,19 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from study_app import figure_style as style
+from study_app.evidence.cfd import score
 from study_app.evidence.cfd.solved_cases import RAMP, STOP, Case
 from study_app.evidence.cfd.stored_flows import Table as SolvedTable
 from study_app.evidence.reference_solutions import PERCEPTIBLE_N, RELATIVE, measured_drag_n
 from study_app.evidence.table import Evidence, Table, plot_files
+from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.laws import LAWS
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.overrides import override_all
-from study_app.haptics.model.scene import Effect, Given, Liquid, Scene
-from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.model.scene import Effect, Ewma, Given, Liquid, Scene
+from study_app.haptics.runtime.offline import ModelAlong, simulate
 from study_app.lab.identify.fit import fit
 from study_app.lab.identify.measured_force import along_a_line
 from study_app.lab.identify.parameters import find
@@ -179,6 +182,59 @@ def share_of(error_n: Floats, force_n: Floats) -> float:
 
 def _rms(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2)))
+
+
+ENGINES: Final[Mapping[str, tuple[int, Mapping[str, float]]]] = {
+    "thesis: drag and wake": (1, {"length": 1700, "scaling": 1700.0, "exponent": 0.75}),  # of water, rek2024
+    "drag, added mass, history": (8, {}),
+    "unsteady drag": (10, {}),
+}
+"""The models that are scored by the benchmark of `score`: their places in `MODELS`, and parameters."""
+
+
+class Tick:
+    """A model tick by tick along x, or `along` a known motion.
+
+    The law alone has the velocities given; what is ``sent`` has passed the estimator and the safety layer.
+    """
+
+    def __init__(self, name: str, setup: Mapping[str, float], *, sent: bool) -> None:
+        place, values = ENGINES[name]
+        given = (setup["density_kg_m3"], setup["viscosity_pa_s"], setup["diameter_m"])
+        scene = scene_of(MODELS[place], Case("liquid", *given, 0.0), values)
+        dynamics = None
+        if sent:
+            scene = scene.model_copy(update={"velocity": Ewma()})
+            delay_s = min(setup["delay_ticks"], MOST_DELAY) / RATE_HZ
+            dynamics = Dynamics(delay_s=delay_s, mass_kg=min(setup["handle_kg"], max(score.HANDLES_KG)))
+        self._sent = sent
+        self._model = ModelAlong(scene, dynamics, given=not sent)
+
+    def __call__(self, t_s: float, x_m: float, v_mps: float) -> float:
+        """Return the force along x [N] at a time, place and velocity."""
+        return float(self.along(np.array([t_s]), np.array([x_m]), np.array([v_mps]))[0])
+
+    def along(self, t_s: Floats, x_m: Floats, v_mps: Floats) -> Floats:
+        """Return the forces along x (n,) [N] of a motion: times [s], places [m] and velocities [m/s], each (n,)."""
+        position_m, velocity_mps = np.zeros((2, len(t_s), 3))
+        position_m[:, 0], velocity_mps[:, 0] = x_m, v_mps
+        samples = self._model.follow(t_s, position_m, None if self._sent else velocity_mps)
+        force_n: Floats = (samples.device_force_n if self._sent else samples.force_n)[:, 0]
+        return force_n
+
+
+def score_all(progress: Callable[[str], object] = lambda _line: None) -> Evidence:
+    """Score every model of `ENGINES`, the law alone and as sent."""
+    over = score.motions()
+    rows = []
+    for name in ENGINES:
+        for sent in (False, True):
+            title = f"{name}, as sent" if sent else name
+            progress(f"{title} ...")
+            rows.append(score.row(title, *score.measure(partial(Tick, name, sent=sent), over)))
+    table = Table(score.HEADINGS, rows, left=1)
+    text = table.markdown() + "\n"
+    return Evidence(text, {"score.md": text, "score.csv": table.csv()})
 
 
 WIDTH_PT: Final = 85 / 25.4 * 72

@@ -1,0 +1,389 @@
+"""A benchmark of liquid forces that any program can enter; this file needs numpy alone, and the tables beside it.
+
+    python score.py PROGRAM [WORD ...]               a program that answers over a pipe
+    python score.py --function MODULE:FUNCTION       a function of Python
+    python score.py --only reversal PROGRAM          only the motions with this word in their names
+
+An engine computes the force of a liquid on a ball, tick by tick at 1 kHz. As a function it receives the setup (a dict
+of ``density_kg_m3``, ``viscosity_pa_s``, ``diameter_m``, ``handle_kg``, ``delay_ticks``) and returns a function of time
+[s], position [m] and velocity [m/s] along a line, which returns the force [N]. That function may have an attribute
+``along``: the same for arrays (n,) from the first tick on, which is then used where the motion is known. A program
+reads lines: ``{"density_kg_m3": ...}`` begins a new ball, to which it answers ``ready``; ``0.001 1e-7 0.0002`` is a
+tick, to which it answers the force. Its input ends after the last tick.
+
+Measured: the error against a fluid solver along given motions (RMS over RMS of the force; greatest over greatest), the
+time of a tick, and what becomes of a handle that the hand moved through the liquid and let go, with forces that come
+late: how much energy the liquid gives it, and up to which delay it neither gets more energy than the hand had put into
+the liquid nor goes on ringing.
+"""
+
+import argparse
+import hashlib
+import importlib
+import itertools
+import json
+import math
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
+Step: TypeAlias = Callable[[float, float, float], float]
+Engine: TypeAlias = Callable[[Mapping[str, float]], Step]
+
+RATE_HZ: Final = 1000.0
+FOLDERS: Final = {"": True, "training": True, "held_out": False}
+"""Where the tables are, and whether the constants of unsteady drag, this project's law, are fitted to them."""
+LIQUIDS: Final = ("honey", "glycerin", "gear_oil")
+"""In which handles are let go."""
+HANDLES_KG: Final = (0.05, 0.2)
+STROKE_M: Final = 0.03
+STROKE_HZ: Final = 2.0
+PHASES: Final = (0.5, 0.625, 0.75)
+"""When the hand lets go, in periods of its stroke: at its far end, on the way back, and in the middle."""
+FREE_S: Final = 0.6
+DELAYS: Final = (0, 1, 2, 4, 8, 16, 32)
+"""Delays of the force that are tried [ticks]: with 0, a force acts from the reading that it answers to the next one."""
+SETTLES_S: Final = 0.2
+"""A handle that goes on swinging after this time rings: more than `RINGS` changes of direction by `RINGS_MPS`."""
+RINGS: Final = 3
+RINGS_MPS: Final = 0.01
+ALLOWANCE_J: Final = 1e-4
+ANSWER_S: Final = 10.0
+SUMS: Final = "SHA256SUMS"
+
+
+class EngineError(Exception):
+    """The engine did not answer as it must."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """One solved motion at `RATE_HZ`: place, velocity and the solver's force, each (n,).
+
+    ``fitted`` says whether this project's law of unsteady drag was fitted to it.
+    """
+
+    name: str
+    fitted: bool
+    notes: Mapping[str, str]
+    t_s: Floats
+    position_m: Floats
+    velocity_mps: Floats
+    force_n: Floats
+
+    @property
+    def setup(self) -> dict[str, float]:
+        """What an engine is told of the liquid and the ball."""
+        return {name: float(self.notes[name]) for name in ("density_kg_m3", "viscosity_pa_s", "diameter_m")}
+
+
+@dataclass(frozen=True)
+class Score:
+    """The error along one motion, RMS and greatest as shares of the force's, and the time of a tick [ns]."""
+
+    motion: Motion
+    rms: float
+    greatest: float
+    tick_ns: float
+
+
+@dataclass(frozen=True)
+class Releases:
+    """Handles let go in one liquid: the most energy given with a delay of one tick [J], and the delay borne [ticks].
+
+    The delay is -1 if none is borne, not even 0.
+    """
+
+    liquid: str
+    given_j: float
+    delay: int
+
+
+def motions(folder: Path | None = None, only: str = "") -> tuple[Motion, ...]:
+    """Return the motions with ``only`` in their names, after comparing each file with its checksum."""
+    folder = folder or Path(__file__).resolve().parent
+    lines = (folder / SUMS).read_text("utf-8").splitlines()
+    sums = {line[66:]: line[:64] for line in lines if not line.startswith("#")}
+    found = []
+    for place, fitted in FOLDERS.items():
+        for path in sorted(it for it in (folder / place).glob("*mmps.csv") if only in it.stem):
+            content = path.read_bytes()
+            if hashlib.sha256(content).hexdigest() != sums.get(path.relative_to(folder).as_posix()):
+                raise EngineError(f"{path} is not the published table: its checksum is not in {SUMS}")
+            found.append(_motion(path.stem, content.decode("utf-8"), fitted=fitted))
+    if not found:
+        raise EngineError(f"{folder} has no motion with '{only}' in its name")
+    return tuple(found)
+
+
+def _motion(name: str, text: str, *, fitted: bool) -> Motion:
+    lines = text.splitlines()
+    notes = dict(line[2:].split(": ", 1) for line in lines if line.startswith("#"))
+    rows = [line for line in lines if not line.startswith("#")][1:]
+    t_s, velocity_mps, force_n = np.array([[float(cell) for cell in row.split(",")] for row in rows]).T
+    even_s = np.arange(math.floor(t_s[-1] * RATE_HZ) + 1) / RATE_HZ
+    even_mps = np.interp(even_s, t_s, velocity_mps)
+    place_m = np.concatenate([[0.0], np.cumsum((even_mps[1:] + even_mps[:-1]) / (2 * RATE_HZ))])
+    return Motion(name, fitted, notes, even_s, place_m, even_mps, np.interp(even_s, t_s, force_n))
+
+
+def score(engine: Engine, motion: Motion) -> Score:
+    """Let an engine follow a motion, and compare its forces with the solver's."""
+    step = engine({**motion.setup, "handle_kg": math.inf, "delay_ticks": 0})
+    ticks = (motion.t_s, motion.position_m, motion.velocity_mps)
+    if (along := getattr(step, "along", None)) is not None:
+        began_ns = time.perf_counter_ns()
+        force_n = np.asarray(along(*ticks), float)
+        tick_ns = (time.perf_counter_ns() - began_ns) / len(force_n)
+    else:
+        force_n, times_ns = np.empty(len(motion.t_s)), np.empty(len(motion.t_s))
+        for k, tick in enumerate(zip(*(column.tolist() for column in ticks), strict=True)):
+            began_ns = time.perf_counter_ns()
+            force_n[k] = step(*tick)
+            times_ns[k] = time.perf_counter_ns() - began_ns
+        tick_ns = float(np.median(times_ns))
+    if force_n.shape != motion.force_n.shape or not np.isfinite(force_n).all():
+        raise EngineError(f"{motion.name}: a force is not a finite number, or is missing")
+    error_n = force_n - motion.force_n
+    rms = float(np.linalg.norm(error_n) / np.linalg.norm(motion.force_n))
+    return Score(motion, rms, float(np.abs(error_n).max() / np.abs(motion.force_n).max()), tick_ns)
+
+
+def let_go(
+    engine: Engine, setup: Mapping[str, float], handle_kg: float, phase: float, delay: int
+) -> tuple[float, bool]:
+    """Move a handle through a liquid, let it go, and follow it.
+
+    Parameters
+    ----------
+    setup : mapping
+        Liquid and ball.
+    handle_kg : float
+        Mass of the handle.
+    phase : float
+        When it is let go, in periods of the stroke.
+    delay : int
+        Ticks by which each force acts late.
+
+    Returns
+    -------
+    given_j : float
+        Greatest kinetic energy after the release beyond that at the release [J].
+    fails : bool
+        Whether that exceeds what the hand had put into the liquid, or the handle rings on.
+    """
+    step = engine({**setup, "handle_kg": handle_kg, "delay_ticks": delay})
+    way = 2 * math.pi * STROKE_HZ
+    period_s, held = 1 / RATE_HZ, round((1 + phase) / STROKE_HZ * RATE_HZ)
+    late = deque([0.0] * delay)
+    x_m = v_mps = put_in_j = given_j = 0.0
+    start_j, turns, heading = math.inf, 0, 0.0
+    for k in range(held + round(FREE_S * RATE_HZ)):
+        late.append(float(step(k * period_s, x_m, v_mps)))
+        acting_n = late.popleft()
+        if k < held:
+            # from rest at one end of the stroke to the other, and back
+            to_m = STROKE_M * (1 - math.cos(way * (k + 1) * period_s))
+            put_in_j -= acting_n * (to_m - x_m)
+            x_m, v_mps = to_m, STROKE_M * way * math.sin(way * (k + 1) * period_s)
+            start_j, heading = 0.5 * handle_kg * v_mps**2, math.copysign(1.0, v_mps)
+            continue
+        v_mps += acting_n / handle_kg * period_s
+        x_m += v_mps * period_s
+        if not abs(v_mps) < 100.0:
+            return math.inf, True
+        given_j = max(given_j, 0.5 * handle_kg * v_mps**2 - start_j)
+        if v_mps * heading < -RINGS_MPS:
+            turns, heading = turns + (k > held + SETTLES_S * RATE_HZ), -heading
+    return given_j, given_j > max(put_in_j, 0.0) + ALLOWANCE_J or turns > RINGS
+
+
+def releases(engine: Engine, motion: Motion, delays: Sequence[int] = DELAYS) -> Releases:
+    """Let handles go in the liquid of a motion, with more and more delay until one fails."""
+    given_j, borne = 0.0, -1
+    for delay in delays:
+        cases = itertools.product(HANDLES_KG, PHASES)
+        found = [let_go(engine, motion.setup, handle_kg, phase, delay) for handle_kg, phase in cases]
+        if delay <= 1:
+            given_j = max(given_j, *(one_j for one_j, _ in found))
+        if any(fails for _, fails in found):
+            break
+        borne = delay
+    return Releases(motion.notes["liquid"], given_j, borne)
+
+
+def measure(
+    engine: Engine,
+    over: Sequence[Motion],
+    delays: Sequence[int] = DELAYS,
+    progress: Callable[[str], object] = lambda _line: None,
+) -> tuple[list[Score], list[Releases]]:
+    """Return an engine's score along each motion, and its releases in each of their liquids."""
+    scores = []
+    for motion in over:
+        progress(motion.name)
+        scores.append(score(engine, motion))
+    first = {it.notes["liquid"]: it for it in reversed(over)}
+    let = []
+    for name in LIQUIDS:
+        if name in first:
+            progress(f"handles let go in {name}")
+            let.append(releases(engine, first[name], delays))
+    return scores, let
+
+
+HEADINGS: Final = (
+    "engine", "RMS error, fitted", "not fitted", "greatest error, not fitted", "time of a tick",
+    "energy given", *(f"delay borne, {name.replace('_', ' ')}" for name in LIQUIDS),
+)  # fmt: skip
+
+
+def row(name: str, scores: Sequence[Score], let: Sequence[Releases]) -> list[str]:
+    """Return the cells of an engine below `HEADINGS`: medians over motions of errors and time, the worst release."""
+    fitted = [it.rms for it in scores if it.motion.fitted]
+    others = [it for it in scores if not it.motion.fitted]
+    tick_ns = float(np.median([it.tick_ns for it in scores]))
+    borne = {it.liquid: f"{it.delay / RATE_HZ * 1e3:g} ms" if it.delay >= 0 else "none" for it in let}
+    given_j = max((it.given_j for it in let), default=math.nan)
+    return [
+        name,
+        *(f"{np.median(of):.1%}" if of else "" for of in (fitted, [it.rms for it in others])),
+        f"{max(it.greatest for it in others):.1%}" if others else "",
+        f"{tick_ns:.0f} ns" if tick_ns < 1e4 else f"{tick_ns / 1e3:.0f} µs",
+        f"{1e3 * given_j:.3g} mJ" if math.isfinite(given_j) else "no end" if let else "",
+        *(borne.get(name, "") for name in LIQUIDS),
+    ]
+
+
+def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return rows as Markdown."""
+    marks = ["---", *["--:"] * (len(headings) - 1)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in (headings, marks, *rows))
+
+
+class Program:
+    """A program as an engine, one line to it and one from it at a time."""
+
+    def __init__(self, words: Sequence[str]) -> None:
+        self._name = words[0]
+        try:
+            self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)  # noqa: S603
+        except OSError as error:
+            raise EngineError(f"{words[0]} cannot be started: {error.strerror}") from error
+        self._asked_s, self._late = math.inf, False
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def __call__(self, setup: Mapping[str, float]) -> Step:
+        told = {name: value if math.isfinite(value) else None for name, value in setup.items()}
+        if (said := self._answer(json.dumps(told))) != "ready":
+            raise EngineError(f"{self._name} answered '{said}' to a new ball, not 'ready'")
+        return self._tick
+
+    def _tick(self, t_s: float, x_m: float, v_mps: float) -> float:
+        said = self._answer(f"{t_s!r} {x_m!r} {v_mps!r}")
+        try:
+            return float(said)
+        except ValueError:
+            raise EngineError(f"{self._name} answered '{said}' to a tick, not a number") from None
+
+    def _answer(self, line: str) -> str:
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin is not None  # noqa: S101 - both are pipes
+        assert stdout is not None  # noqa: S101
+        self._asked_s = time.monotonic()
+        try:
+            stdin.write(line + "\n")
+            said = stdout.readline()
+        except OSError:
+            said = ""
+        self._asked_s = math.inf
+        if not said:
+            why = f"gave no answer within {ANSWER_S:g} s" if self._late else f"ended with code {self._process.wait()}"
+            raise EngineError(f"{self._name} {why}")
+        return said.strip()
+
+    def _watch(self) -> None:
+        """End a program that does not answer."""
+        while self._process.poll() is None:
+            time.sleep(0.2)
+            if time.monotonic() - self._asked_s > ANSWER_S:
+                self._late = True
+                self._process.kill()
+
+    def close(self) -> None:
+        """End its input, and the program if it does not end then."""
+        assert self._process.stdin is not None  # noqa: S101
+        assert self._process.stdout is not None  # noqa: S101
+        try:
+            self._process.stdin.close()
+            self._process.wait(2.0)
+        except (OSError, subprocess.TimeoutExpired):
+            self._process.kill()
+            self._process.wait()
+        self._process.stdout.close()
+
+
+@contextmanager
+def engine_of(words: Sequence[str], function: str) -> Iterator[Engine]:
+    """Yield a program, or a function named ``module:function``, as an engine."""
+    if not function:
+        program = Program(words)
+        try:
+            yield program
+        finally:
+            program.close()
+        return
+    module, _, name = function.partition(":")
+    sys.path.insert(0, "")
+    try:
+        found: Any = getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise EngineError(f"--function {function}: {error}; write MODULE:FUNCTION") from error
+    yield found
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Score an engine and print both tables; return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--function", default="", metavar="MODULE:FUNCTION")
+    parser.add_argument("--only", default="", metavar="WORD", help="only motions with this word in their names")
+    parser.add_argument("program", nargs=argparse.REMAINDER)
+    asked = parser.parse_args(words)
+    if bool(asked.program) == bool(asked.function):
+        parser.error("give either a program or --function MODULE:FUNCTION")
+    try:
+        with engine_of(asked.program, asked.function) as engine:
+            over = motions(only=asked.only)
+            scores, let = measure(engine, over, DELAYS, lambda line: print(line, "...", file=sys.stderr))  # noqa: T201
+    except EngineError as error:
+        print(f"score: {error}", file=sys.stderr)  # noqa: T201
+        return 2
+    name = asked.function or Path(asked.program[0]).name
+    each = [
+        [
+            it.motion.name,
+            it.motion.notes["reynolds"],
+            "yes" if it.motion.fitted else "no",
+            f"{it.rms:.1%}",
+            f"{it.greatest:.1%}",
+        ]
+        for it in sorted(scores, key=lambda one: float(one.motion.notes["reynolds"]))
+    ]
+    print(table(("motion", "Re", "fitted", "RMS error", "greatest error"), each))  # noqa: T201
+    print(table(HEADINGS, [row(name, scores, let)]), end="")  # noqa: T201
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,145 @@
+"""The benchmark that other engines can enter: errors, delays and energies are those that theory or other code gives."""
+
+import ast
+import math
+import shutil
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study_app.evidence.cfd import fits, stored_flows
+
+score = fits.score
+SCORE = Path(score.__file__)
+NAME = "reversal-honey-207mmps"
+
+STOKES = """
+import json, math, sys
+for line in sys.stdin:
+    if line.startswith("{"):
+        ball = json.loads(line)
+        print("ready", flush=True)
+    else:
+        t_s, x_m, v_mps = map(float, line.split())
+        print(-3 * math.pi * ball["viscosity_pa_s"] * ball["diameter_m"] * v_mps, flush=True)
+"""
+
+
+def stokes(setup):
+    return lambda _t_s, _x_m, v_mps: -3 * math.pi * setup["viscosity_pa_s"] * setup["diameter_m"] * v_mps
+
+
+def damper(damping_nspm, _setup):
+    return lambda _t_s, _x_m, v_mps: -damping_nspm * v_mps
+
+
+@pytest.fixture
+def alone(tmp_path: Path) -> Path:
+    """The scorer as somebody downloads it, with one table."""
+    (tmp_path / "held_out").mkdir()
+    for name in ("score.py", "SHA256SUMS", f"held_out/{NAME}.csv"):
+        shutil.copy(SCORE.parent / name, tmp_path / name)
+    (tmp_path / "stokes.py").write_text(STOKES)
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_a_program_over_a_pipe_and_a_function_get_the_same_score(alone: Path) -> None:
+    (motion,) = score.motions(only=NAME)
+    scores, let = score.measure(stokes, [motion])
+    expected = score.row("", scores, let)
+    words = [sys.executable, "-I", "score.py", sys.executable, "stokes.py"]
+    done = subprocess.run(words, cwd=alone, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr.splitlines()) == (0, [f"{NAME} ...", "handles let go in honey ..."])
+    cells = [cell.strip() for cell in done.stdout.splitlines()[-1].split("|")[2:-1]]
+    assert cells[:3] + cells[4:] == expected[1:4] + expected[5:]
+    assert f"| {NAME} | 2 | no | {scores[0].rms:.1%} | {scores[0].greatest:.1%} |" in done.stdout
+    assert let[0].delay == 8
+
+
+def test_the_scorer_needs_numpy_alone() -> None:
+    imports = [
+        node for node in ast.walk(ast.parse(SCORE.read_text("utf-8"))) if isinstance(node, ast.Import | ast.ImportFrom)
+    ]
+    named = {getattr(node, "module", None) or node.names[0].name for node in imports}
+    assert {name.partition(".")[0] for name in named} - sys.stdlib_module_names == {"numpy"}
+
+
+@pytest.mark.parametrize(("name", "held_out"), [(NAME, True), ("glycerin-600mmps", False)])
+def test_a_law_alone_has_the_error_that_its_fit_reports(name: str, held_out: bool) -> None:
+    (motion,) = [it for it in score.motions(only=name) if it.name == name]
+    found = score.score(partial(fits.Tick, "unsteady drag", sent=False), motion)
+    (table,) = [it for it in (stored_flows.held_out() if held_out else stored_flows.stored()) if it.case.name == name]
+    judged = fits.judge(fits.MODELS[-1], table, {})
+    assert motion.fitted is not held_out
+    assert found.rms == pytest.approx(judged.share, rel=1e-6)
+    assert found.greatest == pytest.approx(judged.worst_n / np.abs(table.columns["force_n"]).max(), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("damping_nspm", "delay"),
+    [
+        # A handle of 50 g is stable while its damping · 1 ms / 50 g < 2 sin(π / (4 delay + 2)): up to 38 and 7 ticks.
+        (2.0, 16),  # with 32, it still rings after 0.2 s
+        (10.0, 4),
+        (-1.0, -1),
+    ],
+)
+def test_the_delay_borne_is_the_one_of_theory(damping_nspm: float, delay: int) -> None:
+    found = score.releases(partial(damper, damping_nspm), score.motions(only=NAME)[0])
+    assert found.delay == delay
+    assert (found.given_j > 1e-3) == (damping_nspm < 0)
+
+
+@pytest.mark.slow
+def test_the_safety_layer_bears_delays_that_the_law_alone_does_not() -> None:
+    motion = score.motions(only=NAME)[0]
+    alone, sent = (
+        score.releases(partial(fits.Tick, "unsteady drag", sent=sent), motion, (0, 1, 2)) for sent in (False, True)
+    )
+    assert (alone.delay, sent.delay) == (-1, 2)
+    assert sent.given_j < 2e-3
+    assert alone.given_j > 1.0
+
+
+@pytest.mark.parametrize(
+    ("program", "said"),
+    [
+        ("print('yes')", "answered 'yes' to a new ball, not 'ready'"),
+        ("input(); print('ready'); input(); print('much')", "answered 'much' to a tick, not a number"),
+        ("input(); print('ready'); input(); print('nan')", "ended with code 0"),
+        (STOKES.replace("v_mps)", "math.nan)").replace("* v_mps", "* math.nan"), "a force is not a finite number"),
+        ("import sys; sys.exit(7)", "ended with code 7"),
+        ("import time; time.sleep(60)", "gave no answer within 0.5 s"),
+        (None, "cannot be started: No such file or directory"),
+        ("changed", "is not the published table: its checksum is not in SHA256SUMS"),
+    ],
+)
+def test_a_bad_engine_or_table_ends_in_one_line(
+    alone: Path, program: str | None, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(score, "ANSWER_S", 0.5)
+    monkeypatch.setattr(score, "__file__", str(alone / "score.py"))
+    if program == "changed":
+        with (alone / "held_out" / f"{NAME}.csv").open("a") as file:
+            file.write("99,0,0\n")
+    words = ["/nowhere/engine"] if program is None else [sys.executable, "-c", program]
+    assert score.main(["--only", NAME, *words]) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.startswith("score: ")
+    assert last.endswith(said) or said in last
+
+
+def test_a_function_by_its_name(
+    alone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(score, "DELAYS", (0,))
+    monkeypatch.syspath_prepend(alone)
+    (alone / "own_engine.py").write_text("def none(setup):\n    return lambda *tick: 0.0\n")
+    assert score.main(["--function", "own_engine:none", "--only", NAME]) == 0
+    assert "| 100.0% | 100.0% |" in capsys.readouterr().out
+    assert score.main(["--function", "own_engine:nothing"]) == 2
