@@ -8,6 +8,7 @@ from types import NoneType, UnionType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 WORDS = ("kalman", "water", "honey", "prompt", "late", "drag", "wake", "P001")
 
@@ -22,7 +23,7 @@ def filled(kind: Any, rng: np.random.Generator, **given: Any) -> Any:
         return inner[int(rng.integers(len(inner)))]
     if origin is typing.Annotated:
         return filled(inner[0], rng, **given)
-    if kind is np.ndarray or origin is np.ndarray:
+    if kind is np.ndarray or origin in (np.ndarray, NDArray):  # from numpy 2.5 on an alias of its own
         return np.sort(rng.lognormal(0, 1, 12))
     if origin is tuple and not (len(inner) == 2 and inner[1] is ...):
         return tuple(filled(one, rng, **given) for one in inner)

@@ -31,7 +31,7 @@ def signatures() -> list[str]:
     for name in api.__all__:
         thing = getattr(api, name)
         if inspect.isclass(thing):
-            fields = [one for one in vars(thing).get("__annotations__", {}).items() if not one[0].startswith("_")]
+            fields = [one for one in inspect.get_annotations(thing).items() if not one[0].startswith("_")]
             lines += [f"{name}.{key}: {kind}" for key, kind in fields]
             methods = {key: one for key, one in vars(thing).items() if not key.startswith("_")}
             shown = {key: one.fget if isinstance(one, property) else one for key, one in methods.items()}

@@ -31,7 +31,7 @@ def test_a_layout_that_is_added_to_that_of_a_widget_leaves_no_wrapper_of_its_ite
     outer, inside = QVBoxLayout(), QWidget()
     inside.setLayout(outer)
     outer.addLayout(inner := hbox(QLabel("a"), STRETCH))
-    assert len(wrapped()) == before + 2, "PySide makes none any more: add_layout need not release them"
+    assert len(wrapped()) in {before, before + 2}  # none with PySide 6.12: then add_layout releases nothing
     shiboken6.delete(inside)
     del inner
     between, other = len(wrapped()), QWidget()

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -125,6 +126,13 @@ def test_an_error_of_ffmpeg_that_is_no_system_error_stops_it_too(clip: Path, mon
     footage.close()
 
 
+def unreadable_name(clip: bytes) -> bytes:
+    """Damage the name of the handler; PyAV ignores it from version 19 on."""
+    if int(version("av").partition(".")[0]) >= 19:
+        pytest.skip("this version of PyAV reads such a file")
+    return clip.replace(b"VideoHandler", b"\xff" * 12)
+
+
 @pytest.mark.parametrize(
     "damage",
     [
@@ -133,7 +141,7 @@ def test_an_error_of_ffmpeg_that_is_no_system_error_stops_it_too(clip: Path, mon
         lambda clip: clip[: len(clip) // 2],
         lambda clip: clip.replace(b"avc1", b"zzzz"),  # a codec that there is not
         lambda clip: clip.replace(b"trak", b"zzzz"),
-        lambda clip: clip.replace(b"VideoHandler", b"\xff" * 12),
+        unreadable_name,
         lambda _clip: b"ffconcat version 1.0\nfile clip.mp4\n",
         lambda _clip: b"#EXTM3U\n#EXTINF:1,\nclip.mp4\n",
     ],

@@ -66,6 +66,7 @@ class SocketLink(io.RawIOBase):
         try:
             self._socket = socket.create_connection((host, port), within_s)
         except OSError as error:
+            super().close()  # without a connection there is nothing to close when this object goes
             raise FAILURES.failure("no-service", f"{host}:{port}: {error.strerror or error}") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 

@@ -90,6 +90,7 @@ def test_no_question_keeps_a_hand_from_the_force_stop_or_from_escape(running, qt
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(sys.version_info >= (3, 12), reason="from Python 3.12 on None is immortal: no count ends a program")
 def test_repainting_the_live_plots_keeps_no_reference_to_none(running, health):
     """The PySide pin: from 6.10 on this count drifts with every repaint until the interpreter aborts."""
     for _ in range(5):

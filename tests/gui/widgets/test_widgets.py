@@ -17,15 +17,16 @@ from study_app.gui.widgets.live_plots import TracePlot
 
 
 def test_what_was_changed_is_painted_at_once_and_not_again_later(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    painted: list[int] = []
+    paint = TracePlot.paintEvent
+    monkeypatch.setattr(TracePlot, "paintEvent", lambda self, event: (painted.append(1), paint(self, event))[1])
     plot = TracePlot(10.0, 50.0)
     qtbot.addWidget(plot)
     plot.resize(420, 200)
     plot.show()
     qtbot.waitExposed(plot)
     QApplication.processEvents()
-    painted: list[int] = []
-    paint = TracePlot.paintEvent
-    monkeypatch.setattr(TracePlot, "paintEvent", lambda self, event: (painted.append(1), paint(self, event))[1])
+    painted.clear()
     times_s = np.linspace(-10, 0, 100)
     for turn in range(5):
         plot.show_traces(times_s, np.column_stack([np.sin(times_s + turn)] * 3))
