@@ -6,6 +6,7 @@ screens and the clock's origin. It is written before the first trial, when the s
 the status, at the end.
 """
 
+import hashlib
 import json
 import platform
 from collections.abc import Iterable, Mapping
@@ -28,6 +29,7 @@ GENERATOR = (
     "used, under Fisher-Yates in Durstenfeld's form"
 )
 UNFINISHED = "unfinished"
+CHANGING = ("status", "reason", "ended_at", "resumed", "outlets_lost")
 
 _LIBRARIES = ("numpy", "numba", "pydantic", "PySide6-Essentials", "pyqtgraph", "pyarrow")
 
@@ -114,6 +116,12 @@ def write(path: Path, receipt: Mapping[str, Any]) -> None:
     """Write the receipt in one step."""
     text = json.dumps(plain(dict(receipt)), indent=2, ensure_ascii=False, allow_nan=False)
     write_file(path, f"{text}\n".encode("utf-8", "backslashreplace"))
+
+
+def digest(held: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of a receipt, or of one of its entries in ``resumed``, without what changes later."""
+    lasting = {name: value for name, value in held.items() if name not in CHANGING}
+    return hashlib.sha256(json.dumps(plain(lasting), sort_keys=True).encode()).hexdigest()
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -17,7 +17,16 @@ from study_app.store.tables.columns import TABLES
 from tests.journal_lines import event_from, raw
 
 RECORDED: dict[str, dict[str, Any]] = json.loads((Path(__file__).parent / "format_1.json").read_text())
-UNEQUAL = ("at", "previous", "version", "sha256", "frames_sha256", "opened_sha256", "opened_frames_sha256")
+UNEQUAL = (
+    "at",
+    "previous",
+    "version",
+    "receipt_hash",
+    "sha256",
+    "frames_sha256",
+    "opened_sha256",
+    "opened_frames_sha256",
+)
 """Fields of the journal that differ from run to run or with the program's version."""
 
 ADDED = ("text_sha256", "study_version", "limiter_saturated")

@@ -4,7 +4,9 @@
 writes no file.
 """
 
+import re
 from functools import partial
+from pathlib import Path
 from typing import get_args
 
 from PySide6.QtCore import QRectF, Qt, QTimer, Signal
@@ -49,6 +51,7 @@ SAMPLE = "I think this feels like interacting with a liquid."
 MOST_SAMPLE = 2.4
 SHOWN_MS = 4000
 NUMBER_SHARE = 0.42  # of the screen's height
+STAMPS = "Such as https://freetsa.org/tsr. Leave empty for none."
 PORTS = "One byte per event: serial:/dev/ttyUSB0, serial:COM3 or parallel:/dev/parport0. Leave empty for none."
 
 
@@ -56,6 +59,22 @@ def _port(text: str) -> str:
     if text and not is_port(text):
         raise ValueError(f"This is not the address of a port. {PORTS}")
     return text
+
+
+def _server(text: str) -> str:
+    if not re.fullmatch(r"(https?://\S+)?", text):
+        raise ValueError(f"This is not the address of a server. {STAMPS}")
+    return text
+
+
+def _there(text: str) -> str | None:
+    if text and not Path(text).exists():
+        raise ValueError(f"There is no {text}: choose another, or leave the field empty.")
+    return text or None
+
+
+def _or_empty(value: str | None) -> str:
+    return value or ""
 
 
 SAMPLES = {
@@ -72,7 +91,16 @@ FIELDS = (
     Field("photodiode", "Square for a photodiode in the tank's corner", "switch"),
     choice("device", "Device", {name: title_of(name) for name in list_devices()}),
     Field("camera", "Camera of conditions that show one", longest=CAMERA_LENGTH, placeholder=USUAL),
-)
+    Field(
+        "proofs", "Folder for the study's proof, written when a session ends", "folder",
+        hint="Where people who can change results cannot write. Leave empty for none.", parse=_there, write=_or_empty,
+    ),
+    Field("stamps", "Server that stamps proofs with the time (RFC 3161)", hint=STAMPS, parse=_server),
+    Field(
+        "stamp_root", "Root certificate of the server (PEM), to verify its stamps", "file",
+        file_filter="Certificates (*.pem *.crt *.cer)", parse=_there, write=_or_empty,
+    ),
+)  # fmt: skip
 OF_PROGRAM = tuple(  # what has a title in `MachineSettings`: one of a few words, or a switch
     choice(name, found.title, {word: word.capitalize() for word in words})
     if (words := get_args(found.annotation))
@@ -223,6 +251,7 @@ class MachinePlace(Place):
                 self.screens,
                 card("Text size for the participant", *seen),
                 card("Other programs", "lsl_markers", "lsl_samples", Rule(), "triggers"),
+                card("Proofs kept elsewhere", "proofs", "stamps", "stamp_root"),
             ),
             (
                 card("Display offset", self.offset, Rule(), "photodiode"),

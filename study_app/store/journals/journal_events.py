@@ -274,6 +274,7 @@ class EndOfTask(OfAttempt, group=True):
 class SessionStarted(Event):
     """The session began: always the first line.
 
+    `receipt_hash` is the SHA-256 of the receipt without what changes later (of `session_resumed`: of its entry there);
     `measures_sealed` says whether sealed columns are encrypted, `own_codes` whether codes are the participant's own.
     """
 
@@ -289,6 +290,7 @@ class SessionStarted(Event):
     recordings: Flag
     key_hash: Text
     protocol_hash: Text
+    receipt_hash: Text | None = None
     version: Text
     row_of: ParticipantId | None = None
     device: Text | None
@@ -309,6 +311,7 @@ class SessionResumed(Event):
     torn_bytes: Integer
     device: Text | None
     version: Text
+    receipt_hash: Text | None = None
 
 
 class Allocated(Event):

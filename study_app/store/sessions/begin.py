@@ -4,7 +4,7 @@ import contextlib
 import re
 import shutil
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -409,7 +409,7 @@ def _open(
     store = SessionStore(place, journal, key, session_receipt, opening, recorder=recorder)
     with contextlib.ExitStack() as failing:
         failing.callback(journal.close)
-        store.append(started, t_s=0.0)
+        store.append(replace(started, receipt_hash=receipt.digest(session_receipt)), t_s=0.0)
         note_allocation(store)
         store.write_tables()
         if store.behind is not None:

@@ -136,17 +136,17 @@ def reopen(
         failing.callback(store.close)
         at_s = round(clock.seconds(), 6)
         version, name = study_app.__version__, device.get("name")
-        store.append(
-            events.SessionResumed(**gap, torn_bytes=contents.torn_bytes, device=name, version=version), t_s=at_s
-        )
+        around = surroundings(protocol, device, screens, clock, motors_masked, outlets, video)
+        entry = {"at": clock.at(at_s), **gap, **around}
+        told: dict[str, Any] = {"torn_bytes": contents.torn_bytes, "device": name, "version": version}
+        store.append(events.SessionResumed(**gap, **told, receipt_hash=receipt.digest(entry)), t_s=at_s)
         note_allocation(store)
         sweep(folder.path)
         if is_there(folder.recordings):
             sweep(folder.recordings)
         for event in _recordings_found(folder, contents.lines, left.key) if left.start.recordings else ():
             store.append(event)
-        around = surroundings(protocol, device, screens, clock, motors_masked, outlets, video)
-        store.note_resumed({"at": clock.at(at_s), **gap, **around})
+        store.note_resumed(entry)
         store.write_tables()
         write_description(study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions))
         write_participants(study_folder, left.place.study)

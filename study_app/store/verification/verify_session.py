@@ -251,6 +251,8 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
     compared = [name for name in (*receipt.COPIED_FIELDS, "row_of") if name in held or name == "row_of"]
     differing = [name for name in compared if held.get(name) != getattr(start, name)]
     differing += _differing(held, lines)
+    if not differing and start.receipt_hash not in (None, receipt.digest(held)):
+        differing = ["what the session began with"]
     if differing:
         found.error(path, f"{', '.join(differing)}: differ from the journal")
     if key is not None and not _is_protocol(held, start, key):
@@ -275,7 +277,8 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
 
 def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[str]:
     """Return the fields of a receipt that the journal contradicts, beside those that are copied from its first line."""
-    start, resumed = events.start_of(lines), [line.at for line in lines if isinstance(line, events.SessionResumed)]
+    start = events.start_of(lines)
+    resumed = {line.at: line.receipt_hash for line in lines if isinstance(line, events.SessionResumed)}
     expected: dict[str, Any] = {"started_at": start.at}
     if not isinstance(lines[-1], events.SessionEnded):
         expected |= {"status": receipt.UNFINISHED, "reason": "", "ended_at": None}
@@ -288,8 +291,10 @@ def _differing(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[s
         "versions": ("liquid-study", start.version),
     }
     found += [name for name, (part, value) in parts.items() if held.get(name, {}).get(part) != value]
-    if not all(isinstance(entry, dict) and entry.get("at") in resumed for entry in held.get("resumed", ())):
-        found.append("resumed")
+    for entry in held.get("resumed", ()):
+        at = str(entry.get("at")) if isinstance(entry, dict) else ""
+        if at not in resumed or resumed[at] not in (None, receipt.digest(entry)):
+            found.append("resumed")
     return found
 
 

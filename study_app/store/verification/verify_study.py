@@ -9,6 +9,7 @@ checked separately, and the data that must agree between them.
 from __future__ import annotations
 
 import contextlib
+import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from datetime import datetime
@@ -232,19 +233,20 @@ def _copy(
     for told in proof.told:
         found.warning(study.path, f"{path} {told}")
     erased: set[tuple[str, str]] = set()
-    for participant, tombstone in withdrawn.items():
-        folders = [study.session(participant, one.session) for one in tombstone.sessions]
-        own = {(one.fingerprint, place_of(study, at)) for one, at in zip(tombstone.sessions, folders, strict=True)}
-        if own.isdisjoint(proof.lines):
-            continue
-        erased |= {*own, *(line for line in proof.lines if line[1] == f"{study.exclusions.name}/sub-{participant}")}
-        if (told_of := proof_of_withdrawal(tombstone)) not in proof.lines:
-            advice = f"if {participant} asked for it, add the line: {checked_line(*told_of)}"
-            found.error(study.withdrawals, f"the withdrawal of {participant} is not in {path}: {advice}")
-    copy = [line for line in proof.lines if line not in erased]
     there: Proofs = ()
     with contextlib.suppress(StoreError):  # said already
         there = records(study)
+    kept = _as_named(proof.lines, [*withdrawn, *(one.place.folder.participant for one in sessions)], there)
+    for participant, tombstone in withdrawn.items():
+        folders = [study.session(participant, one.session) for one in tombstone.sessions]
+        own = {(one.fingerprint, place_of(study, at)) for one, at in zip(tombstone.sessions, folders, strict=True)}
+        if own.isdisjoint(kept):
+            continue
+        erased |= {*own, *(line for line in kept if line[1] == f"{study.exclusions.name}/sub-{participant}")}
+        if (told_of := proof_of_withdrawal(tombstone)) not in kept:
+            advice = f"if {participant} asked for it, add the line: {checked_line(*told_of)}"
+            found.error(study.withdrawals, f"the withdrawal of {participant} is not in {path}: {advice}")
+    copy = [line for line in kept if line not in erased]
     for record, place in copy:
         if not place.startswith("data/") and (record, place) not in there:
             what = f"lacks what {path} lists as {record} ({place}): it was deleted or changed"
@@ -255,6 +257,15 @@ def _copy(
         if one.fingerprint and not one.running and place_of(study, one.place.folder) not in known:
             lacks = f"(its fingerprint is {one.fingerprint}) is not in {path}"
             found.error(one.place.folder.path, f"{lacks}: it was added, or ended, after that copy was made")
+
+
+def _as_named(lines: Proofs, participants: Iterable[str], there: Proofs) -> Proofs:
+    """Return lines that may have been typed in capitals with the participants as they are written in the study."""
+    known = {*participants, *(place.rpartition("sub-")[2] for _, place in there)}
+    names = {name.lower(): name for name in known} | {name: name for name in known}
+    return tuple(
+        (proof, re.sub(r"(?<=/sub-)\w+", lambda found: names.get(found[0], found[0]), place)) for proof, place in lines
+    )
 
 
 def _compare(

@@ -54,3 +54,23 @@ def test_what_is_being_typed_stays_if_something_else_is_set(real_place, qtbot):
     assert camera.text() == "v4l2:/dev/vid"
     qtbot.keyClick(camera, Qt.Key.Key_Escape)
     assert camera.text() == "tcp://127.0.0.1:5000"
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "bad"), [("proofs", ".", "nowhere"), ("stamps", "https://a.b/c", "a.b"), ("stamp_root", ".", "x")]
+)
+def test_where_proofs_go_is_set_and_taken_back_here(real_place, qtbot, tmp_path, monkeypatch, name, good, bad):
+    monkeypatch.chdir(tmp_path)
+    editor = real_place.editors[name]
+    for typed, value in ((good, good), ("", MachineSettings.model_fields[name].default)):
+        editor.control.selectAll()
+        with qtbot.waitSignal(real_place.changed) as heard:
+            qtbot.keyClicks(editor.control, typed) if typed else qtbot.keyClick(editor.control, Qt.Key.Key_Delete)
+            qtbot.keyClick(editor.control, Qt.Key.Key_Return)
+        assert heard.args == [{name: value}]
+        show_settings(real_place, MachineSettings.model_validate({name: value}))
+        assert editor.control.text() == typed
+    with qtbot.assertNotEmitted(real_place.changed):
+        qtbot.keyClicks(editor.control, bad)
+        qtbot.keyClick(editor.control, Qt.Key.Key_Return)
+    assert "eave" in editor.below.text()

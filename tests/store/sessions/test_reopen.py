@@ -95,6 +95,7 @@ def test_it_goes_on_after_the_last_line_and_says_so(start: Start, again: Again) 
         "operator": "CD",
         "device": "mouse",
         "version": __version__,
+        "receipt_hash": receipt.digest(receipt.read(store.folder.receipt)["resumed"][0]),
     }
     assert line.t_s == pytest.approx(40 + 72_000.25, abs=0.01)
     since = datetime.fromisoformat(line.at) - last_at

@@ -61,8 +61,10 @@ def forging(
     """Return what changes the journal, and the receipt, and computes checksums and fingerprints anew if ``covered``."""
 
     def act(study: Path) -> None:
-        forge(study / JOURNAL, edit, chained=chained)
         of_receipt(study, **of_the_receipt)
+        forge(study / JOURNAL, edit, chained=chained)
+        digest = receipt.digest(receipt.read(study / P007 / "receipt.json"))
+        forge(study / JOURNAL, of_start(receipt_hash=digest), chained=chained)
         if covered:
             cover_up(study)
 

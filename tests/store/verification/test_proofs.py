@@ -48,9 +48,10 @@ def study(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def forging(edit: Callable[[Lines], object], *, covered: bool = True, **of_the_receipt: object) -> Act:
     def act(study: Path) -> None:
-        forge(study / P001 / "journal.jsonl", edit)
         path = study / P001 / "receipt.json"
-        receipt.write(path, receipt.read(path) | of_the_receipt)
+        receipt.write(path, held := receipt.read(path) | of_the_receipt)
+        forge(study / P001 / "journal.jsonl", edit)
+        forge(study / P001 / "journal.jsonl", of_start(receipt_hash=receipt.digest(held)))
         if covered:
             cover_up(study)
 
@@ -233,8 +234,9 @@ def test_lines_of_records_are_compared_and_a_withdrawal_that_was_asked_for_adds_
     lines = [line.split()[1] for line in kept.read_text().splitlines()]
     names = ["withdrawals.jsonl/sub-P003", "reveals.jsonl", "exclusions.csv/sub-P002"]
     assert lines == [P001, P001.replace("1/", "2/"), *names]
-    found = verify(study, kept)
-    assert found.errors == ()
+    typed = study.parent / "typed.txt"
+    typed.write_text(kept.read_text().upper())
+    assert verify(study, kept).errors == verify(study, typed).errors == ()
     (study / "blinding" / "reveals.jsonl").write_bytes(b"")
     assert "reveals.jsonl: lacks what" in "\n".join(map(str, verify(study, kept).errors))
     words = ("withdraw", str(study), "--participant", "P002", "--by", "AK", "--reason", "asked")

@@ -5,10 +5,13 @@ from typing import Any
 
 import pytest
 
+from study_app.protocol.model import Protocol
+from study_app.store import receipt
 from study_app.store.journals import journal, journal_events
+from study_app.store.sessions import recovery
 from study_app.store.verification.verify_study import verify
 from tests.journal_lines import event_of
-from tests.store.conftest import Start
+from tests.store.conftest import SOURCE, Start
 from tests.store.forging import forge
 from tests.store.verification.findings import PARTICIPANTS, SESSION, replace, told, warned
 
@@ -122,3 +125,22 @@ def test_samples_that_were_dropped_are_known(study: Path) -> None:
     (first,) = [n for n, line in enumerate(journal.read(path)) if line.event == "recorded" and line.trial == 1]
     forge(path, lambda lines: lines[first].update(samples_unrecorded=7))
     assert "recordings/trial-001.parquet: lacks 7 samples" in warned(verify(study))
+
+
+def test_every_change_to_the_receipt_of_a_session_that_has_not_ended_is_an_error(
+    study: Path, start: Start, protocol: Protocol
+) -> None:
+    start("P009").close()
+    path = study / "data/sub-P009/ses-01/receipt.json"
+    recovery.reopen(
+        path.parent, protocol, SOURCE, operator="AB", device={"name": "mouse", "rate_hz": 9}, screens={}
+    ).close()
+    assert told(verify(study)) == ""
+    held = receipt.read(path)
+    (again,) = held["resumed"]
+    changes = [{name: value | {"rate_hz": 5}} for name, value in held.items() if isinstance(value, dict)]
+    changes += [{name: f"{value}x"} for name, value in held.items() if isinstance(value, str)]
+    changes += [{"resumed": [again | {"device": {"name": "mouse"}}]}, {"resumed": [again | {"at": [3]}]}, {"new": 1}]
+    for change in changes:
+        receipt.write(path, held | change)
+        assert "sub-P009/ses-01/receipt.json: " in told(verify(study)), change
