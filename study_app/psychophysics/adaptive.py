@@ -190,8 +190,10 @@ class Observers:
         In u.
     width : float or (tracks,) array
         From 5 to 95 %, in u.
-    guess, lapse : float
+    guess, lapse : float or (tracks,) array
         Guess rate and lapse rate.
+    moves : float or (tracks,) array
+        By how much the threshold rises from the first trial to the last, in u.
     presented : callable, optional
         Maps requested to presented levels, both in u; by default they are equal.
     """
@@ -199,15 +201,20 @@ class Observers:
     family: Family
     thresholds: Floats
     width: ArrayLike
-    guess: float
-    lapse: float
+    guess: float | Floats
+    lapse: float | Floats
+    moves: float | Floats = 0.0
     presented: Callable[[Floats], Floats] | None = None
 
-    def probability(self, levels: ArrayLike) -> Floats:
-        """Return the probability of a success at ``levels``, one for each track or one for all."""
+    def probability(self, levels: ArrayLike, done: ArrayLike = 0.5) -> Floats:
+        """Return the probability of a success at ``levels``, one for each track or one for all.
+
+        ``done`` is the share of the trials before, from 0 to 1.
+        """
         if self.presented is not None:
             levels = self.presented(np.asarray(levels, float))
-        return success(self.family, levels, self.thresholds, self.width, self.guess, self.lapse)
+        thresholds = self.thresholds + np.asarray(self.moves, float) * (np.asarray(done, float) - 0.5)
+        return success(self.family, levels, thresholds, self.width, self.guess, self.lapse)
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +267,8 @@ def constant_tracks(levels: Sequence[float], repetitions: int, observers: Observ
         Uniform numbers in [0, 1).
     """
     presented = np.tile(np.asarray(levels, float), (len(draws), repetitions))
-    return Answers(presented, draws < observers.probability(presented.T).T)
+    done = np.linspace(0.0, 1.0, presented.shape[1])[:, None]
+    return Answers(presented, draws < observers.probability(presented.T, done).T)
 
 
 def staircase_tracks(
@@ -284,7 +292,7 @@ def staircase_tracks(
     now, running = np.full(tracks, staircase.begin), np.ones(tracks, bool)
     in_a_row, reversals, before = np.zeros(tracks, int), np.zeros(tracks, int), np.zeros(tracks)
     for trial in range(trials):
-        right = draws[:, trial] < observers.probability(now)
+        right = draws[:, trial] < observers.probability(now, trial / max(1, trials - 1))
         levels[running, trial], successes[:, trial] = now[running], right & running
         in_a_row = np.where(right, in_a_row + 1, 0)
         steps_down = in_a_row == staircase.down_after
@@ -339,7 +347,7 @@ def search_tracks(
             ends = [[quantile(search.grid.thresholds, one, p) for p in (0.025, 0.975)] for one in posterior.sum(axis=2)]
             running &= np.diff(np.asarray(ends, float), axis=1)[:, 0] > stop[0]
         place = search.next_of(posterior) if trial or begin is None else np.full(tracks, begin)
-        right = draws[:, trial] < observers.probability(at[place])
+        right = draws[:, trial] < observers.probability(at[place], trial / max(1, trials - 1))
         levels[running, trial], successes[:, trial] = at[place[running]], right & running
         answered = psi[place]
         posterior *= np.where(right[:, None, None], answered, 1.0 - answered)

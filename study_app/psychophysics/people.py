@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Final, Literal, NamedTuple
@@ -74,6 +74,8 @@ KINDS: Final = {
     "fatigue": Person(change=1.5),
 }
 """People who differ in one respect each."""
+ALONE: Final = {name: one for name, one in KINDS.items() if not one.criterion and not one.repeats}
+"""Those whom counts of answers describe: preferences are removed from the answers of the others."""
 MIXED: Final = "all of these"
 """Of a group of people drawn at random."""
 
@@ -124,8 +126,8 @@ class Expected:
         Of one standard.
     standards : int
         Number of standards in the group's mean.
-    halves : tuple of float
-        Half the 95 % interval of one participant, in u, for each width of observers; infinite if nothing is measured.
+    halves : mapping of str to float
+        Half the 95 % interval of one participant, in u, for each kind of people; infinite if nothing is measured.
     spread : float
         Standard deviation of the estimate's error, in u; infinite if nothing is measured.
     threshold : float
@@ -135,14 +137,24 @@ class Expected:
     spacing: Literal["log", "linear"]
     trials: int
     standards: int
-    halves: tuple[float, ...]
+    halves: Mapping[str, float]
     spread: float
     threshold: float
 
     @property
     def measured(self) -> bool:
         """Whether there are estimates: levels are not clipped."""
-        return math.isfinite(max(self.halves))
+        return math.isfinite(self.worst[1])
+
+    @property
+    def median(self) -> float:
+        """The median of `halves`, the higher of two."""
+        return sorted(self.halves.values())[len(self.halves) // 2]
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """The kind of people with the widest interval, and half of it."""
+        return max(self.halves.items(), key=lambda one: one[1])
 
     def of_group(self, participants: int, trials: float | None = None) -> float:
         """Return half the 95 % interval of a group's mean over all standards, as a share of the mean.

@@ -90,7 +90,7 @@ def of_delivery() -> Iterator[str]:
     for errors in ([0.1, 0.3], [None, 0.2], [None, None], [0.1, 0.2, 0.5, None]):
         yield f"difference {errors} {told(delivery.difference(errors, [bool(one % 2) for one in range(len(errors))]))}"
     for spacing, half in product(("log", "linear"), (0.2, math.inf)):
-        one = people.Expected(spacing, 40, 2, (half,), half / 2, 0.3)
+        one = people.Expected(spacing, 40, 2, {"": half}, half / 2, 0.3)
         groups = [one.of_group(people, trials) for people in (1, 2, 8) for trials in (None, 80.0)]
         yield f"{told(one)}: {one.measured} {told(groups)}"
         for within in (0.05, 0.3):

@@ -22,7 +22,6 @@ from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.errors import AnalysisError
 from study_app.protocol.checks.expected_precision import (
-    WIDTHS,
     MeanPlan,
     RatingPlan,
     SensitivityPlan,
@@ -32,7 +31,7 @@ from study_app.protocol.checks.expected_precision import (
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.table import text_in
 from study_app.protocol.trials.tracks import standards_of
-from study_app.psychophysics.people import BETWEEN_PEOPLE, ESTIMATE_NOISE
+from study_app.psychophysics.people import ALONE, BETWEEN_PEOPLE, ESTIMATE_NOISE, Person
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
 BATCH: Final = 10
@@ -117,7 +116,9 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
     own = means + apart / math.log(10) if log else means * np.exp(apart)
     shape = (BATCH, people, plan.standards)
     each, truth = plan.each_standard(), np.broadcast_to(own, shape)
-    parts = [_estimates(one, part, rng) for one, part in zip(each, np.split(truth, len(each), 2), strict=True)]
+    first = case.seed[-1] * BATCH
+    kinds = [_kind_of(first + place)[1] for place in range(BATCH)]
+    parts = [_estimates(one, part, kinds, rng) for one, part in zip(each, np.split(truth, len(each), 2), strict=True)]
     medians, variances = (np.concatenate(it, 2) for it in zip(*parts, strict=True))
     errors = (medians - truth) * (math.log(10) if log else 1 / truth)
     found = PrecisionResult()
@@ -154,12 +155,23 @@ def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Pr
     return found
 
 
-def _estimates(plan: ThresholdPlan, truth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return posterior medians and variances of observers with these thresholds (studies, people, standards) [u]."""
+def _kind_of(study: int) -> tuple[str, Person]:
+    """Return the kind of people of a study: kinds take turns."""
+    return [*ALONE.items()][study % len(ALONE)]
+
+
+def _estimates(
+    plan: ThresholdPlan, truth: Array, kinds: Sequence[Person], rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Return posterior medians and variances of observers with these thresholds (studies, people, standards) [u].
+
+    In each study all observers are of one of ``kinds``.
+    """
     studies, people, standards = truth.shape
     own, at_once = truth.transpose(0, 2, 1).reshape(-1), max(1, TRACKS_AT_ONCE // people) * people
+    who = [kind for kind in kinds for _ in range(people * standards)]
     starts = range(0, len(own), at_once)
-    found = [plan.simulate(own[first : first + at_once], rng, WIDTHS, people) for first in starts]
+    found = [plan.simulate(own[first : first + at_once], rng, who[first : first + at_once], people) for first in starts]
     medians, variances = (
         np.concatenate(it).reshape(studies, standards, people).transpose(0, 2, 1)
         for it in zip(*((one.medians, one.variances) for one in found), strict=True)
@@ -303,8 +315,25 @@ def threshold_markdown(precisions: Precisions) -> str:
                 spread = f"{found.spread:.0%}" if math.isfinite(found.spread) else "–"
                 cells = (str(trials), str(size), spread, f"±{half:.0%}" if math.isfinite(half) else "–")
                 lines.append(f"| {' | '.join((*cells, *([share] if wanted else [])))} |")
+        lines += _of_kinds(precisions, block)
     lines += _contrasts(precisions)
     return "\n".join(lines) + "\n"
+
+
+def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
+    """Yield how wide the largest group's interval is with the most trials, over kinds of people: median and worst."""
+    trials = max(trials for of_block, trials in precisions.found if of_block == block)
+    halves = [one[-1] for one in precisions.found[block, trials].halves]
+    if not isinstance(plans(precisions.protocol, (trials,))[block][trials], ThresholdPlan) or len(halves) < len(ALONE):
+        return
+    medians = {name: float(np.median(halves[place :: len(ALONE)])) for place, name in enumerate(ALONE)}
+    worst = max(medians, key=lambda name: medians[name])
+    if math.isfinite(medians[worst]):
+        yield ""
+        yield (
+            f"By kind of people, {precisions.sizes[-1]} participants and {trials} trials: ±"
+            f"{sorted(medians.values())[len(ALONE) // 2]:.0%} (median), ±{medians[worst]:.0%} at worst ({worst})."
+        )
 
 
 def _contrasts(precisions: Precisions) -> Iterator[str]:
@@ -341,9 +370,10 @@ def _assumed(plans_of_block: Mapping[int, Plan]) -> str:
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):
         return (
-            "Observers answer by a psychometric function half, once or twice as wide as the prior's median, with a "
-            "lapse rate of 2 %; the mean of their thresholds is in the middle half of the levels. The group's interval "
-            "is that of the mean over all standards (Hartung–Knapp)."
+            "The people of a study are of one kind; kinds take turns: psychometric functions as wide as the prior's "
+            "median, half, 1.5 and 2.5 times as wide, 2 or 5 % of answers at random, thresholds that fall or rise. "
+            "The mean of their thresholds is in the middle half of the levels. The group's interval is that of the "
+            "mean over all standards (Hartung–Knapp)."
         )
     group = "The group's interval is that of the mean (Student)."
     if isinstance(plan, SensitivityPlan):

@@ -22,7 +22,7 @@ from study_app.protocol.orders.sequences import row_count
 from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.trials.presented_levels import clipping
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.people import BETWEEN_PEOPLE
+from study_app.psychophysics.people import BETWEEN_PEOPLE, Person
 from study_app.workers.client import WorkerClient
 from study_app.workers.server import Send, Stop, Stopped
 
@@ -181,7 +181,7 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
     first: ObserverAnswers | None = None
     for _ in range(0, OBSERVERS, AT_ONCE):
         check()
-        answered = plan.answers(np.full(AT_ONCE, u), random, lapses)
+        answered = plan.answers(np.full(AT_ONCE, u), random, (Person(lapse=lapses),))
         medians.append(plan.estimates(answered).medians)
         presented += [one.levels[~np.isnan(one.levels)] for one in answered.tracks]
         if first is None:
@@ -224,7 +224,7 @@ def measurable(
         levels, held = [], []
         for _ in range(0, OBSERVERS, AT_ONCE):
             check()
-            answered = plan.answers(np.full(AT_ONCE, u), random, lapses)
+            answered = plan.answers(np.full(AT_ONCE, u), random, (Person(lapse=lapses),))
             estimates = plan.estimates(answered)
             levels += [stimulus.level_of(one) for one in estimates.medians.tolist()]
             held.append((estimates.lows <= u) & (u <= estimates.highs))

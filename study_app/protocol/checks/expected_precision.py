@@ -36,7 +36,7 @@ from study_app.psychophysics.adaptive import Answers, Observers
 from study_app.psychophysics.detection import NORMAL, rating
 from study_app.psychophysics.families import Floats
 from study_app.psychophysics.grid import Z_95, fit, group_widths
-from study_app.psychophysics.people import ESTIMATE_NOISE, Estimates, Expected
+from study_app.psychophysics.people import ALONE, ASSUMED, ESTIMATE_NOISE, Estimates, Expected, Person
 
 D_PRIME: Final = 1.0
 """Of simulated participants. [choice]"""
@@ -173,7 +173,7 @@ def expected_mean(plan: MeanPlan) -> Expected:
     """Return how precise the d′, d_a or exponent of one participant, and their mean, are expected to be."""
     found = plan.estimates(np.full(MEAN_OBSERVERS, plan.value), np.random.default_rng(SEED))
     spread = float(found.std())
-    return Expected("linear", plan.trials, standards=1, halves=(Z_95 * spread,), spread=spread, threshold=plan.value)
+    return Expected("linear", plan.trials, standards=1, halves={"": Z_95 * spread}, spread=spread, threshold=plan.value)
 
 
 OBSERVERS: Final = 200
@@ -181,9 +181,6 @@ OBSERVERS: Final = 200
 PEOPLE: Final = 10
 """Of a study, unless it is said how many."""
 SEED: Final = 1
-LAPSES: Final = 0.02
-WIDTHS: Final = (0.5, 1.0, 2.0)
-"""Of simulated observers, as shares of the prior's median: one in three each, so that the prior is wrong, too."""
 FALSE_ALARMS: Final = 0.1
 """Of simulated observers, where the guess rate is free. [choice]"""
 MOST_WORK: Final = 700_000_000
@@ -270,17 +267,19 @@ class ThresholdPlan:
         with np.errstate(divide="ignore"):  # a level of 0 has the logarithm −∞
             return np.log10(np.maximum(found, 0.0)) if log else found
 
-    def answers(
-        self, thresholds: Floats, random: Generator, lapses: float = LAPSES, widths: Sequence[float] = (1.0,)
-    ) -> ObserverAnswers:
-        """Return what observers with thresholds (n,) [u] answer; ``widths`` [prior's median] take turns among them."""
+    def answers(self, thresholds: Floats, random: Generator, people: Sequence[Person] = (ASSUMED,)) -> ObserverAnswers:
+        """Return what observers with thresholds (n,) [u] answer: ``people``, one for each or one for all."""
         stimulus, design = self.stimulus, self.design
         assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
+        columns = np.array([(one.width, one.lapse, one.change) for one in people]).T
+        width, lapse, change = columns if len(people) > 1 else columns[:, 0]
         if guess is None:
-            guess = lapses if guesses_of(stimulus, design) is None else FALSE_ALARMS
+            guess = lapse if guesses_of(stimulus, design) is None else FALSE_ALARMS
         presented = None if self.clipping is None else self.presented
-        own = assumed.width_prior[0] * (np.resize(widths, len(thresholds)) if len(widths) > 1 else widths[0])
-        observers = Observers(assumed.family, thresholds, own, guess, lapses, presented)
+        moves = np.log10(change) if stimulus.spacing == "log" else thresholds * np.log(change)
+        observers = Observers(
+            assumed.family, thresholds, assumed.width_prior[0] * width, guess, lapse, moves, presented
+        )
         noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
         tracks, yes = [], np.zeros(len(thresholds))
         for number in range(1, self.method.tracks + 1):
@@ -294,10 +293,10 @@ class ThresholdPlan:
             np.array([yes, noise_trials * len(tracks) - yes]) if noise_trials else None,
         )  # fmt: skip
 
-    def estimates(self, answered: ObserverAnswers, most: int | None = None, people: int = PEOPLE) -> Estimates:
+    def estimates(self, answered: ObserverAnswers, most: int | None = None, together: int = PEOPLE) -> Estimates:
         """Return what the analysis estimates from answers, of each track the first ``most`` if that is given.
 
-        So many consecutive ``people`` are those of one study, whose widths are estimated together.
+        So many consecutive ones ``together`` are the people of a study, from whose answers each width is estimated.
         """
         stimulus, design = self.stimulus, self.design
         tracks = [one if most is None else one.first(most) for one in answered.tracks]
@@ -317,18 +316,18 @@ class ThresholdPlan:
         flat = replace(grid, width_prior=None)
         fits = [replace(fit(places, right, wrong, flat), grid=grid) for right, wrong in counts.transpose(1, 0, 2)]
         found = []
-        for first in range(0, len(fits), people):
-            group = fits[first : first + people]
+        for first in range(0, len(fits), together):
+            group = fits[first : first + together]
             for one, prior in zip(group, group_widths(group, assumed.width_prior), strict=True):
                 own = one.with_widths(prior)
                 found.append((own.threshold, *own.interval, own.variance))
         return Estimates(*np.array(found).T)
 
     def simulate(
-        self, thresholds: Floats, random: Generator, widths: Sequence[float] = (1.0,), people: int = PEOPLE
+        self, thresholds: Floats, random: Generator, people: Sequence[Person] = (ASSUMED,), together: int = PEOPLE
     ) -> Estimates:
         """Return what the analysis estimates of observers with these thresholds [u], as in `answers`."""
-        return self.estimates(self.answers(thresholds, random, widths=widths), people=people)
+        return self.estimates(self.answers(thresholds, random, people), together=together)
 
 
 def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
@@ -347,7 +346,7 @@ def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
 
 @lru_cache(maxsize=32)
 def expected(plan: ThresholdPlan) -> Expected:
-    """Return how precise thresholds are expected to be, of observers with each of `WIDTHS`.
+    """Return how precise thresholds are expected to be, of each kind of people that counts of answers describe.
 
     Only thresholds below the highest level that is presented in full have estimates; where those are not the larger
     half of all, none is expected.
@@ -356,25 +355,29 @@ def expected(plan: ThresholdPlan) -> Expected:
     per_trial = cells * plan.stimulus.steps
     trials = min(plan.trials, MOST_TRIALS, max(10, MOST_WORK // (per_trial * FEWEST)))
     simulated = plan if trials == plan.trials else plan.with_trials(trials)
-    observers = max(FEWEST, min(OBSERVERS, MOST_WORK // (per_trial * simulated.trials)))
+    observers = max(FEWEST, min(OBSERVERS, MOST_WORK // (per_trial * simulated.trials))) // len(ALONE)
+    together = min(PEOPLE, observers)
+    observers = observers // together * together
     low, high = plan.stimulus.domain
-    truth = low + (high - low) * (0.25 + 0.5 * (np.arange(observers) + 0.5) / observers)  # the middle half
+    own = low + (high - low) * (0.25 + 0.5 * (np.arange(observers) + 0.5) / observers)  # the middle half
+    truth, people = np.tile(own, len(ALONE)), [one for one in ALONE.values() for _ in own]
     halves, variances = [], []
     for one in simulated.each_standard():
-        found = one.simulate(truth, np.random.default_rng(SEED), WIDTHS)
-        full = one.measures(truth)
-        ends, turn = (found.highs - found.lows) / 2, np.arange(observers) % len(WIDTHS)
-        measured = [ends[full & (turn == place)] if full.mean() > 0.5 else math.inf for place in range(len(WIDTHS))]
-        halves.append([float(np.mean(one)) for one in measured])
-        variances.append(float((found.medians - truth)[full].var()) if full.mean() > 0.5 else math.inf)
+        found = one.simulate(truth, np.random.default_rng(SEED), people, together)
+        full = one.measures(own)
+        ends = ((found.highs - found.lows) / 2).reshape(len(ALONE), -1)[:, full]
+        errors = (found.medians - truth).reshape(len(ALONE), -1)[:, full]
+        measured = full.mean() > 0.5
+        halves.append(ends.mean(axis=1) if measured else np.full(len(ALONE), math.inf))
+        variances.append(float(errors.var()) if measured else math.inf)
     shrunk = (simulated.trials / plan.trials) ** 0.5
     return Expected(
         spacing=plan.stimulus.spacing,
         trials=plan.trials,
         standards=plan.standards,
-        halves=tuple((shrunk * np.mean(halves, axis=0)).tolist()),
+        halves=dict(zip(ALONE, (shrunk * np.mean(halves, axis=0)).tolist(), strict=True)),
         spread=shrunk * (sum(variances) / len(variances)) ** 0.5,
-        threshold=plan.stimulus.level_of(float(np.median(truth))),
+        threshold=plan.stimulus.level_of(float(np.median(own))),
     )
 
 
@@ -397,8 +400,9 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
         yield "Expected precision", "none: the levels of most thresholds are clipped"
         return
     log = found.spacing == "log"
-    ends = [f"{10.0**half:.1f}" if log else f"{half:.2g}" for half in (min(found.halves), max(found.halves))]
-    one = f"{'×/÷ ' if log else '±'}{' to '.join(dict.fromkeys(ends))}{'' if log else plan.unit}"
+    kind, most = found.worst
+    median, worst = (f"×/÷ {10.0**half:.1f}" if log else f"±{half:.2g}{plan.unit}" for half in (found.median, most))
+    one = median if median == worst else f"{median}, at worst {worst} ({kind})"
     people, precision = _planned(protocol)
     over = "" if found.standards == 1 else " over all standards"
     group = ""

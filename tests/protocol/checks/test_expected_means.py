@@ -76,7 +76,7 @@ def test_the_spread_of_d_prime_is_that_of_the_binomial_counts() -> None:
     found = expected_mean(plan_of(compared()))
     assert (found.trials, found.threshold) == (40, 1.0)
     assert found.spread == pytest.approx(exact, rel=0.08)
-    assert found.halves[0] == pytest.approx(1.96 * found.spread, rel=1e-4)
+    assert found.median == pytest.approx(1.96 * found.spread, rel=1e-4)
 
 
 @pytest.mark.parametrize("roving", [False, True])
@@ -141,7 +141,7 @@ def test_the_spread_of_d_a_is_that_of_the_area_under_the_roc_curve(ratings: int)
     found = expected_mean(RatingPlan(11, ratings))
     assert (found.trials, found.threshold) == (ratings, 1.0)
     assert found.spread == pytest.approx(exact_spread(1.0, ratings), rel=0.08)
-    assert found.halves[0] == pytest.approx(1.96 * found.spread, rel=1e-4)
+    assert found.median == pytest.approx(1.96 * found.spread, rel=1e-4)
 
 
 def test_many_ratings_recover_d_a_less_what_few_points_hide() -> None:
