@@ -36,6 +36,12 @@ LEAST_HELD = 0.93
 MOST_ERROR = 0.05
 
 
+def search() -> Search:
+    """Return how QUEST+ chooses levels by default."""
+    coordinates = tuple(STIMULUS.coordinate(level) for level in STIMULUS.grid)
+    return Search(running_grid(STIMULUS, DESIGN, assumed_for(STIMULUS, DESIGN), LAPSES), coordinates, "threshold")
+
+
 def answered(person: Person, planted: np.ndarray, search: Search, draw: np.random.Generator) -> tuple[np.ndarray, ...]:
     """Return the places of the levels presented, whether answers were right, and the first interval was (n, trials)."""
     psi = search.psi.reshape(len(search.levels), len(search.grid.thresholds), -1)
@@ -73,15 +79,13 @@ def studies(places: np.ndarray, rights: np.ndarray, firsts: np.ndarray) -> Itera
 
 def main(observers: str = "1000", seed: str = "1") -> int:
     """Print a row for each kind and number of trials; return the exit code."""
-    coordinates = tuple(STIMULUS.coordinate(level) for level in STIMULUS.grid)
-    search = Search(running_grid(STIMULUS, DESIGN, assumed_for(STIMULUS, DESIGN), LAPSES), coordinates, "threshold")
     failed = False
     print(f"{observers} observers, 2IFC, 75 % at {MEDIAN_75} (factor {BETWEEN}), QUEST+, seed {seed}")
     print("                   trials  held %   error %    SD %   groups held %  half of a group's interval %")
     for name, person in KINDS.items():
         draw = np.random.default_rng(int(seed))
         planted = MEDIAN_75 * BETWEEN ** draw.normal(size=int(observers))
-        presented = answered(person, planted, search, draw)
+        presented = answered(person, planted, search(), draw)
         for trials in TRIALS:
             moved = math.log10(person.change) * ((trials - 1) / (max(TRIALS) - 1) - 1) / 2  # the mean of these trials
             truth, true_mean = np.log10(planted) + moved, math.log10(MEDIAN_75) + moved

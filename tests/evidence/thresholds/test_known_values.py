@@ -3,6 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from statistics import NormalDist
 
 import pytest
 from click.testing import CliRunner
@@ -23,7 +24,7 @@ from study_app.evidence.thresholds.known_values import (
     validate,
 )
 from study_app.protocol.load import load, parse
-from study_app.protocol.simulated import Comparison, Observer
+from study_app.protocol.simulated import Comparison, Course, Observer
 from study_app.protocol.source.files import source_bytes
 from study_app.protocol.streams import stream
 from study_app.protocol.trials.designs import default_design
@@ -77,13 +78,39 @@ def exponents(exponent: KnownExponent) -> list[StudyFound]:
 def test_an_observer_is_correct_in_75_percent_at_the_known_threshold(
     delays: bool, standard: float, difference: float
 ) -> None:
-    observer = Observer(person=Observer().person._replace(lapse=0.0))
-    attended = Comparison(delays, smallest=False, observer=observer)
-    comparison = standard + difference if delays else standard * (1 + difference)
-    draw, design = stream(3, "observer").random, default_design("2ifc")
-    n = 20_000
-    correct = sum(attended.choose(design, [standard, comparison], 0.0, draw) == "second" for _ in range(n))
-    assert correct / n == pytest.approx(0.75, abs=0.01)
+    draw, design, n = stream(3, "observer").random, default_design("2ifc"), 20_000
+    for width in (0.5, 1.0, 2.5):
+        attended = of_person(delays, width=width)
+        for share in (0.5, 1.0):
+            apart = difference * share * (1.0 if delays else standard)
+            correct = sum(
+                attended.choose(design, [standard, standard + apart], 0.0, draw) == "second" for _ in range(n)
+            )
+            expected = NormalDist().cdf(NormalDist().inv_cdf(0.75) * share ** (1 / width))
+            assert correct / n == pytest.approx(expected, abs=0.01), (width, share)
+
+
+def of_person(delays: bool, **differs: float) -> Comparison:
+    person = Observer().person._replace(lapse=0.0, **differs)
+    return Comparison(delays, smallest=False, observer=Observer(person=person))
+
+
+@pytest.mark.parametrize("delays", [False, True])
+def test_people_prefer_an_interval_or_their_last_answer_and_learn(delays: bool) -> None:
+    draw, design, n = stream(4, "observer").random, default_design("2ifc"), 4000
+
+    def first(attended: Comparison, apart: float, course: Course) -> float:
+        sensed = [0.1 + apart if delays else 8.0 * (1 + apart), 0.1 if delays else 8.0]
+        return sum(attended.choose(design, sensed, 0.0, draw, course) == "first" for _ in range(n)) / n
+
+    threshold = 0.025 if delays else 0.24
+    preferred = pytest.approx(NormalDist().cdf(0.5), abs=0.03)
+    assert first(of_person(delays, criterion=0.5), 0.0, Course()) == preferred
+    assert first(of_person(delays, repeats=0.5), 0.0, Course(last="first")) == preferred
+    assert first(of_person(delays, repeats=0.5), 0.0, Course(last="second")) == pytest.approx(0.31, abs=0.03)
+    learning = of_person(delays, change=1 / 1.5)
+    for done in (0.0, 0.5, 1.0):
+        assert first(learning, threshold * 1.5 ** (0.5 - done), Course(done)) == pytest.approx(0.75, abs=0.03)
 
 
 @pytest.mark.slow
