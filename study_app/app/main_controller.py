@@ -46,7 +46,7 @@ from study_app.workspace import Workspace, chosen_workspace, offered_workspace, 
 if TYPE_CHECKING:
     from study_app.app.lab_controller import LabController
     from study_app.app.session.playing import Playing
-    from study_app.designer.participant.feeling import LabLiquids
+    from study_app.designer.participant.playable import LabLiquids
     from study_app.designer.place.controller import DesignerController
     from study_app.designer.place.view import DesignerPlace
     from study_app.gui.lab.view import LabPlace

@@ -95,7 +95,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
 @click.option("--no-window", is_flag=True, help="Write the file directly, without opening the study designer.")
 def new(name: str, template: str, *, no_window: bool) -> None:
     """Create a study from a template, and open it in the study designer."""
-    from study_app.designer.new_study import new_study
+    from study_app.designer.document import document as new_study
 
     study = new_study.template(template)
     keep_offered_workspace()

@@ -25,4 +25,4 @@ def designer(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
 def editors(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Run a test with the special editors and without any."""
     if request.param == "no special editors":
-        monkeypatch.setattr("study_app.designer.form.row_widget.EDITORS", {})
+        monkeypatch.setattr("study_app.designer.form.card.EDITORS", {})

@@ -241,10 +241,6 @@ def finding(record: Record) -> None:
         record.hit("ctrl+f")
         record.type(words)
         record.hit(*keys)
-    for words in ("williams design", "force limit"):
-        record.hit("Insert")
-        record.type(words)
-        record.hit("Return")
 
 
 def languages(record: Record) -> None:

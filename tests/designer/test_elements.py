@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.designer.document.steps import AddElement, AddNamed, ChangeLanguage, RenameElement, SetText, Situation
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.outline.card import ROW_ROLE
+from study_app.designer.outline import ROW_ROLE
 from study_app.protocol.source.document import value_at
 from tests.designer.document.grown import PROTOCOLS
 
@@ -35,8 +35,8 @@ def test_one_key_is_given_in_place_of_another_and_back_without_losing_its_value(
     designer.editing.select(task)
     before = designer.text
     row = designer.form_row(*task, "count")
-    assert row.remove is None
-    assert not [one for one in designer.place.form.rows if one.row.row.path[-1] == "duration_s"]
+    assert row.remove.isHidden()
+    assert not [one for one in designer.place.form.rows if one.row.path[-1] == "duration_s"]
     row.keys.buttons[1].click()
     study = designer.study
     assert study.faults == ()
@@ -53,25 +53,16 @@ def test_one_key_is_given_in_place_of_another_and_back_without_losing_its_value(
     )
 
 
-def test_after_a_rename_comments_that_mention_the_old_name_are_gone_through(designer: Any, qtbot: Any) -> None:
-    text = designer.file.read_text()
-    said = "# No thanks to common words.\n# The pages `thanks` and `thanks_2` are short.\n# The last one, `thanks`.\n"
-    designer.file.write_text(text + said)
+def test_a_rename_says_how_many_places_follow(designer: Any, qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr("study_app.designer.place.view.say", lambda _widget, words: said.append(words))
     designer.open("kitchen", "pages", "thanks")
     head = designer.place.form.head
     head.edit_id()
     qtbot.keyClicks(head.id, "goodbye")
     qtbot.keyClick(head.id, Qt.Key.Key_Return)
     assert "[pages.goodbye]" in designer.text
-    assert head.comments.text() == "2 comments mention “thanks”"
-    last = len(designer.text.splitlines()) - 1
-    for line in (last - 1, last, last - 1):
-        qtbot.mouseClick(head.comments, Qt.MouseButton.LeftButton)
-        assert designer.place.file.isVisible()
-        assert designer.place.file.editor.textCursor().blockNumber() == line
-    assert designer.text.endswith("# The last one, `thanks`.\n")
-    designer.editing.select(("pages", "welcome"))
-    assert not head.comments.isVisible()
+    assert (said, designer.steps) == (["1 place updated"], ["Rename to goodbye, 1 place updated"])
 
 
 ITEMS = ("questionnaires", "liquid", "items")

@@ -9,7 +9,7 @@ from PySide6.QtGui import QGuiApplication, QMouseEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
 from study_app.designer.document.steps import AddKey, RenameElement
-from study_app.designer.form.typed_fields import HAND_ON_MS, TypedSentence, TypedText
+from study_app.designer.form.fields import HAND_ON_MS, TypedSentence, TypedText
 from study_app.gui.widgets.controls import IconButton
 
 pytestmark = pytest.mark.slow
@@ -162,8 +162,9 @@ def test_typing_on_after_a_rest_keeps_the_caret_where_the_key_is_new_in_the_file
     line = designer.field(*view).line
     line.setFocus()
     qtbot.keyClicks(designer.keyboard, "f")
-    qtbot.waitUntil(lambda: designer.value(*view) == "f")  # the row can be removed now: it has another widget
-    assert designer.keyboard is not line
+    qtbot.waitUntil(lambda: designer.value(*view) == "f")
+    assert designer.keyboard is line
+    assert designer.form_row(*view).remove.isVisible()
     qtbot.keyClicks(designer.keyboard, "ront")
     designer.keyboard.flush()
     assert designer.value(*view) == "front"
@@ -197,7 +198,7 @@ def test_the_next_element_has_no_selected_entries_and_shows_the_field_with_the_k
     designer.click_on(entries.viewport(), at=entries.visualItemRect(entries.item(0)).center())
     assert entries.selectedItems()
     last = designer.place.form.rows[-1]
-    designer.place.form.focus(last.row.row.path)
+    designer.place.form.focus(last.row.path)
     designer.go_to("blocks", "delays")
     assert designer.field("blocks", "delays", "conditions").list is entries
     assert not entries.selectedItems()

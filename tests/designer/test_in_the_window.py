@@ -77,7 +77,7 @@ designer.place.resize(1400, 900)
 designer.place.show()
 designer.open("kitchen")
 designer.editing.select(("study",))
-line = next(row for row in designer.place.form.rows if row.row.row.path[-1] == "version").field.line
+line = next(row for row in designer.place.form.rows if row.row.path[-1] == "version").field.line
 line.setFocus()
 line.selectAll()
 for letters in range(1, 100000):

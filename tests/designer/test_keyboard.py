@@ -68,7 +68,7 @@ def test_a_number_that_is_left_by_tab_at_once_keeps_the_keyboard_in_its_form(
     designer.change(("format = 1", "format = 2"))
     designer.open("kitchen", *path[:2])
     designer.field(*path).line.setFocus()
-    rows = [row.row.row.path for row in designer.place.form.rows]
+    rows = [row.row.path for row in designer.place.form.rows]
     qtbot.keyClicks(designer.keyboard, "7")
     designer.hit("Backtab" if back else "Tab")  # the key is new in the file: the form is made anew
     assert designer.value("conditions", "thin", "force_delay_ms") == 7
@@ -89,12 +89,12 @@ def test_ctrl_delete_removes_the_key_of_a_field_whose_cross_tab_passes(designer:
     designer.open()
     block = ("blocks", "liquids")
     designer.go_to(*block)
-    text, removable = designer.text, [row for row in designer.place.form.rows if row.remove is not None]
-    assert {"title", "order", "repetitions", "questionnaire"} <= {str(row.row.row.path[-1]) for row in removable}
+    text, removable = designer.text, [row for row in designer.place.form.rows if row.row.removable]
+    assert {"title", "order", "repetitions", "questionnaire"} <= {str(row.row.path[-1]) for row in removable}
     for row in removable:
         assert row.remove not in stops(designer.place.form)
         assert "(Ctrl+Del)" in row.remove.toolTip()
-        path = row.row.row.path
+        path = row.row.path
         designer.place.form.focus(path)
         if isinstance(designer.keyboard, QLineEdit):
             designer.keyboard.selectAll()  # as where Tab leads to it
@@ -214,7 +214,7 @@ def test_tab_goes_to_each_stop_of_a_form_once(dutch: Any, editors: None, path: t
 def test_tab_goes_through_problems_questions_and_the_banner_which_are_made_later(
     qtbot: Any, designer: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("study_app.designer.problems.problems.REST_MS", 0)
+    monkeypatch.setattr("study_app.designer.problems.REST_MS", 0)
     designer.open()
     designer.editing.ask(ChangeLanguage("add", "nl"))
     designer.saving.save()

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QLineEdit
 from shiboken6 import isValid
 
 from study_app.designer.document.steps import AddInstrument, MoveTo, SetValue
-from study_app.designer.outline.card import ROW_ROLE
+from study_app.designer.outline import ROW_ROLE
 from study_app.protocol.source.files import shipped
 from study_app.store.study_settings import begin_settings
 
@@ -314,7 +314,7 @@ def test_an_entry_opens_by_enter_and_a_double_click(qtbot: Any, designer: Any, w
         qtbot.keyClick(field.rows[1], Qt.Key.Key_Return)
     else:
         qtbot.mouseDClick(field.rows[1], LEFT)
-    assert designer.editing.selected == ("conditions", field.row.row.value[1])
+    assert designer.editing.selected == ("conditions", field.row.value[1])
 
 
 def listed(designer: Any) -> list[str]:

@@ -45,7 +45,7 @@ def stuck(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What the banner has a screen reader say."""
     found: list[str] = []
-    monkeypatch.setattr("study_app.designer.participant.play.say", lambda by, words: found.append(words))
+    monkeypatch.setattr("study_app.designer.place.header.say", lambda by, words: found.append(words))
     return found
 
 

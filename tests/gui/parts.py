@@ -9,8 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.designer.outline.card import OutlineCard
-from study_app.designer.outline.outline_rows import OutlineRow
+from study_app.designer.outline import OutlineCard, OutlineRow
 from study_app.gui.help.view import PageReader
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.lab.cards import EstimateCard

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.app.main_controller import MainController
-from study_app.designer.new_study.new_study import Answers, answered, template
+from study_app.designer.document.document import Answers, answered, template
 from study_app.gui.theme.theme import Theme
 from study_app.protocol.load import source_bytes
 from tools.screenshots.capture import Camera

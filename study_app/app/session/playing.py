@@ -21,11 +21,11 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.failures import Patience
 from study_app.app.session.live_session import BUG, LiveSession
-from study_app.designer.participant import play as shown
-from study_app.designer.participant.play import Notice, PlayDevices
 from study_app.designer.participant.playable import NotPlayableError, Playable, StepPosition, playable
+from study_app.designer.place import header as shown
 from study_app.designer.place.controller import DesignerController
-from study_app.designer.problems.problems import problem_rows
+from study_app.designer.place.header import Notice, PlayDevices
+from study_app.designer.problems import problem_rows
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError, StudyError
 from study_app.gui.kit.devices import device_choices, settings_here

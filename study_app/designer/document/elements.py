@@ -6,8 +6,19 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Final
 
-from study_app.designer.document.fields import Row, counted_elements, label_of, refused_at, row_at, rows, singular
-from study_app.designer.document.names import ITEMS, languages_of, named_at, uses
+from study_app.designer.document.fields import (
+    ITEMS,
+    Row,
+    counted_elements,
+    label_of,
+    languages_of,
+    named_at,
+    refused_at,
+    row_at,
+    rows,
+    singular,
+    uses,
+)
 from study_app.designer.document.study import Study
 from study_app.number_text import counted, exact_duration
 from study_app.protocol.formats import is_second
@@ -252,13 +263,9 @@ _DEEPEST: Final = 3
 class FoundField:
     """A field that was found."""
 
-    # the element, and the field in it
     element: Path
-    field: Path
-    # its label, what is chosen in it where that was looked for, and what it is for
+    field: Path  # in the element
     label: str
-    choice: str = ""
-    help: str = ""
     # what was found: 0 its label, 1 what is chosen in it, 2 another choice, 3 only the sentence of a choice
     rank: int = LABEL
 
@@ -320,7 +327,7 @@ def _found_in(field: tuple[Path, Row, str], parts: list[str]) -> Iterator[FoundF
     """Yield the field where its label has the words; else once for each of its choices that has them."""
     element, row, label = field
     if _has(label, parts):
-        yield FoundField(element, row.path, label, help=row.help)
+        yield FoundField(element, row.path, label)
         return
     for choice in row.choices if row.kind in {"choice", "choices", "kind"} else ():
         named = label_of(choice.value or "")
@@ -329,7 +336,7 @@ def _found_in(field: tuple[Path, Row, str], parts: list[str]) -> Iterator[FoundF
             there = row.default if row.value is None else row.value
             of_name = CHOSEN if choice.value == there else OTHER
             rank = of_name if any(_has(named, [part]) for part in parts) else SENTENCE
-            yield FoundField(element, row.path, label, named, choice.sentence or row.help, rank)
+            yield FoundField(element, row.path, label, rank)
 
 
 def _has(text: str, parts: list[str]) -> bool:

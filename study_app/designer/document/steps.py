@@ -11,19 +11,38 @@ from study_app.designer.document.additions import (
     check_values,
     copy_with,
     duplicated,
+    filled_in,
     fitted,
+    followed,
     listings,
+    moved,
     number_row,
+    pasted,
+    switched,
+    with_language,
+    without_language,
 )
-from study_app.designer.document.changes import filled_in, followed, moved, switched, with_language, without_language
 from study_app.designer.document.elements import step_of, title_of
-from study_app.designer.document.fields import counted_elements, initial, label_of, row_at, rows, singular
-from study_app.designer.document.fragments import pasted
-from study_app.designer.document.names import deletions, languages_of, named_at, renamed, replaced, with_references
+from study_app.designer.document.fields import (
+    counted_elements,
+    deletions,
+    initial,
+    label_of,
+    languages_of,
+    named_at,
+    references_to,
+    renamed,
+    replaced,
+    row_at,
+    rows,
+    singular,
+    with_references,
+)
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Edit, Insert, Move, Set, Unset
 from study_app.designer.document.toml_text import Refused, retyped
 from study_app.ids import free_id
+from study_app.number_text import counted
 from study_app.protocol.formats import is_second
 from study_app.protocol.questionnaires import written_out
 from study_app.protocol.source.document import Path, names, value_at
@@ -432,7 +451,9 @@ class RenameElement(Request):
     def step(self, at: Situation) -> Step:
         edits = renamed(at.study.document, self.path, self.name, at.recorded(self.path))
         after = self.path if isinstance(self.path[-1], int) else (*self.path[:-1], self.name)
-        return Step(f"Rename to {self.name}", edits, after)
+        followed = len(references_to(at.study.document, self.path))
+        said = f"{counted(followed, 'place')} updated" if followed else ""
+        return Step(", ".join(filter(None, (f"Rename to {self.name}", said))), edits, after, said=said)
 
 
 @dataclass(frozen=True, slots=True)
@@ -463,7 +484,7 @@ class Several(Request):
 
 
 Task: TypeAlias = Literal[
-    "select", "join", "write", "back", "find", "undo", "redo", "save", "open", "new", "begin", "banner", "add", "copy",
+    "select", "write", "back", "find", "undo", "redo", "save", "open", "new", "begin", "banner", "add", "copy",
     "paste", "delete", "series", "judge id", "repair", "repairs",
 ]  # fmt: skip
 

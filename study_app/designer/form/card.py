@@ -2,33 +2,369 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import partial
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import Final
 
-from PySide6.QtCore import QEvent, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QApplication, QGridLayout, QMenu, QWidget
+from PySide6.QtCore import QCoreApplication, QEvent, QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QAbstractItemView, QApplication, QBoxLayout, QGridLayout, QMenu, QVBoxLayout, QWidget
 
-from study_app.designer.document.steps import AddKey, LeaveText, RemoveKey, RenameElement, SetValue
-from study_app.designer.form.fields import LanguagesField, add_button, stacked
-from study_app.designer.form.lists import EntryList
-from study_app.designer.form.row_widget import LABEL_PX, LanguageHeads, RowWidget, is_wide, structure_of
-from study_app.designer.form.rows import Form, FormRow, Section, added_row
-from study_app.designer.form.special import Panel, QuestionRow, QuestionRows
-from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.designer.place.segments import cut_text, small_button
-from study_app.designer.problems.problems import NameRefusal, ProblemRow, RepairButton
-from study_app.gui.kit.commands import tip
+from study_app.designer.document.steps import AddKey, LeaveText, RemoveKey, RenameElement, SetValue, SwitchKey
+from study_app.designer.form.drawn_fields import LEVELS, TARGETS, TRIAL
+from study_app.designer.form.fields import (
+    ChecksField,
+    ChoiceField,
+    Field,
+    LanguagesField,
+    LineField,
+    SpecialEditor,
+    SwitchField,
+    TypedLine,
+    TypedText,
+    UnknownField,
+    add_button,
+    removes_key,
+    stacked,
+)
+from study_app.designer.form.lists import CONDITIONS, EntriesField, EntryList, LanguageListField, LinesField
+from study_app.designer.form.rows import STUDY_LANGUAGES, Form, FormRow, Section, added_row, values_of
+from study_app.designer.form.special import (
+    BLOCK_ORDER,
+    DESCRIPTION,
+    HYPOTHESES,
+    ORDER,
+    POINTS,
+    QUESTION_KIND,
+    QUESTION_LIST,
+    SENTENCES,
+    Panel,
+    QuestionRows,
+)
+from study_app.designer.place.segments import FIELD_PX, Segments, cut_text, small_button
+from study_app.designer.problems import NameRefusal, ProblemRow, RepairButton
+from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, name_bars, remove_widget
-from study_app.gui.widgets.accessible import say
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, insert_layout, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Rule, fill_rounded, scrolled, smooth_painter
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Icon, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import Elided, label
+from study_app.number_text import capitalised
 from study_app.protocol.source.document import Path
+
+KINDS = {
+    "numbers": "Numbers", "vector": "Numbers", "number": "One number", "whole number": "One number", "text": "Text",
+    "choices": "Chosen", "choice": "Automatic", "texts": "Texts", "references": "Named", "reference": "Named",
+    "table": "Table", "list": "List", "points": "Points", "localised": "Text", "switch": "Yes or no",
+}  # fmt: skip
+"""What the kinds of a value that may be of several are called."""
+
+
+class EitherField(Field):
+    """A value of one of several kinds: the kind, then its editor."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
+        self.kinds = Segments(f"{row.label}, kind")
+        self.kinds.chosen.connect(self._switch)
+        self.box.addWidget(self.kinds, 0, Qt.AlignmentFlag.AlignLeft)
+        self.inner = field(self._chosen(row))
+        self.inner.asked.connect(self.asked)
+        self.inner.came.connect(self.came)
+        self.box.addWidget(self.inner)
+        self.setFocusProxy(self.inner)
+        self.show_value()
+
+    def show_row(self, row: FormRow) -> None:
+        self.inner.show_row(self._chosen(row))
+        super().show_row(row)
+
+    def show_value(self) -> None:
+        values = [(at, KINDS.get(one.kind, one.kind)) for at, one in enumerate(self.row.either)]
+        self.kinds.show_values(values, self.row.number)
+
+    def _chosen(self, row: FormRow) -> FormRow:
+        return replace(row, **values_of(row.either[row.number or 0]))
+
+    def _switch(self, at: int) -> None:
+        """Ask for a value of another kind, made of the one there is as far as that goes."""
+        if at == self.row.number:
+            return
+        to, value = self.row.either[at], self.row.value
+        first = value[0] if isinstance(value, tuple) and value else value
+        if to.kind in {"choice", "reference"}:
+            self.set_value(to.choices[0].value if to.choices else "")
+        elif to.kind == "choices":
+            self.set_value([choice.value for choice in to.choices][:1])
+        elif to.kind in {"number", "whole number"}:
+            self.set_value(first if isinstance(first, int | float) else 1)
+        elif to.kind in {"numbers", "vector"}:
+            self.set_value([value] if isinstance(value, int | float) else [1])
+        else:
+            self.set_value(str(first))
+
+
+def field(row: FormRow) -> Field:
+    """Return the editor of a row."""
+    kind = row.kind
+    if kind in {"localised", "paragraphs"}:
+        return LanguagesField(row)
+    if kind == "switch":
+        return SwitchField(row)
+    if kind in {"choice", "kind", "reference"}:
+        return ChoiceField(row)
+    if kind == "choices":
+        return ChecksField(row)
+    if row.path == STUDY_LANGUAGES:
+        return LanguageListField(row)
+    if kind in {"texts", "points"}:
+        return LinesField(row)
+    if kind in {"references", "list", "tables"}:
+        return EntriesField(row)
+    if kind == "either":
+        return EitherField(row)
+    return LineField(row) if kind not in {"unknown", "table"} else UnknownField(row)
+
+
+LABEL_PX = 116
+MOST_REPAIRS = 3
+EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
+    key: editor
+    for editor in (
+        CONDITIONS, DESCRIPTION, SENTENCES, ORDER, POINTS, QUESTION_KIND, QUESTION_LIST, LEVELS, TRIAL, TARGETS,
+        BLOCK_ORDER, HYPOTHESES,
+    )
+    for key in editor.keys
+}  # fmt: skip
+"""The special editor of each (model, key) that has one."""
+
+
+class FaultLine(QWidget):
+    """A sentence that says what is wrong, below an editor."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        icon = (Icon("warning", "bad", 16), 0, Qt.AlignmentFlag.AlignTop)
+        self.sentence = label("", "label", "bad", wraps=True)
+        hbox(icon, (self.sentence, 1), spacing=8, margins=(LABEL_PX + 8, 0, 0, 0), parent=self)
+
+
+class RowWidget(Themed, QWidget):
+    """A row: its label, its editor, a button that removes the key, and what is wrong with it.
+
+    ``repair_asked`` carries a problem and the words of one of its repairs.
+    """
+
+    repair_asked = Signal(object, str)
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__()
+        self.row = row
+        self.refusal = ""
+        special, wide = special_editor_of(row), is_wide(row)
+        bare = special is not None and not special.labelled
+        self.field = field(row) if special is None or special.make is None else special.make(row)
+        if special is not None and special.adds is not None:
+            self.field.add_extra(special.adds(self.field))
+        self.keys = Segments("Which of the two is given") if row.keys else None
+        self.words = label(row.label, "label", wraps=True)
+        if not wide:
+            self.words.setFixedWidth(LABEL_PX)
+        self.words.setMinimumHeight(FIELD_PX)
+        self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
+        self.words.setBuddy(self.field)
+        removes = f"Remove {row.label} from the file"
+        self.remove = IconButton("cross", removes, with_key(removes, "remove"), size=FIELD_PX, role="plain")
+        self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # no stop of Tab at each field
+        self.remove.clicked.connect(self._remove)
+        room = self.remove.sizePolicy()
+        room.setRetainSizeWhenHidden(True)
+        self.remove.setSizePolicy(room)
+        across = hbox(spacing=8)
+        top = Qt.AlignmentFlag.AlignTop
+        if bare:
+            across.addWidget(self.field, 1)
+        else:
+            across.addWidget(self.words, int(wide), top)
+            across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
+        if not bare or row.removable:
+            across.addWidget(self.remove, 0, top)
+        self.repairs: list[RepairButton] = []
+        self._offered: dict[ProblemRow, tuple[str, ...]] = {}
+        self._buttons = vbox(spacing=6, margins=(LABEL_PX + 32, 0, 0, 0))
+        column = vbox(spacing=4, margins=0, parent=self)
+        heads = wide and len(row.languages) > 1 and not stacked(row)
+        labelled = not bare and not (heads and row.required)
+        if labelled or bare:
+            add_layout(column, across)
+        if not labelled:  # the names of the languages, or the editor, say what it is
+            self.words.setParent(self)
+            self.words.hide()
+        if self.keys is not None:
+            self.keys.show_values(row.keys, row.path[-1])
+            self.keys.chosen.connect(self._switch)
+            above = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else LABEL_PX + 8, 0, 0, 0))
+            insert_layout(column, 0, above)
+        if heads:
+            of = "" if labelled else f"{row.label}, "
+            column.addWidget(LanguageHeads(f"{of}{language}" for _, language in row.languages))
+        if wide and not bare:
+            column.addWidget(self.field)
+        add_layout(column, self._buttons)
+        self.show_row(row)
+
+    @cached_property
+    def wrong(self) -> FaultLine:
+        """What is wrong, below the editor; made when it is first needed."""
+        made = FaultLine()
+        column = self.layout()
+        assert isinstance(column, QVBoxLayout)  # noqa: S101 - made so
+        made.hide()
+        column.insertWidget(column.count() - 1, made)
+        name_bars(made)
+        return made
+
+    def _remove(self) -> None:
+        """Ask to remove the key; what is being typed is handed on before, else it would come back with that."""
+        for part in self.field.findChildren(QWidget):
+            if isinstance(part, TypedLine | TypedText):
+                part.flush()
+        self.field.asked.emit(RemoveKey(self.row.path))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if removes_key(event) and self.row.removable and self.remove.isEnabled():
+            self._remove()
+        else:
+            super().keyPressEvent(event)
+
+    def _switch(self, key: object) -> None:
+        if key != self.row.path[-1]:
+            self.field.asked.emit(SwitchKey(self.row.path, str(key)))
+
+    def show_row(self, row: FormRow) -> None:
+        if row != self.row:
+            self.refusal = ""
+            self.row = row
+            self.field.show_row(row)
+        self.say()
+
+    def begin(self, row: FormRow) -> None:
+        """Show a row of another element: nothing typed, refused or selected in this one stays."""
+        for field in (self.field, *self.field.findChildren(Field)):
+            field.refusal = ""
+        typed = [part for part in self.field.findChildren(QWidget) if isinstance(part, TypedLine | TypedText)]
+        for part in typed:
+            part.show_refused(False)
+        for entries in self.field.findChildren(QAbstractItemView):
+            entries.clearSelection()
+        self.refusal, self.row = "", row
+        self.field.show_row(row)
+        for part in typed:
+            part.begin_value()
+        self.say()
+
+    def say(self) -> None:
+        self.remove.setVisible(self.row.removable and self.remove.parent() is not None)
+        refused = [field.refusal for field in (self.field, *self.field.findChildren(Field)) if field.refusal]
+        found = [sentence for sentence in (self.refusal, *refused, *self.row.faults) if sentence]
+        times = Counter(found)
+        if found or "wrong" in self.__dict__:
+            said = (one if count == 1 else f"{count} × {one}" for one, count in times.items())
+            self.wrong.sentence.setText("\n".join(said))
+            self.wrong.setVisible(bool(found))
+        row = self.row
+        sentences = filter(None, (row.help, row.permitted, *found))
+        self.field.setAccessibleDescription(" ".join(f"{one.rstrip('.')}." for one in sentences))
+        some_missing = isinstance(self.field, LanguagesField) and self.field.some_missing
+        for part in self.field.findChildren(QWidget):
+            if not isinstance(part, TypedLine | TypedText):
+                continue
+            part.setAccessibleDescription(self.field.accessibleDescription())
+            if not refused:
+                blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
+                part.show_refused(bool(self.row.faults) and blamed)
+
+    def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
+        """Offer the repairs of the problems of this row, of each the first; none that reads like another one."""
+        path = self.row.path
+        offered = {one: words for one, words in known.items() if one.fault.path[: len(path)] == path and words}
+        if offered == self._offered:
+            return
+        self._offered = offered
+        before, self.repairs = self.repairs, []
+        held = next((button.text() for button in before if button.hasFocus()), None)
+        several = len(offered) > 1
+        asked = [(one, word) for one, words in offered.items() for word in words[: 1 if several else 2]]
+        times = Counter(word for _problem, word in asked)
+        for problem, word in [(one, word) for one, word in asked if times[word] == 1][:MOST_REPAIRS]:
+            made = RepairButton(problem, word)
+            made.clicked.connect(lambda _on=False, one=problem, word=word: self.repair_asked.emit(one, word))
+            made.typed.connect(self._type)
+            name_bars(made)
+            self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
+            made.show()  # at once: Tab passes what a layout is still to show
+            self.repairs.append(made)
+        if held is not None and not self.repairs:
+            self.field.take_keyboard()
+        elif held is not None:  # the same words again, where they are still offered
+            min(self.repairs, key=lambda one: one.text() != held).setFocus(Qt.FocusReason.OtherFocusReason)
+        for button in before:
+            remove_widget(button)
+
+    def _type(self, event: QKeyEvent) -> None:
+        """Type a letter into the field."""
+        self.field.take_keyboard()
+        line = self.window().focusWidget()
+        if isinstance(line, TypedLine | TypedText) and self.isAncestorOf(line):
+            QCoreApplication.sendEvent(line, event)
+
+    @property
+    def help(self) -> str:
+        """What the row edits: the description, or the sentence of what is chosen, and what is permitted."""
+        row = self.row
+        shown = row.default if row.value is None else row.value
+        sentence = next((choice.sentence for choice in row.choices if choice.value == shown), "")
+        reason = f" ({row.reason})" if row.reason else ""
+        permitted = f"Permitted: {row.permitted}{reason}." if row.permitted and not row.choices else ""
+        words = " ".join(filter(None, (sentence or row.help, permitted)))
+        words = " ".join(words.replace("`", "").split())
+        return capitalised(words)
+
+
+def special_editor_of(row: FormRow) -> SpecialEditor | None:
+    """Return the special editor of a row, None where its kind's editor is used."""
+    return EDITORS.get((row.model, str(row.path[-1])))
+
+
+def is_wide(row: FormRow) -> bool:
+    """Return whether the editor of a row takes the width of the form."""
+    special = special_editor_of(row)
+    return row.kind == "paragraphs" if special is None else special.wide
+
+
+def structure_of(row: FormRow) -> object:
+    """Return what makes another editor of a row necessary."""
+    special, own = special_editor_of(row), row
+    inner = own.either[row.number or 0].kind if own.either else ""
+    choices = tuple(choice.value for choice in own.choices) if own.kind in {"choice", "choices", "kind"} else ()
+    extra = None if special is None else special.structure(row)
+    return own.model, own.kind, inner, choices, row.languages, own.required, row.keys, extra
+
+
+class LanguageHeads(QWidget):
+    """Names of languages above the columns of their texts; ``inset`` is the room left and right [px]."""
+
+    def __init__(self, languages: Iterable[str], inset: tuple[int, int] = (0, 0)) -> None:
+        super().__init__()
+        heads = ((label(language, "small", "text2"), 1) for language in languages)
+        hbox(*heads, spacing=8, margins=(inset[0], 0, inset[1], 0), parent=self)
+
 
 TILE = 40
 
@@ -52,15 +388,13 @@ class Tile(Themed, QWidget):
 class FormHead(QWidget):
     """Signals: ``asked`` (a request), ``feel_asked`` (path), ``id_typed`` (path, text so far).
 
-    ``unlock_asked`` is emitted where a locked id is to be changed, ``comments_asked`` where the comments are to be seen
-    that mention the id before. What ``up``, ``down``, ``copy`` and ``delete`` do is
+    ``unlock_asked`` is emitted where a locked id is to be changed. What ``up``, ``down``, ``copy`` and ``delete`` do is
     done to every selected element.
     """
 
     asked = Signal(object)
     id_typed = Signal(object, str)
     unlock_asked = Signal()
-    comments_asked = Signal()
     feel_asked = Signal(object)
 
     def __init__(self) -> None:
@@ -70,7 +404,6 @@ class FormHead(QWidget):
         self.tile = Tile()
         self.title = Elided("card")
         self.kind = Elided("small", "text2")
-        self.followed = Elided("small", "text2")
         self.used = Elided("small", "text2")
         self.ask = small_button("list", "Ask after …", height=34)
         self.ask.hide()
@@ -82,8 +415,6 @@ class FormHead(QWidget):
         self.id.rests = False
         self.unlock = small_button("lock", "Change anyway …", height=34)
         self.unlock.hide()
-        self.comments = small_button("", "Comments", role="plain", height=34)
-        self.comments.hide()
         self._lock: tuple[object, str] = ((), "")
         self._read_only = False
         self.refusal = NameRefusal("Rename to")
@@ -94,8 +425,8 @@ class FormHead(QWidget):
         self.down = IconButton("arrow_down", "Move down", size=34)
         self.copy = IconButton("copy", "Duplicate", size=34)
         self.delete = IconButton("trash", "Delete", f"{tip('delete')} in the outline", size=34, role="danger")
-        words = vbox(self.title, hbox(self.kind, (self.followed, 1), spacing=8), spacing=0)
-        grid = self._grid = QGridLayout(self)
+        words = vbox(self.title, self.kind, spacing=0)
+        grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(8)
         grid.addWidget(self.tile, 0, 0)
@@ -106,7 +437,7 @@ class FormHead(QWidget):
         self.id_line = QWidget()
         words_of_id = label("Id", "label")
         words_of_id.setFixedWidth(LABEL_PX)
-        parts = (words_of_id, (self.id, 8), self.unlock, self.comments, (self.used, 1))
+        parts = (words_of_id, (self.id, 8), self.unlock, (self.used, 1))
         hbox(*parts, spacing=8, margins=(0, 4, 0, 0), parent=self.id_line)
         grid.addWidget(self.id_line, 1, 0, 1, 3)
         grid.addWidget(self.refusal, 2, 0, 1, 3)
@@ -114,7 +445,6 @@ class FormHead(QWidget):
         self.id.typed.connect(self._rename)
         self.id.textEdited.connect(self._type_id)
         self.unlock.clicked.connect(self.unlock_asked)
-        self.comments.clicked.connect(self.comments_asked)
         self.feel.clicked.connect(self._ask_to_feel)
         self.ask.clicked.connect(lambda: self.asks.popup(self.ask.mapToGlobal(self.ask.rect().bottomLeft())))
 
@@ -165,21 +495,6 @@ class FormHead(QWidget):
     def show_lock(self, path: object, why: str) -> None:
         self._lock = (path, why)
         self._apply_lock()
-
-    def show_comments(self, words: str) -> None:
-        """Offer the comments that mention the id before, with "" none; nothing moves and the keyboard stays."""
-        if words and words != self.comments.text():
-            say(self, words)
-        self.comments.setText(words or "Comments")
-        self.comments.setVisible(bool(words))
-
-    def show_followed(self, words: str) -> None:
-        """Show in place of the kind, and say once, what followed the id."""
-        if words:
-            say(self, words)
-        self.followed.show_text(words)
-        self.kind.setHidden(bool(words))
-        self._grid.activate()  # at once, or the words are cut where there was less room
 
     def _apply_lock(self) -> None:
         path, why = self._lock
@@ -282,7 +597,6 @@ class FormCard(Card):
         self.adds: dict[Path, QWidget] = {}
         self._parts: dict[object, QWidget] = {}
         self._known: Mapping[ProblemRow, tuple[str, ...]] = {}
-        self._together: tuple[Path, ...] = ()
         self._focused: RowWidget | None = None
         self._renames = False
         self.head = FormHead()
@@ -308,10 +622,6 @@ class FormCard(Card):
         self.asked.emit(asked)
         self._renames = before
 
-    @property
-    def others(self) -> list[QuestionRow]:
-        return [*self.above.rows, *self.below.rows]
-
     def show_form(self, form: Form, *, read_only: bool) -> None:
         """Show a form: parts that it has already stay as they are, others are made, the rest goes."""
         before = self.form
@@ -336,7 +646,6 @@ class FormCard(Card):
             if keyboard is not None and self.inside.isAncestorOf(keyboard):
                 self._reveal(keyboard)
         self.show_repairs(self._known)
-        self.show_selected(self._together)
         self.show_help()
 
     def _show_parts(self, form: Form, before: Form | None) -> None:
@@ -362,8 +671,6 @@ class FormCard(Card):
             elif isinstance(part, AddKeys):
                 self.adds |= {(*form.path, *inner): made for inner, made in part.buttons.items()}
         gone = next((part for part in old.values() if inside_form and part.isAncestorOf(keyboard)), None)
-        typed = keyboard if gone is not None and isinstance(keyboard, TypedLine | TypedText) else None
-        marked = (0, 0, 0) if typed is None else typed.marked()
         if gone is not None and keyboard is not None:
             keyboard.clearFocus()  # else Qt hands the keyboard on
         self._drop(old)
@@ -374,16 +681,12 @@ class FormCard(Card):
                 part.show()  # at once: a layout shows it later, and what is hidden takes no keyboard
         if gone is not None:
             self._refocus(form, before, gone)
-        if typed is not None and before is not None and self._focused is not None:
-            for part in self._focused.findChildren(QWidget):
-                if type(part) is type(typed) and part.accessibleName() == typed.accessibleName():
-                    part.take_over(typed, marked)
 
     def _refocus(self, form: Form, before: Form | None, gone: QWidget) -> None:
         """Give the keyboard of a part that is gone to the row in its place, or that it added; else to the first row."""
         path: Path | None = None
         if before is not None and isinstance(gone, RowWidget):
-            path = gone.row.row.path
+            path = gone.row.path
             path = (*form.path, *path[len(before.path) :]) if path[: len(before.path)] == before.path else path
         elif before is not None:
             path = added_row(form, before)
@@ -413,12 +716,12 @@ class FormCard(Card):
                 if len(beside) > 1 and beside != heads:
                     names = tuple(language for _, language in beside)
                     yield (
-                        ("heads", at, row.row.path[-1], names),
+                        ("heads", at, row.path[-1], names),
                         partial(LanguageHeads, names, (LABEL_PX + 8, FIELD_PX + 8)),
                         None,
                     )
                 heads = beside
-                inner = row.row.path[len(form.path) :] if row.row.path[: len(form.path)] == form.path else row.row.path
+                inner = row.path[len(form.path) :] if row.path[: len(form.path)] == form.path else row.path
                 yield (at, inner, structure_of(row)), partial(self._row, row), row
             if section.absent and not self.read_only:
                 added = tuple((one.path[len(form.path) :], one.label, one.help) for one in section.absent)
@@ -430,11 +733,6 @@ class FormCard(Card):
     def _now(self, inner: Path) -> Path:
         """Return the path of a part of the element that is shown."""
         return inner if self.form is None else (*self.form.path, *inner)
-
-    def show_selected(self, paths: tuple[Path, ...]) -> None:
-        self._together = paths
-        for row in self.others:
-            row.show_chosen(row.line.path in paths)
 
     def _heading(self, section: Section, *, removable: bool) -> QWidget:
         made, inner = QWidget(), () if self.form is None else section.path[len(self.form.path) :]
@@ -453,7 +751,7 @@ class FormCard(Card):
         if isinstance(made.field, EntryList) and self.read_only:
             made.field.freeze()
         made.field.came.connect(lambda: self._come(made))
-        made.field.setEnabled(not self.read_only or row.row.kind in {"list", "tables", "references", "reference"})
+        made.field.setEnabled(not self.read_only or row.kind in {"list", "tables", "references", "reference"})
         for part in (made.remove, made.keys):
             if part is not None:
                 part.setEnabled(not self.read_only)
@@ -474,8 +772,8 @@ class FormCard(Card):
             self.area.ensureWidgetVisible(keyboard, 0, 40)
 
     def _row_of(self, path: Path) -> RowWidget | None:
-        around = [row for row in self.rows if path[: len(row.row.row.path)] == row.row.row.path]
-        return max(around, key=lambda row: len(row.row.row.path), default=None)
+        around = [row for row in self.rows if path[: len(row.row.path)] == row.row.path]
+        return max(around, key=lambda row: len(row.row.path), default=None)
 
     def focus(self, path: Path) -> bool:
         """Give the keyboard to the row of a place and scroll; return whether there is one.
@@ -495,7 +793,7 @@ class FormCard(Card):
 
     def focus_first(self) -> None:
         if self.rows:
-            self.focus(self.rows[0].row.row.path)
+            self.focus(self.rows[0].row.path)
 
     def focus_first_text(self, *, filled: bool) -> None:
         """Give the keyboard to the first text, marked, before it to an empty one unless all are filled in.
@@ -543,4 +841,4 @@ class FormCard(Card):
         if row is None:
             self.foot.show_help("", "", "")
         else:
-            self.foot.show_help(row.row.row.label, row.row.place, row.help)
+            self.foot.show_help(row.row.label, row.row.place, row.help)

@@ -1,29 +1,308 @@
-"""The editors of the rows of a form, one for each kind of value."""
+"""The editors of the rows of a form, one for each kind of value, and the fields that they are typed in.
 
-from collections.abc import Callable
+What is typed is handed on within moments, at Enter, and on leaving the field.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, QMimeData, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QResizeEvent
+from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.designer.document.fields import Row
 from study_app.designer.document.steps import AddNamed, Do, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
 from study_app.designer.document.study import Study
-from study_app.designer.form.rows import FormRow, choice_words, is_right_to_left, new_words
-from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedText
-from study_app.designer.place.segments import Segments, cut_text, small_button
-from study_app.gui.kit.commands import with_key
+from study_app.designer.form.rows import STATEMENT, FormRow, choice_words, is_right_to_left, new_words
+from study_app.designer.place.segments import FIELD_PX, Segments, cut_text, dense, small_button
+from study_app.gui.kit.commands import keys_of, with_key
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import number_of, typed_numbers
 
+HAND_ON_MS = 150
+"""What is typed is handed on so long after the first key [ms]: typing without a rest is kept as well."""
+CLICK_MS = 10
+"""How often it is looked whether the click is done that the keyboard left a field by [ms]."""
+MOST_LINES, SENTENCE_EDGE_PX = 6, 16
+"""How many lines a sentence has at most, and what its field needs above and below them [px]."""
+LINE_BREAK = re.compile(r"\s*[\r\n\u2028\u2029]+\s*")
+KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
+
+
+def removes_key(event: QKeyEvent) -> bool:
+    """Return whether a key removes the field's key from the file."""
+    return QKeySequence(event.keyCombination()) == QKeySequence(keys_of("remove")[0])
+
+
+if TYPE_CHECKING:
+    _Base = QWidget
+else:
+    _Base = object  # mixed into fields of Qt
+
+
+class _Typed(_Base):
+    """What a line and a field of several lines share; ``typed`` carries the text, ``left`` follows when it is left."""
+
+    typed: Any
+    came: Any
+    left: Any
+    rests = True
+    """Whether what is typed is handed on while typing, not only at Enter and on leaving."""
+    beside: Sequence[_Typed] = ()
+    """The fields of all languages of a text in several languages."""
+
+    def begin(self) -> None:
+        self.pending = False
+        self._before = ""
+        self._rest = QTimer(self)
+        self._rest.setSingleShot(True)
+        self._rest.timeout.connect(self._flush_after_click)
+
+    def note(self) -> None:
+        self.pending = True
+        if self.rests and not self._rest.isActive():
+            self._rest.start(HAND_ON_MS)
+
+    def flush(self) -> None:
+        self._rest.stop()
+        if self.pending:
+            self.pending = False
+            self.typed.emit(self.words())
+
+    def _flush_after_click(self) -> None:
+        """Hand on what was typed, once no button is pressed and no list is open: another form would take it away."""
+        if QApplication.mouseButtons() == Qt.MouseButton.NoButton and QApplication.activePopupWidget() is None:
+            self.flush()
+            if not self.hasFocus():
+                self.left.emit()
+        else:
+            self._rest.start(CLICK_MS)
+
+    def accept(self) -> None:
+        """Hand on what was typed; Esc restores it from now on, unless it is refused."""
+        self.flush()
+        if self.property("state") != "refused":
+            self._before = self.words()
+
+    def words(self) -> str:
+        raise NotImplementedError
+
+    def nothing_to_delete(self) -> bool:
+        """Return whether all of the text is marked, or nothing is and the caret is at its end; other languages: empty.
+
+        No key removes a text that is not.
+        """
+        return self.at_end() and not any(one.words() for one in self.beside if one is not self)
+
+    def at_end(self) -> bool:
+        """Return whether the caret is at the end of a text of which nothing or all is marked."""
+        raise NotImplementedError
+
+    def begin_value(self) -> None:
+        """Take what is shown as the value of another element: nothing is refused, and Esc restores it."""
+        self.show_refused(False)
+        self._before = self.words()
+
+    def restore(self) -> None:
+        """Hand on what was there when the keyboard came."""
+        self._rest.stop()
+        self.pending = False
+        if self.words() != self._before:
+            self.show_text(self._before)
+            self.typed.emit(self._before)
+
+    def show_text(self, text: str) -> None:
+        """Show a text, unless something else is being typed."""
+        raise NotImplementedError
+
+    def show_refused(self, yes: bool) -> None:
+        """Give the field the edge of one whose text is refused, or take it away."""
+        state = "refused" if yes else ""
+        if (self.property("state") or "") != state:
+            self.setProperty("state", state)
+            self.style().unpolish(self)
+            self.style().polish(self)
+
+    def leaves_to_place(self, event: QEvent) -> bool:
+        """Return whether a key is the place's, whose undo is for the whole study."""
+        if event.type() != QEvent.Type.ShortcutOverride or not isinstance(event, QKeyEvent):
+            return False
+        if not any(event.matches(key) for key in KEYS_OF_PLACE):
+            return False
+        self.flush()
+        event.ignore()
+        return True
+
+    def event(self, event: QEvent) -> bool:
+        return True if self.leaves_to_place(event) else super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.restore()
+        elif removes_key(event) and self.nothing_to_delete():
+            event.ignore()  # its row removes the key
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        if self.property("state") != "refused":
+            self._before = self.words()
+        self.came.emit()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if event.reason() != Qt.FocusReason.MouseFocusReason:
+            self.flush()
+            QTimer.singleShot(0, self, self.left.emit)  # once the keyboard is elsewhere: the form may be made anew
+        else:
+            self._rest.start(CLICK_MS)
+
+
+class TypedLine(_Typed, QLineEdit):
+    """One line; ``stepped`` says that an arrow key counts up (1) or down (-1)."""
+
+    stepped = Signal(int)
+    typed = Signal(str)
+    came = Signal()
+    left = Signal()
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.begin()
+        dense(self, name)
+        self.textEdited.connect(lambda _text: self.note())
+        self.returnPressed.connect(self.accept)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        steps = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}
+        if event.key() in steps and not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier:
+            self.flush()
+            self.stepped.emit(steps[Qt.Key(event.key())])
+        else:
+            super().keyPressEvent(event)
+
+    def words(self) -> str:
+        return self.text()
+
+    def at_end(self) -> bool:
+        last = len(self.text().encode("utf-16-le", "surrogatepass")) // 2  # in the units of Qt: some letters have two
+        return self.selectedText() == self.text() or (not self.hasSelectedText() and self.cursorPosition() == last)
+
+    def show_text(self, text: str) -> None:
+        if not self.pending and text != self.text():
+            at = self.cursorPosition()
+            self.setText(text)
+            self.setCursorPosition(at if self.hasFocus() else 0)  # Qt leaves the caret at the end of a shorter text
+
+
+class TypedText(_Typed, QPlainTextEdit):
+    """Several lines; Tab leaves the field."""
+
+    typed = Signal(str)
+    came = Signal()
+    left = Signal()
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.begin()
+        self.setAccessibleName(name)
+        self.setTabChangesFocus(True)
+        self.setUndoRedoEnabled(False)
+        self.setFont(font("label", weight=400))
+        self.setFixedHeight(118)
+        self._known, self._showing = "", False
+        self.textChanged.connect(self._note_change)
+
+    def _note_change(self) -> None:
+        """Note what was typed; Qt says so of another font or margin, too."""
+        if self.words() != self._known:
+            self._known = self.words()
+            if not self._showing:
+                self.note()
+
+    def words(self) -> str:
+        return self.document().toRawText().replace("\u2029", "\n")
+
+    def at_end(self) -> bool:
+        cursor = self.textCursor()
+        return cursor.position() == self.document().characterCount() - 1 and cursor.anchor() in {0, cursor.position()}
+
+    def sizeHint(self) -> QSize:
+        return QSize(120, 118)
+
+    def show_text(self, text: str) -> None:
+        if not self.pending and text != self.words():
+            self._showing = True
+            self.setPlainText(text)  # Qt makes a paragraph of each separator of lines: the words may be others
+            self._showing = False
+
+
+class TypedSentence(TypedText):
+    """A sentence in as many lines as it takes, as far as there is room for them; Enter accepts it."""
+
+    def __init__(self, name: str, *, most_lines: int = MOST_LINES) -> None:
+        super().__init__(name)
+        self._most_lines = most_lines
+        self.setProperty("dense", "true")
+        self.document().setDocumentMargin(0)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.textChanged.connect(self._fit)
+        self._fit()
+
+    def _fit(self) -> None:
+        block, needed = self.document().firstBlock(), 0.0
+        while block.isValid():
+            needed += self.document().documentLayout().blockBoundingRect(block).height()
+            block = block.next()
+        most = self._most_lines * self.fontMetrics().lineSpacing()
+        scrolls = Qt.ScrollBarPolicy.ScrollBarAsNeeded if needed > most else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        self.setVerticalScrollBarPolicy(scrolls)
+        self.setFixedHeight(max(FIELD_PX, min(most, math.ceil(needed)) + SENTENCE_EDGE_PX))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def sizeHint(self) -> QSize:
+        return QSize(120, self.height())
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        if event.reason() in {Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason}:
+            self.selectAll()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            self.accept()
+        else:
+            super().keyPressEvent(event)
+
+    def insertFromMimeData(self, source: QMimeData) -> None:
+        self.insertPlainText(LINE_BREAK.sub(" ", source.text()))
+
+
 MOST_SEGMENTS, SEGMENT_LETTERS = 4, 34
-NUMBER_PX = 96
+NUMBER_PX, NARROWEST_LIST = 96, 120
+
+
+class Extra:
+    """What is shown of a row beyond its value; at the right of an editor that is at least so wide (0: below it)."""
+
+    beside_px = 0
+
+    def show_facts(self, facts: Any) -> None:
+        raise NotImplementedError
 
 
 class Field(Themed, QWidget):
@@ -41,11 +320,27 @@ class Field(Themed, QWidget):
         super().__init__()
         self.row = row
         self.refusal = ""
-        self.box: QBoxLayout = hbox(spacing=8, margins=0, parent=self)
+        self.extra: Any = None
+        self.box: QBoxLayout = hbox(spacing=8)
+        self.outer: QBoxLayout = vbox(self.box, spacing=4, margins=0, parent=self)
 
     def show_row(self, row: FormRow) -> None:
         self.row = row
         self.show_value()
+        self.show_extra()
+
+    def add_extra(self, extra: QWidget) -> None:
+        """Add what shows the facts of the row, below the editor; an `Extra` at its right where there is room."""
+        self.extra = extra
+        self.outer.addWidget(extra, 0, Qt.AlignmentFlag.AlignVCenter)
+        self.show_extra()
+
+    def show_extra(self) -> None:
+        facts = self.row.facts
+        if self.extra is not None:
+            self.extra.setVisible(bool(facts))
+            if facts:
+                self.extra.show_facts(facts)
 
     def show_value(self) -> None:
         raise NotImplementedError
@@ -53,12 +348,24 @@ class Field(Themed, QWidget):
     def take_keyboard(self) -> None:
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
+    def minimumSizeHint(self) -> QSize:
+        least = super().minimumSizeHint()
+        beside_px = 0 if self.extra is None else self.extra.beside_px
+        return QSize(max(beside_px, self.extra.sizeHint().width()), least.height()) if beside_px else least
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self.extra is not None and self.extra.beside_px:
+            beside = self.width() >= self.extra.beside_px + self.extra.sizeHint().width() + 8
+            directions = QBoxLayout.Direction
+            self.outer.setDirection(directions.LeftToRight if beside else directions.TopToBottom)
+
     def set_value(self, value: Any, *, typing: bool = False) -> None:
-        self.asked.emit(SetValue(self.row.row.path, value, typing))
+        self.asked.emit(SetValue(self.row.path, value, typing))
 
     def placeholder(self) -> str:
         """Return what counts where nothing is written."""
-        default = self.row.row.default
+        default = self.row.default
         if default in (None, "", [], {}):
             return ""
         return f"{written(default)} (default)"
@@ -67,30 +374,28 @@ class Field(Themed, QWidget):
 class LineField(Field):
     """A plain text, one number, or numbers side by side, in one line."""
 
-    typed_in: Callable[[str], Any] = TypedLine
-
-    def __init__(self, row: FormRow) -> None:
+    def __init__(self, row: FormRow, typed_in: Callable[[str], Any] = TypedLine) -> None:
         super().__init__(row)
-        self.line = self.typed_in(row.row.label)
-        if row.row.kind in {"number", "whole number"}:
+        self.line = typed_in(row.label)
+        if row.kind in {"number", "whole number"}:
             self.line.setFixedWidth(NUMBER_PX + (48 if self.placeholder() else 0))
             self.line.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.box.addWidget(self.line)
-        if row.row.unit:
-            self.box.addWidget(label(row.row.unit, "label", "text2"))
-        if row.row.kind in {"number", "whole number"}:
+        if row.unit:
+            self.box.addWidget(label(row.unit, "label", "text2"))
+        if row.kind in {"number", "whole number"}:
             permitted = cut_text(row.range, "small", "text2", right=True)
             self.box.addWidget(permitted, 1)
         self.line.typed.connect(self._take)
         self.line.came.connect(self.came)
-        if row.row.kind in {"number", "whole number"}:
+        if row.kind in {"number", "whole number"}:
             self.line.stepped.connect(self._step)
         self.setFocusProxy(self.line)
         self.show_value()
 
     def _step(self, by: int) -> None:
         """Count up or down, in the last digit that is shown."""
-        shown = self.line.text().strip() or str(self.row.row.default or 0)
+        shown = self.line.text().strip() or str(self.row.default or 0)
         number = number_of(shown)
         if number is None or self.line.isReadOnly():
             return
@@ -100,13 +405,13 @@ class LineField(Field):
         self._take(self.line.text())
 
     def show_value(self) -> None:
-        value = self.row.row.value
+        value = self.row.value
         self.line.setPlaceholderText(self.placeholder())
         if not self.refusal:
             self.line.show_text("" if value is None else written(value))
 
     def _take(self, text: str) -> None:
-        row, before = self.row.row, self.refusal
+        row, before = self.row, self.refusal
         self.refusal = ""
         value: Any = text
         if not text.strip() and row.value is not None and not row.required and row.kind != "text":
@@ -135,59 +440,60 @@ class SwitchField(Field):
         super().__init__(row)
         self.toggle = Toggle()
         self.toggle.setFont(font("label"))
-        self.toggle.setAccessibleName(row.row.label)
+        self.toggle.setAccessibleName(row.label)
         self.toggle.clicked.connect(lambda checked: self.set_value(bool(checked)))
         add_parts(self.box, self.toggle, STRETCH)
         self.setFocusProxy(self.toggle)
         self.show_value()
 
     def show_value(self) -> None:
-        row = self.row.row
+        row = self.row
         self.toggle.setChecked(bool(row.default if row.value is None else row.value))
 
 
 class ChoiceField(Field):
-    """One of some words: few and short ones side by side, others in a list; a reference has an arrow to its element."""
+    """One of some words: few and short ones side by side, others in a list; a reference has an arrow to its element.
+
+    The kinds of a question are side by side where there is room.
+    """
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
-        words = [choice_words(choice, None) for choice in row.row.choices]
+        words = [self.words(choice, None) for choice in row.choices]
         few = 1 < len(words) <= MOST_SEGMENTS and sum(len(one) + 3 for one in words) <= SEGMENT_LETTERS
-        self.segments = Segments(row.row.label) if few and row.row.kind != "reference" else None
-        self.list: Choice | None = None
+        few = few and row.kind != "reference"
+        self.segments = Segments(row.label) if few or row.kind == "kind" else None
+        self.list = None if few else dense(Choice(), row.label)
         if self.segments is not None:
             self.segments.chosen.connect(self._choose)
-            add_parts(self.box, self.segments, STRETCH)
-        else:
-            self.list = Choice()
-            self.list.setProperty("dense", "true")
-            self.list.setFont(font("label", weight=400))
-            self.list.setFixedHeight(FIELD_PX)
-            self.list.setAccessibleName(row.row.label)
-            self.list.setMinimumContentsLength(12)
+            self.box.addWidget(self.segments)
+        if self.list is not None:
+            self.list.setMinimumContentsLength(8 if row.facts else 12)
             self.list.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
             self.list.activated.connect(self._pick)
             self.box.addWidget(self.list, 1)
+        if self.segments is not None:
+            self.box.addStretch()
         self._values: list[str | None] = []
-        opens = f"Open what {row.row.label} names"
+        opens = f"Open what {row.label} names"
         self.arrow = IconButton("arrow_right", opens, with_key(f"{opens}; back", "back"), size=FIELD_PX)
         self.arrow.clicked.connect(lambda: self.asked.emit(Do("select", (self.row.target,))))
-        if row.row.kind == "reference":
+        if row.kind == "reference":
             self.box.addWidget(self.arrow)
         self.setFocusProxy(self.segments or self.list or self.arrow)
         self.show_value()
+        self._make_room()
 
     def show_value(self) -> None:
-        row = self.row.row
+        row = self.row
         shown = row.default if row.value is None else row.value
-        values = [(choice.value, self.words(choice)) for choice in row.choices]
-        if row.kind == "reference":
-            values = [(name, f"{name} ({note})" if note else name) for name, note in self.row.notes]
         if self.segments is not None:
-            plain = [(choice.value, choice_words(choice, None)) for choice in row.choices]
-            self.segments.show_values(plain, shown)
+            self.segments.show_values([(choice.value, self.words(choice, None)) for choice in row.choices], shown)
+        if self.list is None:
             return
-        assert self.list is not None  # noqa: S101 - one of the two is there
+        values = [(choice.value, self.words(choice, row.default)) for choice in row.choices]
+        if row.kind == "reference":
+            values = [(name, f"{name} ({note})" if note else name) for name, note in row.notes]
         if shown is not None and shown not in [value for value, _ in values]:
             values.append((shown, str(shown)))
         values += [(section, new_words(section)) for section in row.sections]
@@ -200,26 +506,48 @@ class ChoiceField(Field):
         known = self._values[: len(values) - len(row.sections)]
         self.list.setCurrentIndex(known.index(shown) if shown in known else -1)
         self.list.setPlaceholderText("" if known else "Nothing can be named yet")
-        self.arrow.setEnabled(self.row.target is not None)
+        self.arrow.setEnabled(row.target is not None)
 
-    def words(self, choice: Any) -> str:
-        return choice_words(choice, self.row.row.default)
+    def words(self, choice: Any, default: object) -> str:
+        """Return what a choice is called; a statement has no kind in the file."""
+        if choice.value is None and self.row.kind == "kind" and "items" in self.row.path:
+            return STATEMENT.capitalize()
+        return choice_words(choice, default)
+
+    def _make_room(self) -> None:
+        if self.segments is not None and self.list is not None:
+            both: tuple[QWidget, QWidget] = (self.segments, self.list)
+            shown, hidden = both if self.width() >= self.segments.sizeHint().width() else both[::-1]
+            held = self.window().focusWidget()
+            shown.show()
+            self.setFocusProxy(shown)
+            if held is not None and (held is hidden or hidden.isAncestorOf(held)):
+                shown.setFocus()
+            hidden.hide()
+
+    def minimumSizeHint(self) -> QSize:
+        least = super().minimumSizeHint()
+        return least if None in {self.segments, self.list} else QSize(NARROWEST_LIST, least.height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._make_room()
 
     def _pick(self, at: int) -> None:
         """Choose a value; one of the last entries adds an element and names it."""
-        sections = self.row.row.sections
+        sections = self.row.sections
         new = at - (len(self._values) - len(sections))
         if new < 0:
             self._choose(self._values[at])
             return
         self.show_value()
-        self.asked.emit(AddNamed(self.row.row.path, sections[new]))
+        self.asked.emit(AddNamed(self.row.path, sections[new]))
 
     def _choose(self, value: Any) -> None:
-        row = self.row.row
-        if row.kind == "kind":
+        row = self.row
+        if row.kind == "kind" and value != row.value:
             self.asked.emit(SwitchKind(row.path[:-1], value))
-        elif value is not None and value != row.value:
+        elif row.kind != "kind" and value is not None and value != row.value:
             self.set_value(value)
         self.came.emit()
 
@@ -232,10 +560,10 @@ class ChecksField(Field):
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.box.setSpacing(0)
         self.checks: dict[str, Check] = {}
-        for choice in row.row.choices:
+        for choice in row.choices:
             made = Check(choice_words(choice, None))
             made.setFont(font("label", weight=400))
-            made.setAccessibleName(f"{row.row.label}, {made.text()}")
+            made.setAccessibleName(f"{row.label}, {made.text()}")
             made.setToolTip(choice.sentence)
             made.clicked.connect(self._take)
             self.checks[str(choice.value)] = made
@@ -245,13 +573,13 @@ class ChecksField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        row = self.row.row
+        row = self.row
         chosen = row.value if isinstance(row.value, tuple) else row.default or ()
         for value, check in self.checks.items():
             check.setChecked(value in chosen)
 
     def _take(self) -> None:
-        row = self.row.row
+        row = self.row
         there = [value for value in row.value or () if value in self.checks and self.checks[value].isChecked()]
         there += [value for value, check in self.checks.items() if check.isChecked() and value not in there]
         self.set_value(there)
@@ -267,7 +595,7 @@ class UnknownField(Field):
         self.show_value()
 
     def show_value(self) -> None:
-        self.value.show_text(written(self.row.row.value))
+        self.value.show_text(written(self.row.value))
 
 
 def add_button(name: str, words: str = "") -> ActionButton:
@@ -296,29 +624,22 @@ def written(value: Any) -> str:
 class LanguagesField(Field):
     """A text in each language, side by side, or below each other where there are more than two or several lines."""
 
-    one: type[TypedLine | TypedText] = TypedLine
-    """What a text of one paragraph is typed into."""
-
-    def __init__(self, row: FormRow) -> None:
+    def __init__(self, row: FormRow, typed_in: type[TypedLine | TypedText] = TypedLine) -> None:
         super().__init__(row)
-        several, down = row.row.kind == "paragraphs", stacked(row)
-        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        self.box.setSpacing(4)
-        self.outer = self.box
-        self.box = QVBoxLayout() if down else QHBoxLayout()
-        self.box.setSpacing(8)
-        add_layout(self.outer, self.box)
+        several, down = row.kind == "paragraphs", stacked(row)
+        if down:
+            self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.lines: dict[str, TypedLine | TypedText] = {}
         for code, language in row.languages:
-            name = row.row.label if len(row.languages) == 1 else f"{row.row.label}, {language}"
-            made = (TypedText if several else self.one)(name)
+            name = row.label if len(row.languages) == 1 else f"{row.label}, {language}"
+            made = (TypedText if several else typed_in)(name)
             if len(row.languages) > 1:
                 made.setPlaceholderText(f"Missing in {language}")
                 made.setToolTip(language)
             if is_right_to_left(code):
                 made.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
-            made.typed.connect(lambda text, code=code: self.asked.emit(SetText(self.row.row.path, code, text)))
-            made.left.connect(lambda: self.asked.emit(LeaveText(self.row.row.path)))
+            made.typed.connect(lambda text, code=code: self.asked.emit(SetText(self.row.path, code, text)))
+            made.left.connect(lambda: self.asked.emit(LeaveText(self.row.path)))
             made.came.connect(self.came)
             self.lines[code] = made
             if down and len(row.languages) > 1:
@@ -345,7 +666,7 @@ class LanguagesField(Field):
 
     def show_value(self) -> None:
         """Show each text; a plain one stands for the first language. A text that is that of the first one is marked."""
-        value = self.row.row.value
+        value = self.row.value
         named, copies = self.row.languages[0][1], self.row.copied
         if copies or "copied" in self.__dict__:
             self.copied.setText(f"As in {named}, not translated yet: {', '.join(copies)}")
@@ -361,7 +682,7 @@ class LanguagesField(Field):
 
 def stacked(row: FormRow) -> bool:
     """Return whether texts in several languages are below each other, each with its language."""
-    return len(row.languages) > 2 or row.row.kind == "paragraphs"
+    return len(row.languages) > 2 or row.kind == "paragraphs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -369,7 +690,8 @@ class SpecialEditor:
     """An editor of certain keys; bounds, faults, help and removal stay those of the row."""
 
     keys: tuple[tuple[str, str], ...]  # title of the model in the JSON Schema, such as "Block", and the key
-    make: Callable[[FormRow], Field]  # makes the editor of a row
+    make: Callable[[FormRow], Field] | None = None  # makes the editor of a row; None: that of its kind
+    adds: Callable[[Field], QWidget] | None = None  # makes what shows its facts, an `Extra`
     wide: bool = False  # whether it takes the width of the form, with the label above it
     labelled: bool = True  # whether the label is shown; a screen reader says it in any case
     # returns what makes another editor necessary, beyond what does for every row

@@ -16,14 +16,32 @@ from study_app.designer.document.elements import (
     title_of,
     used_by,
 )
-from study_app.designer.document.fields import Choice, Row, label_of, refused_at, row_at, rows, sections_of
-from study_app.designer.document.names import languages_of, named_at
+from study_app.designer.document.fields import (
+    Choice,
+    Row,
+    label_of,
+    languages_of,
+    named_at,
+    refused_at,
+    row_at,
+    rows,
+    sections_of,
+)
 from study_app.designer.document.steps import AddToSession, Request, SetValue, index_of
 from study_app.designer.document.study import Study
-from study_app.designer.form.row_widget import EDITORS
-from study_app.designer.form.rows import NO_QUESTIONS, STUDY_LANGUAGES, Entry, Form, FormRow, Section, question_lines
+from study_app.designer.form.card import EDITORS
+from study_app.designer.form.rows import (
+    NO_QUESTIONS,
+    STUDY_LANGUAGES,
+    Entry,
+    Form,
+    FormRow,
+    Section,
+    question_lines,
+    values_of,
+)
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language
-from study_app.designer.outline.outline_rows import icon_of
+from study_app.designer.outline import icon_of
 from study_app.number_text import capitalised
 from study_app.protocol.formats import is_second
 from study_app.protocol.groups import sequences_in
@@ -57,7 +75,7 @@ def form(study: Study, path: Path) -> Form:
         if (path == SEQUENCE or main) and (of_blocks := rows_of_blocks(document)):
             together = tuple(_form_row(study, row, places) for row in of_blocks)
             sections = (*sections, Section(path, "The main blocks together", together))
-    shown = {row.row.path for section in sections for row in section.rows}
+    shown = {row.path for section in sections for row in section.rows}
     shown |= {section.path for section in sections if section.path != path}
     within = [fault for fault in study.faults if fault.path[: len(path)] == path]
     within = [fault for fault in within if not any(fault.path[: len(one)] == one for one in shown)]
@@ -147,7 +165,7 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
             ]
         elif row.instead and not _given(other[row.instead]) and (_given(row) or faulty):
             both = tuple((str(key), one.label) for key, one in other.items() if key in {row.path[-1], row.instead})
-            shown.append(replace(_form_row(study, row, places), instead=both))
+            shown.append(replace(_form_row(study, row, places), keys=both))
         elif (row.value is None and not faulty and row.path[-1] in refused) or (
             row.instead and _given(other[row.instead]) and not _given(row)
         ):
@@ -161,7 +179,7 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
         elif row.path[-1] != "id" or len(path) < 3:
             shown.append(_form_row(study, row, places))
     title = "" if depth == 0 else label_of(path[-1])
-    inside = {row.row.path for row in shown}
+    inside = {row.path for row in shown}
     faults = tuple(
         _sentence(fault.message, fault.hint)
         for fault in study.faults
@@ -170,9 +188,9 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
         and not any(fault.path[: len(one)] == one for one in inside)
         and not any(fault.path[: len(one)] == one for one in below)
     )
-    rest = (title, tuple(row.path[-1] for row in (*(one.row for one in shown), *absent)))
+    rest = (title, tuple(row.path[-1] for row in (*shown, *absent)))
     for words, keys in (*sections_of(study.document, path), rest):
-        own = tuple(row for key in keys for row in shown if row.row.path[len(path)] == key)
+        own = tuple(row for key in keys for row in shown if row.path[len(path)] == key)
         missing = tuple(row for key in keys for row in absent if row.path[-1] == key)
         shown = [row for row in shown if row not in own]
         absent = [row for row in absent if row not in missing]
@@ -197,16 +215,17 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     if row.kind == "either":
         number = next((index for index, one in enumerate(row.either) if _fits(one, row.value)), 0)
     return FormRow(
-        row,
-        place_words(path, places.line(path)),
-        faults,
-        tuple((code, language_name(code)) for code in codes) if row.kind in {"localised", "paragraphs"} else (),
-        tuple(_entries(study, row)),
-        named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
-        tuple(_notes(document, row)),
-        number,
+        **values_of(row),
+        place=place_words(path, places.line(path)),
+        faults=faults,
+        languages=tuple((code, language_name(code)) for code in codes)
+        if row.kind in {"localised", "paragraphs"} else (),
+        entries=tuple(_entries(study, row)),
+        target=named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
+        notes=tuple(_notes(document, row)),
+        number=number,
         facts=facts(study, row) if (facts := _facts_of(row)) is not None else None,
-    )
+    )  # fmt: skip
 
 
 def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:

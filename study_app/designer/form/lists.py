@@ -1,6 +1,6 @@
 """Lists in the form: entries that are selected, moved, copied and removed together, each time as one step."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -26,18 +26,17 @@ from study_app.designer.document.steps import (
     Several,
 )
 from study_app.designer.document.study import Study
-from study_app.designer.form.fields import Field, SpecialEditor, add_button, kept, written
+from study_app.designer.form.fields import Field, SpecialEditor, TypedLine, add_button, kept, written
 from study_app.designer.form.rows import FormRow, new_words
-from study_app.designer.form.typed_fields import FIELD_PX, TypedLine
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.study_facts import valid_part
-from study_app.designer.place.segments import cut_text
+from study_app.designer.place.segments import FIELD_PX, cut_text, dense
 from study_app.gui.kit.commands import tip, with_key
-from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import name_bars
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
+from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
-from study_app.gui.widgets.labels import Elided, figures
+from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.number_text import typed_numbers
 from study_app.protocol.source.document import Path
@@ -156,12 +155,12 @@ class EntryList(Field):
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.box.setSpacing(6)
-        self.ordered = row.row.kind != "tables"
+        self.ordered = row.kind != "tables"
         self.rows: list[EntryRow] = []
         self._after: tuple[int, ...] | None = None
         self._filled: object = None
         self.list = Rows()
-        self.list.setAccessibleName(row.row.label)
+        self.list.setAccessibleName(row.label)
         self.list.dropped.connect(self.move_entries)
         self.list.itemDoubleClicked.connect(lambda item: self.open(self.list.row(item)))
         self.list.keys = {
@@ -230,7 +229,7 @@ class EntryList(Field):
         (self.list if self.chosen else self).setFocus(Qt.FocusReason.OtherFocusReason)
 
     def place(self, at: int) -> tuple[str | int, ...]:
-        return self.row.entries[at].path if self.row.entries else (*self.row.row.path, at)
+        return self.row.entries[at].path if self.row.entries else (*self.row.path, at)
 
     def open(self, at: int) -> None:
         if at < len(self.row.entries) and (target := self.row.entries[at].target):
@@ -262,11 +261,11 @@ class EntryList(Field):
             return
         gone: tuple[Request, ...] = tuple(RemoveKey(self.place(index)) for index in reversed(indexes))
         near = min(indexes[0], len(self.rows) - len(indexes) - 1)
-        words = f"Remove {len(gone)} entries of {self.row.row.label}"
+        words = f"Remove {len(gone)} entries of {self.row.label}"
         self._change(gone[0] if len(gone) == 1 else Several(words, gone), () if near < 0 else (near,))
 
     def _duplicate(self) -> None:
-        if self.row.row.kind != "references":  # a name that is listed twice is a fault
+        if self.row.kind != "references":  # a name that is listed twice is a fault
             after = (index + rank for rank, index in enumerate(self.chosen, start=1))
             first, *others = map(self.place, self.chosen)
             self._change(DuplicateElement(first, tuple(others), stays=True), after)
@@ -286,10 +285,7 @@ class NamesList(Choice):
 
     def __init__(self, name: str, placeholder: str) -> None:
         super().__init__()
-        self.setProperty("dense", "true")
-        self.setFont(font("label", weight=400))
-        self.setFixedHeight(FIELD_PX)
-        self.setAccessibleName(name)
+        dense(self, name)
         self.setPlaceholderText(placeholder)
         self.activated.connect(self._take)
 
@@ -310,14 +306,14 @@ class EntriesField(EntryList):
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
-        name = f"Add to {row.row.label}"
-        self.names = NamesList(name, "Add …") if row.row.kind == "references" else None
+        name = f"Add to {row.label}"
+        self.names = NamesList(name, "Add …") if row.kind == "references" else None
         if self.names is not None:
             self.names.chosen.connect(self.asked)
             self.add: QWidget = self.names
         else:
             self.add = add_button(name, "Add")
-            self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.row.path)))
+            self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.path)))
         self.foot = hbox(self.add, STRETCH)
         add_layout(self.box, self.foot)
         self.setFocusProxy(self.add)
@@ -326,14 +322,14 @@ class EntriesField(EntryList):
     def show_value(self) -> None:
         super().show_value()
         if self.names is not None:
-            row = self.row.row
+            row = self.row
             items: list[tuple[str, Request]]
             items = [(str(choice.value), AddEntry(row.path, str(choice.value))) for choice in row.choices]
             items += [(new_words(section), AddNamed(row.path, section)) for section in row.sections]
             self.names.show_items(items)
 
     def fill(self) -> None:
-        label, count = self.row.row.label, len(self.row.entries)
+        label, count = self.row.label, len(self.row.entries)
         for at, entry in enumerate(self.row.entries):
             title = cut_text(entry.title, "label", "bad" if entry.faults else "text")
             shown = self.add_row(f"{label}, {entry.title}, {at + 1} of {count}", (title, 1), faulty=bool(entry.faults))
@@ -362,7 +358,7 @@ class ConditionsField(EntriesField):
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
-        self.series = add_button(f"Series of {row.row.label.lower()}", "Series …")
+        self.series = add_button(f"Series of {row.label.lower()}", "Series …")
         self.series.setToolTip(tip("series"))
         self.series.setEnabled(bool(row.entries))
         self.series.clicked.connect(self._ask_for_series)
@@ -394,16 +390,16 @@ class LinesField(EntryList):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.lines: list[TypedLine] = []
-        self.add = add_button(f"Add to {row.row.label}")
-        self.add.clicked.connect(lambda: self.asked.emit(AddEntry(self.row.row.path)))
+        self.add = add_button(f"Add to {row.label}")
+        self.add.clicked.connect(lambda: self.asked.emit(AddEntry(self.row.path)))
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
         self.show_value()
 
     def filled_with(self) -> object:
-        return len(self.row.row.value or ())
+        return len(self.row.value or ())
 
     def fill(self) -> None:
-        self.lines, row = [], self.row.row
+        self.lines, row = [], self.row
         count = len(row.value or ())
         for at in range(count):
             line = TypedLine(f"{row.label} {at + 1}")
@@ -416,7 +412,7 @@ class LinesField(EntryList):
 
     def show_value(self) -> None:
         super().show_value()
-        for line, value in zip(self.lines, self.row.row.value or (), strict=False):
+        for line, value in zip(self.lines, self.row.value or (), strict=False):
             if not (self.refusal and line.property("state")):
                 line.show_text(written(value))
 
@@ -426,23 +422,62 @@ class LinesField(EntryList):
     def _paste(self) -> None:
         with suppress(ValueError):  # another text than points
             lines = filter(str.strip, QGuiApplication.clipboard().text().splitlines())
-            added = tuple(AddEntry(self.row.row.path, self._value(line)) for line in lines)
+            added = tuple(AddEntry(self.row.path, self._value(line)) for line in lines)
             after = range(len(self.lines), len(self.lines) + len(added))
-            self._change(Several(f"Paste into {self.row.row.label}", added), after)
+            self._change(Several(f"Paste into {self.row.label}", added), after)
 
     def _value(self, text: str) -> Any:
-        return text if self.row.row.kind == "texts" else [number for _, number in typed_numbers(text)]
+        return text if self.row.kind == "texts" else [number for _, number in typed_numbers(text)]
 
     def _take(self, at: int, text: str) -> None:
         self.refusal, value = "", None
         try:
             value = self._value(text)
         except ValueError as unclear:
-            self.refusal = f"{unclear}. {kept(self.row.row.value[at])}"
+            self.refusal = f"{unclear}. {kept(self.row.value[at])}"
         self.lines[at].show_refused(bool(self.refusal))
         self.came.emit()
         if not self.refusal:
-            self.asked.emit(SetValue((*self.row.row.path, at), value, typing=True))
+            self.asked.emit(SetValue((*self.row.path, at), value, typing=True))
+
+
+class GridField(Field):
+    """A line of fields for each entry, under the heads of their columns, and a button that adds one."""
+
+    def __init__(self, row: FormRow, entry: str, heads: Sequence[str], signs: Sequence[str]) -> None:
+        super().__init__(row)
+        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
+        grid = grid_of(6, 6)
+        for column, words in enumerate(heads, start=1):
+            grid.addWidget(label(words, "small", "text2"), 0, column)
+        self.lines: list[list[TypedLine]] = []
+        for at, sign in enumerate(signs):
+            grid.addWidget(figures(sign, "label", "text2"), at + 1, 0)
+            self.lines.append([TypedLine(f"{entry} {at + 1}, {words}") for words in heads])
+            for column, line in enumerate(self.lines[-1]):
+                line.typed.connect(partial(self.take, at, column))
+                line.came.connect(partial(self.come, at))
+                grid.addWidget(line, at + 1, column + 1)
+            away = IconButton("cross", f"Remove {entry} {at + 1}", size=FIELD_PX, role="plain")
+            away.clicked.connect(partial(self.remove, at))
+            grid.addWidget(away, at + 1, len(heads) + 1)
+        add_layout(self.box, grid)
+        self.add = add_button(f"Add to {row.label}", entry)
+        self.add.clicked.connect(self.add_entry)
+        self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
+        self.setFocusProxy(self.lines[0][0] if self.lines else self.add)
+
+    def come(self, _at: int) -> None:
+        self.came.emit()
+
+    def take(self, at: int, column: int, text: str) -> None:
+        raise NotImplementedError
+
+    def remove(self, at: int) -> None:
+        self.asked.emit(RemoveKey((*self.row.path, at)))
+
+    def add_entry(self) -> None:
+        self.asked.emit(AddEntry(self.row.path))
 
 
 class LanguageListField(EntryList):
@@ -460,7 +495,7 @@ class LanguageListField(EntryList):
 
     def fill(self) -> None:
         row, self.copies = self.row, {}
-        codes = [str(code) for code in row.row.value] if isinstance(row.row.value, tuple) else []
+        codes = [str(code) for code in row.value] if isinstance(row.value, tuple) else []
         first = row.entries[0].title if row.entries else ""
         for at, (code, entry) in enumerate(zip(codes, row.entries, strict=True)):
             title, note = Elided("label", "bad" if entry.faults else "text"), Elided("small", "text2")
@@ -476,7 +511,7 @@ class LanguageListField(EntryList):
             if len(codes) > 1:
                 name = f"Remove {entry.title} from every text"
                 shown.add_button("cross", name, partial(self.asked.emit, ChangeLanguage("remove", code)))
-        self.names.show_items((one.sentence, one.value) for one in row.row.choices if one.value not in codes)
+        self.names.show_items((one.sentence, one.value) for one in row.choices if one.value not in codes)
 
 
 CONDITIONS: Final = SpecialEditor(

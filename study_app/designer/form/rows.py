@@ -1,12 +1,11 @@
 """What a form shows: its rows in sections, their words, and the lines of a questionnaire."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Final
 
-from study_app.designer.document.changes import is_copied
-from study_app.designer.document.fields import Choice, Row, label_of, singular
-from study_app.designer.document.names import languages_of
+from study_app.designer.document.additions import is_copied
+from study_app.designer.document.fields import Choice, Row, label_of, languages_of, singular
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import Study
 from study_app.protocol.source.document import Path, value_at
@@ -92,11 +91,10 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class FormRow:
+class FormRow(Row):
     """One row of the form."""
 
-    row: Row  # what is edited and how
-    place: str  # its place in the file, such as ``blocks.liquids.order``, with its line
+    place: str = ""  # its place in the file, such as ``blocks.liquids.order``, with its line
     faults: tuple[str, ...] = ()  # what is wrong with it, in the words of ``check``
     languages: tuple[tuple[str, str], ...] = ()  # code and name of each language of the study, for texts
     entries: tuple[Entry, ...] = ()  # what a list holds, or what references name
@@ -104,32 +102,37 @@ class FormRow:
     notes: tuple[tuple[str, str], ...] = ()  # elements that a reference can name, each with its `brief` fact
     number: int | None = None  # of alternatives ("either"), which one the value is
     # keys of which exactly one is given, with their labels: this row's and the other one
-    instead: tuple[tuple[str, str], ...] = ()
+    keys: tuple[tuple[str, str], ...] = ()
     facts: Any = None  # what its special editor shows beyond the value; None where it has none
 
     @property
     def copied(self) -> tuple[str, ...]:
         """The languages in which a text is still that of the first language."""
-        texts = self.row.value if isinstance(self.row.value, Mapping) else {}
+        texts = self.value if isinstance(self.value, Mapping) else {}
         return tuple(name for code, name in self.languages[1:] if is_copied(texts, code, self.languages[0][0]))
 
     @property
     def removable(self) -> bool:
-        path = self.row.path
-        given = self.row.value is not None and isinstance(path[-1], str)
+        path = self.path
+        given = self.value is not None and isinstance(path[-1], str)
         section = len(path) == 1 or path == STUDY_LANGUAGES
-        return given and not (self.row.required or self.instead or section)
+        return given and not (self.required or self.keys or section)
 
     @property
-    def bounds(self) -> str:
-        return ", ".join(self.row.bounds)
+    def permitted(self) -> str:
+        return ", ".join(self.bounds)
 
     @property
     def range(self) -> str:
-        bounds = self.row.bounds
+        bounds = self.bounds
         if len(bounds) == 2 and bounds[0].startswith(LEAST) and bounds[1].startswith(MOST):
             return f"{bounds[0].removeprefix(LEAST)} to {bounds[1].removeprefix(MOST)}"
-        return self.bounds
+        return self.permitted
+
+
+def values_of(row: Row) -> dict[str, Any]:
+    """Return the values of a row by their names."""
+    return {one.name: getattr(row, one.name) for one in fields(Row)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,8 +180,8 @@ class Form:
 
 def added_row(form: Form, before: Form) -> Path | None:
     """Return the path of the first row that the form did not have before; None where it had each."""
-    known = {row.row.path for row in before.rows}
-    return next((row.row.path for row in form.rows if row.row.path not in known), None)
+    known = {row.path for row in before.rows}
+    return next((row.path for row in form.rows if row.path not in known), None)
 
 
 def is_right_to_left(code: str) -> bool:

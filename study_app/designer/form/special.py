@@ -1,40 +1,48 @@
-"""Editors of certain keys: sentences, order, points of a scale, kind and list of questions."""
+"""Editors of certain keys: sentences, order, points of a scale, kind and list of questions, hypotheses."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final, Literal
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QBoxLayout, QLabel, QSizePolicy, QWidget
 
-from study_app.designer.document.fields import Row
-from study_app.designer.document.names import languages_of
+from study_app.designer.document.elements import title_of
+from study_app.designer.document.fields import Row, languages_of
 from study_app.designer.document.steps import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
-from study_app.designer.form.fields import ChoiceField, Field, LanguagesField, LineField, SpecialEditor, add_button
-from study_app.designer.form.rows import (
-    STATEMENT,
-    FormRow,
-    QuestionLine,
-    choice_words,
-    is_right_to_left,
-    question_lines,
+from study_app.designer.form.fields import (
+    Extra,
+    Field,
+    LanguagesField,
+    LineField,
+    SpecialEditor,
+    TypedLine,
+    TypedSentence,
+    add_button,
+    kept,
+    written,
 )
-from study_app.designer.form.typed_fields import FIELD_PX, TypedLine, TypedSentence
-from study_app.designer.place.segments import Segments, small_button
+from study_app.designer.form.lists import GridField
+from study_app.designer.form.rows import FormRow, QuestionLine, is_right_to_left, question_lines
+from study_app.designer.measures.study_facts import valid_part
+from study_app.designer.place.segments import FIELD_PX, dense, small_button
 from study_app.gui.kit.commands import with_key
-from study_app.gui.theme.theme import Tone, TypeRole
+from study_app.gui.theme.theme import Tone, TypeRole, font
 from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
-from study_app.gui.widgets.controls import ActionButton, IconButton
+from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
+from study_app.number_text import capitalised, number_of
 from study_app.protocol import questions
+from study_app.protocol.model import OF_LEVELS
+from study_app.protocol.orders.balance import block_order_words
 from study_app.protocol.orders.sequences import borders_even, row_count
-from study_app.protocol.source.document import value_at
+from study_app.protocol.source.document import entries, names, value_at
 from study_app.protocol.trials import designs, tasks
 from study_app.protocol.wording.languages import language_name
 
@@ -112,18 +120,13 @@ INSET_PX = NUMBER_PX + ICON_PX + 2 * 8
 
 
 class QuestionRow(Themed, QWidget):
-    """One question.
-
-    Signals: ``opened`` when it is clicked or its button is pressed, ``joined`` when it is clicked with Shift (True) or
-    Ctrl (False).
-    """
+    """One question; ``opened`` when it is clicked or its button is pressed."""
 
     opened = Signal()
-    joined = Signal(bool)
 
     def __init__(self, line: QuestionLine) -> None:
         super().__init__()
-        self.line, self.chosen = line, False
+        self.line = line
         title = next((text for text in line.texts if text), "without a text")
         self.setAccessibleName(f"Question {line.number}, {line.kind}: {title}")
         self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -159,23 +162,8 @@ class QuestionRow(Themed, QWidget):
         return made
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        if event.button() != Qt.MouseButton.LeftButton or not self.rect().contains(event.position().toPoint()):
-            return
-        shift = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
-        if shift or event.modifiers() & Qt.KeyboardModifier.ControlModifier:
-            self.joined.emit(bool(shift))
-        else:
+        if event.button() == Qt.MouseButton.LeftButton and self.rect().contains(event.position().toPoint()):
             self.opened.emit()
-
-    def show_chosen(self, chosen: bool) -> None:
-        if chosen != self.chosen:
-            self.chosen = chosen
-            self.setAccessibleDescription("Selected" if chosen else "")
-            self.update()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        if self.chosen:
-            paint_ground(self, self.theme.selected)
 
 
 def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
@@ -190,7 +178,7 @@ def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
 class QuestionRows(Themed, QWidget):
     """Questions: all of a questionnaire, or those above or below the one that is edited.
 
-    ``asked`` carries a request: to write the text of one, or to select it with the others.
+    ``asked`` carries a request: to write the text of one.
     """
 
     asked = Signal(object)
@@ -218,7 +206,6 @@ class QuestionRows(Themed, QWidget):
         for line in lines:
             made = QuestionRow(line)
             made.opened.connect(lambda path=line.path: self.asked.emit(Do("write", (path,))))
-            made.joined.connect(lambda between, path=line.path: self.asked.emit(Do("join", (path, between))))
             add_parts(self.column, made, Rule())
             self.rows.append(made)
 
@@ -235,25 +222,15 @@ class Panel(Themed, QWidget):
         QPainter(self).fillRect(QRectF(0, 2, 3, self.height() - 4), QColor(self.theme.accent))
 
 
-class DescriptionField(LineField):
-    """A plain text; what is longer than three lines scrolls."""
-
-    typed_in = staticmethod(partial(TypedSentence, most_lines=3))
-
-
-DESCRIPTION: Final = SpecialEditor((("StudyHead", "description"),), DescriptionField)
+DESCRIPTION: Final = SpecialEditor(
+    (("StudyHead", "description"),), partial(LineField, typed_in=partial(TypedSentence, most_lines=3))
+)
 
 
 QUESTIONS: Final = (*(kind.__name__ for kind in questions.KINDS.own.values()), *questions.KINDS.others)
 TASKS: Final = (*(kind.__name__ for kind in tasks.KINDS.own.values()), *tasks.KINDS.others)
 DESIGNS: Final = tuple({kind.__name__ for kind in designs.KINDS.values()})
 """The titles of their tables."""
-
-
-class SentencesField(LanguagesField):
-    """A sentence in each language."""
-
-    one = TypedSentence
 
 
 SENTENCES: Final = SpecialEditor(
@@ -263,83 +240,39 @@ SENTENCES: Final = SpecialEditor(
         *((kind, "instruction") for kind in TASKS),
         *((kind, "question") for kind in DESIGNS),
     ),
-    SentencesField,
+    partial(LanguagesField, typed_in=TypedSentence),
     wide=True,
 )
 
 
-LETTERS, NARROWEST = 8, 124
+class BalanceChip(Extra, Chip):
+    """Says how even an order is."""
+
+    beside_px = 124
+
+    def show_facts(self, facts: Any) -> None:
+        found: OrderBalance = facts
+        self.show_state(found.tone, found.icon, found.words)
+        self.setToolTip(found.sentence)
+        self.setAccessibleDescription(found.sentence)
 
 
-class OrderField(ChoiceField):
-    """The choice of an order, and a chip that says how even it is."""
-
-    def __init__(self, row: FormRow) -> None:
-        self.chip = Chip(small=True)
-        super().__init__(row)
-        if self.list is not None:
-            self.list.setMinimumContentsLength(LETTERS)
-        self.box.addWidget(self.chip, 0, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
-        self.show_value()
-
-    def show_value(self) -> None:
-        super().show_value()
-        found: OrderBalance | None = self.row.facts
-        self.chip.setVisible(found is not None and self.box.indexOf(self.chip) >= 0)
-        if found is not None:
-            self.chip.show_state(found.tone, found.icon, found.words)
-            self.chip.setToolTip(found.sentence)
-            self.chip.setAccessibleDescription(found.sentence)
-
-    def minimumSizeHint(self) -> QSize:
-        return QSize(max(NARROWEST, self.chip.sizeHint().width()), super().minimumSizeHint().height())
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        beside = self.width() >= NARROWEST + self.chip.sizeHint().width() + 8
-        directions = QBoxLayout.Direction
-        self.box.setDirection(directions.LeftToRight if beside else directions.TopToBottom)
+ORDER: Final = SpecialEditor((("Block", "order"),), adds=lambda _field: BalanceChip(small=True), facts=order_balance)
 
 
-ORDER: Final = SpecialEditor((("Block", "order"),), OrderField, facts=order_balance)
-
-
-class PointsField(Field):
+class PointsField(GridField):
     """A line for each point, a column for each language."""
 
     def __init__(self, row: FormRow) -> None:
-        super().__init__(row)
-        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        grid = grid_of(6, 6)
-        for column, (_code, language) in enumerate(row.facts.languages, start=1):
-            grid.addWidget(label(language, "small", "text2"), 0, column)
-        self.lines: list[list[TypedLine]] = []
-        count = len(row.facts.points)
-        for at in range(count):
-            self._add_line(grid, at, {0: "lowest", count - 1: "highest"}.get(at, ""))
-        add_layout(self.box, grid)
-        self.add = add_button("Add a point", "Point")
-        self.add.clicked.connect(self._ask_to_add)
-        self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
-        self.setFocusProxy(self.lines[0][0] if self.lines else self.add)
+        last = len(row.facts.points) - 1
+        signs = [f"{at + 1}  {({0: 'lowest', last: 'highest'}).get(at, '')}".strip() for at in range(last + 1)]
+        super().__init__(row, "Point", [language for _code, language in row.facts.languages], signs)
+        for lines in self.lines:
+            for line, (code, language) in zip(lines, row.facts.languages, strict=True):
+                line.setPlaceholderText(f"Missing in {language}")
+                if is_right_to_left(code):
+                    line.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
         self.show_value()
-
-    def _add_line(self, grid: QGridLayout, at: int, end: str) -> None:
-        grid.addWidget(figures(f"{at + 1}  {end}".strip(), "label", "text2"), at + 1, 0)
-        lines = []
-        for column, (code, language) in enumerate(self.row.facts.languages, start=1):
-            line = TypedLine(f"Point {at + 1}, {language}")
-            line.setPlaceholderText(f"Missing in {language}")
-            line.typed.connect(lambda text, code=code: self._take(at, code, text))
-            line.came.connect(self.came)
-            if is_right_to_left(code):
-                line.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
-            grid.addWidget(line, at + 1, column)
-            lines.append(line)
-        away = IconButton("cross", f"Remove point {at + 1}", size=FIELD_PX, role="plain")
-        away.clicked.connect(lambda: self._ask_to_remove(at))
-        grid.addWidget(away, at + 1, len(lines) + 1)
-        self.lines.append(lines)
 
     def show_value(self) -> None:
         for lines, words in zip(self.lines, self.row.facts.points, strict=True):
@@ -347,28 +280,23 @@ class PointsField(Field):
                 line.show_text(text)
 
     def _written(self, code: str) -> int:
-        return len((self.row.row.value or {}).get(code, ()))
+        return len((self.row.value or {}).get(code, ()))
 
-    def _take(self, at: int, code: str, text: str) -> None:
-        path, there = (*self.row.row.path, code), self._written(code)
-        if at < there:
-            self.asked.emit(SetValue((*path, at), text, typing=True))
-        else:
-            missing = [*((self.row.row.value or {}).get(code, ())), *[""] * (at - there), text]
-            self.asked.emit(SetValue(path, missing, typing=True))
+    def take(self, at: int, column: int, text: str) -> None:
+        code = self.row.facts.languages[column][0]
+        path, there = (*self.row.path, code), self._written(code)
+        missing = [*((self.row.value or {}).get(code, ())), *[""] * (at - there), text]
+        changed = SetValue((*path, at), text, typing=True) if at < there else SetValue(path, missing, typing=True)
+        self.asked.emit(changed)
 
-    def _ask_to_add(self) -> None:
-        path, number = self.row.row.path, len(self.lines) + 1
-        added: list[Request] = [
-            AddEntry((*path, code), f"Point {number}") for code, _ in self.row.facts.languages if self._written(code)
-        ]
+    def add_entry(self) -> None:
+        path, words = self.row.path, f"Point {len(self.lines) + 1}"
+        added = (AddEntry((*path, code), words) for code, _ in self.row.facts.languages if self._written(code))
         self.asked.emit(Several("Add point", tuple(added)))
 
-    def _ask_to_remove(self, at: int) -> None:
-        path = self.row.row.path
-        gone: list[Request] = [
-            RemoveKey((*path, code, at)) for code, _ in self.row.facts.languages if at < self._written(code)
-        ]
+    def remove(self, at: int) -> None:
+        path = self.row.path
+        gone = (RemoveKey((*path, code, at)) for code, _ in self.row.facts.languages if at < self._written(code))
         self.asked.emit(Several(f"Remove point {at + 1}", tuple(gone)))
 
 
@@ -381,47 +309,7 @@ POINTS: Final = SpecialEditor(
 )
 
 
-NARROWEST_LIST = 120
-
-
-class KindField(ChoiceField):
-    """A statement has no kind in the file."""
-
-    def __init__(self, row: FormRow) -> None:
-        self.all: Segments | None = None
-        super().__init__(row)
-        self.all = Segments(row.row.label)
-        self.all.chosen.connect(lambda kind: None if kind == self.row.row.value else self._choose(kind))
-        self.box.addWidget(self.all)
-        self.box.addStretch()
-        self.show_value()
-        self._make_room()
-
-    def words(self, choice: Any) -> str:
-        return STATEMENT.capitalize() if choice.value is None else choice_words(choice, None)
-
-    def show_value(self) -> None:
-        super().show_value()
-        if self.all is not None:
-            kinds = [(choice.value, self.words(choice)) for choice in self.row.row.choices]
-            self.all.show_values(kinds, self.row.row.value)
-
-    def _make_room(self) -> None:
-        if self.all is not None and self.list is not None:
-            fits = self.width() >= self.all.sizeHint().width()
-            self.all.setVisible(fits)
-            self.list.setVisible(not fits)
-            self.setFocusProxy(self.all if fits else self.list)
-
-    def minimumSizeHint(self) -> QSize:
-        return QSize(NARROWEST_LIST, super().minimumSizeHint().height())
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._make_room()
-
-
-QUESTION_KIND: Final = SpecialEditor(tuple((kind, "kind") for kind in QUESTIONS), KindField, wide=True, labelled=False)
+QUESTION_KIND: Final = SpecialEditor(tuple((kind, "kind") for kind in QUESTIONS), wide=True, labelled=False)
 
 
 class QuestionsField(Field):
@@ -432,9 +320,9 @@ class QuestionsField(Field):
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.rows = QuestionRows()
         self.rows.asked.connect(self.asked)
-        self.add = add_button(f"Add to {row.row.label}", "Question")
+        self.add = add_button(f"Add to {row.label}", "Question")
         self.add.setToolTip(with_key("Add a question", "add"))
-        self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.row.path)))
+        self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.path)))
         self.box.addWidget(self.rows)
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
         self.show_value()
@@ -446,4 +334,252 @@ class QuestionsField(Field):
 
 QUESTION_LIST: Final = SpecialEditor(
     (("Questionnaire", "items"),), QuestionsField, wide=True, facts=lambda study, row: question_lines(study, row.path)
+)
+
+
+def order_of_blocks(study: Study, _row: Row) -> str:
+    """Return what the order of the blocks means for the planned participants; "" while that is not known."""
+    protocol = valid_part(study).protocol
+    if protocol is None or len(protocol.main_blocks) < 2:
+        return ""
+    return f"{capitalised(block_order_words(protocol).partition(': ')[2])}."
+
+
+class Said(Extra, QLabel):
+    """What the planned participants get."""
+
+    def show_facts(self, facts: Any) -> None:
+        self.setText(facts)
+
+
+def _said_below(_field: Field) -> Said:
+    made = Said()
+    made.setFont(font("small"))
+    made.setProperty("role", "text2")
+    made.setWordWrap(True)
+    return made
+
+
+BLOCK_ORDER: Final = SpecialEditor((("StudyHead", "block_order"),), adds=_said_below, facts=order_of_blocks)
+
+MEASURES: Final = tuple(zip(OF_LEVELS, ("Threshold", "Exponent", "Sensitivity d′", "Setting (PSE)"), strict=True))
+RELATIONS: Final = (
+    ("higher", "is higher than"), ("lower", "is lower than"), (None, "is different from"), ("equal", "is equal to"),
+)  # fmt: skip
+BOUND, RATIO = 0.5, 1.25
+NOTHING_TO_COMPARE: Final = "It compares two main blocks, two conditions of a block, or two groups: add a second one."
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """A block, or a condition or group in a block, with the measures that it has, each with its words."""
+
+    key: str  # the key of the file that names it
+    block: str
+    name: str
+    words: str
+    measures: tuple[tuple[str, str], ...]
+
+    def others(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
+        """Return what it can be compared with: other blocks with a measure of its own, or what is in the same block."""
+        alike = (one for one in every if one.key == self.key and one.name != self.name)
+        return tuple(one for one in alike if self.shared(one) and (self.key == "blocks" or one.block == self.block))
+
+    def shared(self, other: "Compared") -> tuple[tuple[str, str], ...]:
+        """Return the measures that both have."""
+        return tuple(one for one in self.measures if one in other.measures)
+
+
+def compared(study: Study, _row: Row) -> tuple[Compared, ...]:
+    """Return what hypotheses can compare, in the order of the file; blocks of one title are told apart by their ids."""
+    every = tuple(_compared(study.document))
+    times = Counter(one.words for one in every)
+    every = tuple(replace(one, words=f"{one.words} ({one.block})") if times[one.words] > 1 else one for one in every)
+    return tuple(one for one in every if one.others(every))
+
+
+def _compared(document: Mapping[str, Any]) -> Iterator[Compared]:
+    for place, block in entries(document, "blocks.*"):
+        if not isinstance(block, Mapping) or block.get("phase", "main") != "main":
+            continue
+        name, title, measures = str(place[1]), title_of(document, place), MEASURES
+        if "design" not in block:
+            asked = entries(document, f"questionnaires.{block.get('questionnaire')}.items.*")
+            items = ((item, path) for path, item in asked if isinstance(item, Mapping) and "kind" not in item)
+            measures = tuple((str(item.get("id")), title_of(document, path)) for item, path in items)
+        if not measures:
+            continue
+        yield Compared("blocks", name, name, title, measures)
+        conditions = block.get("conditions") if "design" not in block else ()
+        for key, inner in (("conditions", conditions), ("groups", names(document, "groups"))):
+            for one in inner if isinstance(inner, tuple | list) else ():
+                words = f"{title_of(document, (key, str(one)))} in {title}"
+                yield Compared(key, name, str(one), words, measures)
+
+
+class Hypothesis(QWidget):
+    """One hypothesis; ``changed`` carries its table as it is chosen."""
+
+    changed = Signal(object)
+    refused = Signal(str)  # why the bound that was typed is none; "" where it is one
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.measures = MEASURES
+        self.known: tuple[Compared, ...] = ()
+        self.others: tuple[Compared, ...] = ()
+        self.value: Mapping[str, Any] = {}
+        boxes = self.measure, self.first, self.relation, self.second = [Choice() for _ in range(4)]
+        for box, part in zip(boxes, ("measure", "of what", "relation", "than what"), strict=True):
+            dense(box, f"{name}, {part}")
+            box.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+            box.setMinimumContentsLength(6)
+            box.activated.connect(self._take)
+        self.within = label("within", "label")
+        self.bound = TypedLine(f"{name}, largest difference that would not matter")
+        self.bound.setFixedWidth(64)
+        self.bound.typed.connect(self._take_bound)
+        self.away = IconButton("cross", f"Remove {name}", size=FIELD_PX, role="plain")
+        above = hbox((self.measure, 2), label("of", "label"), (self.first, 3), self.away, spacing=8)
+        below = hbox((self.relation, 2), (self.second, 3), self.within, self.bound, spacing=8)
+        below.addSpacing(FIELD_PX + 8)
+        vbox(above, below, spacing=4, margins=(0, 0, 0, 6), parent=self)
+
+    def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
+        self.value, self.known = value, known
+        key = next((key for key in ("conditions", "groups") if value.get(key)), "blocks")
+        listed = (value.get(one) for one in ("blocks", key))
+        blocks, named = (tuple(map(str, one)) if isinstance(one, tuple) else () for one in listed)
+        at = [(key, name if key == "blocks" else next(iter(blocks), ""), name) for name in named]
+        found = [next((one for one in known if (one.key, one.block, one.name) == place), None) for place in at]
+        first, second = (*found, None, None)[:2]
+        self.others = () if first is None else first.others(known)
+        self.measures = MEASURES if first is None else first.measures if second is None else first.shared(second)
+        measure, relation = value.get("measure", "threshold"), _relation(value)
+        one, two = (*named, "", "")[:2]
+        for box, word in ((self.measure, measure), (self.first, one), (self.second, two)):
+            box.setPlaceholderText(str(word))  # shown where it is not among the choices
+        self._fill(self.measure, self.measures, measure)
+        self._fill(self.relation, RELATIONS, relation)
+        self._fill(self.first, tuple((one, one.words) for one in known), first)
+        self._fill(self.second, tuple((one, one.words) for one in self.others), second)
+        self.bound.show_text("" if (bound := value.get("bound")) is None else written(bound))
+        for part in (self.within, self.bound):
+            part.setVisible(bound is not None)
+
+    @staticmethod
+    def _fill(box: Choice, values: tuple[tuple[Any, str], ...], chosen: Any) -> None:
+        words = [word for _, word in values]
+        if words != [box.itemText(at) for at in range(box.count())]:
+            box.clear()
+            box.addItems(words)
+        box.setCurrentIndex(next((at for at, (value, _) in enumerate(values) if value == chosen), -1))
+
+    def _take(self) -> None:
+        """Say the hypothesis as it is chosen; what does not fit the first of the two any more is chosen anew."""
+        relation = RELATIONS[max(0, self.relation.currentIndex())][0]
+        if not self.known or self.first.currentIndex() < 0:  # what it compares is not among the choices
+            keys = ("measure", "blocks", "conditions", "groups")
+            table = {key: self.value[key] for key in keys if key in self.value}
+            self.changed.emit(table | _related(relation, self._bound(relation, str(self.value.get("measure")))))
+            return
+        first, others, at = self.known[self.first.currentIndex()], self.others, self.second.currentIndex()
+        fitting = first.others(self.known)
+        second = others[at] if 0 <= at < len(others) and others[at] in fitting else fitting[0]
+        chosen, shared = self.measures[max(0, self.measure.currentIndex())], first.shared(second)
+        measure = (chosen if chosen in shared else shared[0])[0]
+        self.changed.emit(_table(first, second, measure) | _related(relation, self._bound(relation, measure)))
+
+    def _bound(self, relation: Any, measure: str) -> Any:
+        """Return the bound that stays, the usual one of a new equality, or None."""
+        before = self.value.get("bound")
+        if relation == "equal" and before is None:
+            return RATIO if measure in {"threshold", "pse"} else BOUND
+        return before if relation == "equal" or _relation(self.value) != "equal" else None
+
+    def _take_bound(self, text: str) -> None:
+        bound = number_of(text)
+        self.refused.emit("" if bound is not None else f"“{text}” is not a number. {kept(self.value.get('bound'))}")
+        if bound is not None:
+            self.changed.emit({**self.value, "bound": bound})
+
+
+def _related(relation: Any, bound: Any) -> dict[str, Any]:
+    """Return the keys of a hypothesis that say its relation."""
+    table = {} if relation in {None, "equal"} else {"expected": relation}
+    return table if bound is None else {**table, "bound": bound}
+
+
+def _table(first: Compared, second: Compared, measure: str) -> dict[str, Any]:
+    """Return the keys of a hypothesis that say what it compares."""
+    pair = [first.name, second.name]
+    table: dict[str, Any] = {"measure": measure, "blocks": pair if first.key == "blocks" else [first.block]}
+    return table if first.key == "blocks" else {**table, first.key: pair}
+
+
+def _relation(value: Mapping[str, Any]) -> Any:
+    return value.get("expected", None if value.get("bound") is None else "equal")
+
+
+class HypothesesField(Field):
+    """A sentence with choices for each hypothesis."""
+
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
+        self.lines = [Hypothesis(f"Hypothesis {at + 1}") for at in range(count_of(row))]
+        for at, line in enumerate(self.lines):
+            line.changed.connect(lambda value, at=at: self._change(at, value))
+            line.refused.connect(self._refuse)
+            line.away.clicked.connect(lambda _on=False, at=at: self._remove(at))
+            self.box.addWidget(line)
+        self.add, self.why = add_button("Add a hypothesis", "Hypothesis"), label("", "small", "text2", wraps=True)
+        self.add.clicked.connect(self._add)
+        add_layout(self.box, hbox(self.add, (self.why, 1), spacing=8))
+        self.setFocusProxy(self.lines[-1].measure if self.lines else self.add)
+        self.show_value()
+
+    def show_value(self) -> None:
+        for line, value in zip(self.lines, self.row.value if self.lines else (), strict=False):
+            line.show_value(value if isinstance(value, Mapping) else {}, self.row.facts)
+        self.add.setEnabled(bool(self.row.facts))
+        self.why.setText("" if self.row.facts else NOTHING_TO_COMPARE)
+
+    def _add(self) -> None:
+        first: Compared = self.row.facts[0]
+        second = first.others(self.row.facts)[0]
+        value = _table(first, second, first.shared(second)[0][0]) | _related(RELATIONS[0][0], None)
+        self.asked.emit(AddEntry(self.row.path, value))
+
+    def _refuse(self, why: str) -> None:
+        if why != self.refusal:
+            self.refusal = why
+            self.came.emit()
+
+    def _remove(self, at: int) -> None:
+        path = self.row.path
+        self.asked.emit(RemoveKey(path if len(self.lines) == 1 else (*path, at)))
+
+    def _change(self, at: int, value: Mapping[str, Any]) -> None:
+        path, before = (*self.row.path, at), self.row.value[at]
+        if not isinstance(before, Mapping):
+            self.asked.emit(SetValue(path, value))
+            return
+        asked: list[Request] = [
+            SetValue((*path, key), one)
+            for key, one in value.items()
+            if (tuple(one) if isinstance(one, list) else one) != before.get(key)
+        ]
+        asked += [RemoveKey((*path, key)) for key in before if key not in value]
+        if asked:
+            self.asked.emit(Several("Change hypothesis", tuple(asked)))
+
+
+def count_of(row: FormRow) -> int:
+    """Return how many hypotheses a row has; 0 where the file has something else there."""
+    return len(row.value) if isinstance(row.value, tuple) else 0
+
+
+HYPOTHESES: Final = SpecialEditor(
+    (("Analysis", "contrasts"),), HypothesesField, wide=True, structure=count_of, facts=compared
 )

@@ -13,7 +13,7 @@ from study_app.designer.measures.levels import LevelBlock, LevelWords, rounded
 from study_app.designer.measures.measures_view import FAILED, NO_FORCES, MeasuresView
 from study_app.designer.measures.simulation import Controls
 from study_app.designer.place.segments import cut_text, small_button
-from study_app.designer.problems.problems import ProblemRow
+from study_app.designer.problems import ProblemRow
 from study_app.gui.theme.theme import Tone
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox

@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from study_app.designer.document.elements import SEQUENCE, title_of
-from study_app.designer.document.fields import label_of
-from study_app.designer.document.names import blocks_using, languages_of
+from study_app.designer.document.fields import blocks_using, label_of, languages_of
 from study_app.designer.document.study import Study
-from study_app.designer.measures.cards import (
+from study_app.designer.measures.cards import (  # fmt: skip
     MOST_LINES,
     NARROW_CODES,
     UNKNOWN,
@@ -23,7 +22,7 @@ from study_app.designer.measures.cards import (
     Segments,
     Table,
     Verdict,
-)  # fmt: skip
+)
 from study_app.designer.measures.levels import LIMIT_NAMES, LevelBlock, LevelWords, level_block, rounded
 from study_app.designer.measures.simulation import (
     ENOUGH,
@@ -42,7 +41,7 @@ from study_app.designer.measures.study_facts import (
     texts_by_language,
     valid_part,
 )
-from study_app.designer.problems.problems import ProblemRow
+from study_app.designer.problems import ProblemRow
 from study_app.haptics.model.gate import calls_for
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.number_text import capitalised, counted, duration, duration_figure, duration_range

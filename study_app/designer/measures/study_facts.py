@@ -5,10 +5,9 @@ from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from typing import Any, Final
 
-from study_app.designer.document.changes import is_copied, texts_of
+from study_app.designer.document.additions import is_copied, texts_of
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import alternatives, initial, is_localised, label_of
-from study_app.designer.document.names import languages_of, named_at
+from study_app.designer.document.fields import alternatives, initial, is_localised, label_of, languages_of, named_at
 from study_app.designer.document.study import Study, with_value, without_value
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady

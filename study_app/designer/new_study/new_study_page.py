@@ -1,14 +1,18 @@
-"""A new study: what it can begin as at the left, the chosen one with its questions at the right."""
+"""A new study: what it can begin as at the left, the chosen one with its questions at the right; and known studies."""
 
+import json
 import math
-from functools import partial
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache, partial
+from pathlib import Path
 from typing import Any, Final
 
-from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt, QTimer, Signal
+from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QColor,
     QFocusEvent,
-    QFontMetricsF,
     QKeyEvent,
     QLinearGradient,
     QPainter,
@@ -29,32 +33,328 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.designer.new_study.known_studies import (
-    PLANNED,
-    SHIPPED,
-    KnownAnswer,
-    OwnQuestion,
-    TemplateChoice,
-    languages_offered,
-)
-from study_app.designer.new_study.new_study import Answers
-from study_app.designer.new_study.templates import FOLDER
-from study_app.designer.place.header import StudyChoice
-from study_app.designer.place.segments import cut_text
-from study_app.designer.problems.problems import NameRefusal
+from study_app.designer.document.document import Answers, Document, taken_names, template
+from study_app.designer.document.elements import study_title, title_of
+from study_app.designer.document.fields import languages_of, row_at, unit_of
+from study_app.designer.document.study import Study, read
+from study_app.designer.new_study.templates import FOLDER, QUESTIONS, templates
+from study_app.designer.outline import icon_of
+from study_app.designer.place.header import HeaderState, StudyChoice, problems_chip
+from study_app.designer.place.segments import cut_text, dense
+from study_app.designer.problems import NameRefusal
+from study_app.designer.versions.version_rows import VersionChip
+from study_app.errors import StudyError
+from study_app.gui.home.study_facts import holds_liquids_alone, is_shipped, sources
 from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.kit.dialogs import choose_protocol
-from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, TANK, font
 from study_app.gui.theme.themed import Themed, name_bars, remove_widget, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Check, IconButton
-from study_app.gui.widgets.labels import clamped, figures, label
+from study_app.gui.widgets.labels import Clamped, figures, label
 from study_app.gui.widgets.main_view import last_focused
-from study_app.ids import short_name_of
-from study_app.number_text import number_of, typed_numbers
+from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
+from study_app.number_text import counted, duration, number_of, typed_numbers
+from study_app.protocol.load import read_document
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
+from study_app.protocol.source.document import Path as Place
+from study_app.protocol.source.document import names
+from study_app.protocol.source.files import find, shipped, shipped_file
+from study_app.protocol.wording.languages import LANGUAGES
+from study_app.store.drafts import draft_of, drafted_files, unsaved_files
+from study_app.store.study_settings import kept_original
+from study_app.workspace import workspace
+
+FILE: Final = FOLDER / "known_answers.json"
+
+
+@dataclass(frozen=True, slots=True)
+class KnownAnswer:
+    """A planted threshold (mean of ``people``), and what simulated studies find of it, in ``unit``.
+
+    ``found`` is the mean of the studies' thresholds, ``low`` and ``high`` the ends of the middle 90 % of them.
+    """
+
+    planted: float
+    unit: str
+    source: str
+    people: int
+    found: float
+    low: float
+    high: float
+
+    @property
+    def recovered(self) -> bool:
+        """Whether the mean is within 10 % of the planted threshold, which is among the middle 90 %."""
+        return abs(self.found / self.planted - 1) <= 0.1 and self.low <= self.planted <= self.high
+
+    @property
+    def most(self) -> float:
+        return 10.0 * (1 + int(1.5 * max(self.planted, self.high)) // 10)
+
+    @property
+    def sentence(self) -> str:
+        return (
+            f"Simulated: {self.planted:g} {self.unit} at 75 % correct (after {self.source}). Estimated: "
+            f"{self.found:.3g} {self.unit}; in 9 of 10 simulated studies of {self.people} people {self.low:.3g} to "
+            f"{self.high:.3g} {self.unit}. A model, not measured."
+        )
+
+
+@cache
+def known_answers() -> dict[str, KnownAnswer]:
+    """Return the known answers of the templates that have one, as they were computed when the templates were made."""
+    found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return {name: KnownAnswer(**values) for name, values in found.items()}
+
+
+COPY: Final = "copy"
+TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
+    "compare-liquids": (
+        "Compare liquids",
+        "Do people tell liquids apart, and what do they call them? Statements after each one.",
+    ),
+    "viscosity-jnd": (
+        "Viscosity JND",
+        "How much thicker must a liquid be to feel thicker? Two intervals, adaptive levels.",
+    ),
+    "delay-detection": (
+        "Delay detection",
+        "From how many milliseconds on is a late picture noticed? Two intervals, adaptive levels.",
+    ),
+    "rate-realism": (
+        "Rate realism",
+        "How real does a liquid feel? A slider after each of four liquids, three times each.",
+    ),
+    "questionnaire-only": ("Questionnaire only", "Questions of every kind before, during and after a single trial."),
+    "empty": ("Empty study", "One liquid, one block, a welcome and thanks: it runs as it is."),
+}
+"""Title and question of each template, in the order in which they are shown."""
+
+
+SHIPPED: Final = "shipped study"
+PLANNED: Final = " planned"
+"""Follows a number of participants; a picture of people says the same."""
+STEPS: Final = ("pages", "blocks", "questionnaires")
+"""Sections whose tables are steps of a session."""
+
+
+@dataclass(frozen=True, slots=True)
+class OwnQuestion:
+    """A question of a template: its key, words, unit, what is permitted, and the value that the template has."""
+
+    path: Place
+    words: str
+    unit: str
+    bounds: str
+    value: str
+    several: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class TemplateChoice:
+    """What a new study can begin as."""
+
+    source: str  # what it is opened by
+    title: str
+    description: str
+    copy: bool = False  # whether it is another study
+    note: str = ""  # of a copy: where the study is from
+    figures: tuple[tuple[str, str], ...] = ()  # icon and words of its length, people and trials
+    tags: tuple[tuple[str, str], ...] = ()  # icon and words of what it needs
+    session: tuple[tuple[str, str, str], ...] = ()  # icon, title and time of each step
+    recovery: KnownAnswer | None = None
+    name: str = ""  # short name that a copy gets where none is given
+    study_title: str = ""  # title that it gets where none is given
+    languages: tuple[str, ...] = ()
+    questions: tuple[OwnQuestion, ...] = ()  # beyond title, name and languages
+
+
+def languages_offered() -> tuple[tuple[str, str], ...]:
+    """Return code and name of each language that participants can be addressed in."""
+    return tuple((code, language.english_name) for code, language in LANGUAGES.items())
+
+
+def template_choice(name: str, study: Study) -> TemplateChoice:
+    """Return what is shown of a template."""
+    title, words = _described(study.document)
+    shown, question = TEMPLATES.get(name, (name, words))
+    protocol = study.protocol
+    found = TemplateChoice(
+        f"template:{name}", shown, question, recovery=known_answers().get(name),
+        study_title=title, languages=languages_of(study.document), questions=tuple(_questions(name, study)),
+    )  # fmt: skip
+    if protocol is None:
+        return found
+    language, document = protocol.study.languages[0], study.document
+    session = (
+        (
+            icon_of((section, step), document),
+            title_of(document, (section, step)),
+            duration(step_duration_s(protocol, step, language)),
+        )
+        for step in protocol.steps
+        for section in STEPS
+        if step in names(document, section)
+    )
+    blind = "Double-blind" if protocol.study.blinding == "double" else "Single-blind"
+    tags = (("device", f"Up to {protocol.device.force_limit_n:g} N"), ("lock", blind))
+    return replace(found, figures=tuple(_figures(protocol)), tags=tags, session=tuple(session))
+
+
+def copy_choice(source: str, document: Mapping[str, Any], note: str, name: str) -> TemplateChoice:
+    """Return what is shown of a study that can be copied."""
+    title, words = _described(document)
+    return TemplateChoice(
+        source, title or source, words, copy=True, note=note, name=name, study_title=title,
+        languages=languages_of(document),
+    )  # fmt: skip
+
+
+def _described(document: Mapping[str, Any]) -> tuple[str, str]:
+    head = document.get("study", {})
+    description = head.get("description", "") if isinstance(head, Mapping) else ""
+    return study_title(document), " ".join(str(description).split())
+
+
+def _figures(protocol: Protocol) -> Iterator[tuple[str, str]]:
+    trials = sum(block.trials for block in orders_of(protocol).blocks)
+    yield "clock", duration(expected_duration_s(protocol))
+    people = None if protocol.analysis is None else protocol.analysis.participants
+    if people is not None:
+        yield "people", f"{people}{PLANNED}"
+    yield "layers", counted(trials, "trial")
+
+
+def _questions(name: str, study: Study) -> Iterator[OwnQuestion]:
+    for words, path in QUESTIONS.get(name, ()):
+        row = row_at(study.document, path)
+        if row is not None:
+            there = row.default if row.value is None else row.value
+            several = isinstance(there, tuple)
+            parts = there if isinstance(there, tuple) else (there,)
+            value = ", ".join(f"{part:g}" for part in parts if isinstance(part, int | float))
+            unit = row.unit or _unit_of(study, path)
+            yield OwnQuestion(path, words, unit, ", ".join(row.bounds), value, several)
+
+
+def _unit_of(study: Study, path: Place) -> str:
+    """Return the unit of a stimulus's numbers, which is that of the key that it varies."""
+    varied = study.document.get(path[0], {}).get(path[1], {}).get("vary") if path[0] == "stimuli" else None
+    if isinstance(varied, str):
+        return unit_of(varied)
+    return "times" if path[-1] == "repetitions" else ""
+
+
+def studies(opened: Document | None) -> tuple[StudyChoice, ...]:
+    """Return what can be opened: the open file, drafts that were never saved, recent files, names at hand.
+
+    They are in the order of their titles; studies that ship with the program come last.
+    """
+    found = dict.fromkeys([*map(str, unsaved_files(workspace().protocols)), *sources()])
+    own = "" if opened is None else source_of(opened.file)
+    if opened is not None:
+        found[own] = None
+    drafted = {file.resolve() for file in drafted_files()}
+    choices = []
+    for source in found:
+        file = _resolved(source)
+        if Path(source).suffix == ".toml" and Path(source).exists() and holds_liquids_alone(source):
+            continue
+        title = _title(file, drafted=file in drafted) if opened is None or source != own else opened.title
+        stem = Path(source).stem
+        ships, original = is_shipped(source), "" if file is None else kept_original(file)
+        choices.append(StudyChoice(title or stem, f"{stem}.toml", source, ships, file in drafted, original))
+    return tuple(sorted(choices, key=lambda choice: (choice.shipped, choice.title.casefold(), choice.source)))
+
+
+def _title(file: Path | None, *, drafted: bool) -> str:
+    """Return the title of a study, of its draft where one is kept; "" where it has none or cannot be read."""
+    if file is not None and drafted and (draft := draft_of(file)) is not None:
+        return study_title(read(draft.text.encode(), file.parent).document)
+    try:
+        state = None if file is None else file.stat()
+    except OSError:
+        return ""
+    return "" if file is None or state is None else _title_of_file(file, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=256)
+def _title_of_file(file: Path, _changed_ns: int, _size: int) -> str:
+    try:
+        document, _places = read_document(file.read_bytes(), file.name)
+    except (StudyError, OSError):
+        return ""
+    return study_title(document)
+
+
+def header_state(
+    opened: Document | None, choices: tuple[StudyChoice, ...], warnings: int, version: VersionChip
+) -> HeaderState:
+    """Return the header's state of the open study; ``warnings`` is how many it has."""
+    if opened is None:
+        return HeaderState(choices)
+    draft = "Saved" if not opened.edited and opened.base else "Not saved yet"
+    if opened.kept is not None and (opened.edited or not opened.base):
+        draft = f"Draft kept {opened.kept:%H:%M}"
+    return HeaderState(
+        choices,
+        source_of(opened.file),
+        problems_chip(len(opened.study.faults), warnings),
+        "" if opened.read_only else draft,
+        opened.done[-1].words if opened.done else "",
+        opened.undone[-1].words if opened.undone else "",
+        not opened.read_only and (opened.edited or not opened.base),
+        bool(opened.read_only),
+        version,
+    )
+
+
+def source_of(file: Path) -> str:
+    """Return what a study's file is opened by: its name at hand, else its path."""
+    found = _file(file.stem)
+    return file.stem if found is not None and found.resolve() == file.resolve() else str(file)
+
+
+def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
+    """Return what a new study can begin as: templates, the empty one last, then studies to copy.
+
+    Raises StudyError if the study ``source`` cannot be read.
+    """
+    in_order = [name for name in TEMPLATES if name in templates()]
+    choices = [_template_choice(name) for name in dict.fromkeys((*in_order, *templates()))]
+    taken = taken_names()
+    copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
+    for name in copied:
+        file = shipped_file(name) if name in shipped() else find(name)
+        note = SHIPPED if name in shipped() else str(file.name)
+        document, _places = read_document(file.read_bytes(), name)
+        stem = re.sub(f"{COPY}[0-9]*$", "", short_name_of(file.stem)) or "study"
+        free = free_short_name(taken, f"{stem[: MAX_SHORT_NAME - len(COPY)]}{COPY}")
+        choices.append(copy_choice(name, document, note, free))
+    return tuple(choices)
+
+
+@cache
+def _template_choice(name: str) -> TemplateChoice:
+    return template_choice(name, template(name))
+
+
+def _resolved(source: str) -> Path | None:
+    file = Path(source) if Path(source).suffix == ".toml" else _file(source)
+    return None if file is None else file.resolve()
+
+
+def _file(source: str) -> Path | None:
+    try:
+        return find(source)
+    except StudyError:
+        return None
+
 
 DEEP: Final = "#142E40"
 
@@ -91,6 +391,18 @@ RING = 4
 """The room around a card for the ring [px]."""
 
 
+class Picture(QWidget):
+    """The picture of a template, above its words."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.name = name
+        self.setFixedHeight(PICTURE_PX)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        paint_picture(smooth_painter(self), self.name, QRectF(self.rect()))
+
+
 class TemplateButton(Themed, QAbstractButton):
     """One thing to begin from: its picture or icon, title, description and figures.
 
@@ -112,18 +424,34 @@ class TemplateButton(Themed, QAbstractButton):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setFixedHeight(2 * RING + (COPY_PX if choice.copy else PICTURE_PX + CARD_WORDS_PX))
+        picture = choice.source.removeprefix("template:")
+        self._empty = not choice.copy and not FOLDER.joinpath(f"{picture}.svg").exists()
+        if choice.copy:
+            self._lay_out_copy()
+        else:
+            above = Picture(picture) if not self._empty else Icon("plus", "text", 24)
+            described = label(choice.description, "label", "text2", wraps=True)
+            title, aligned = cut_text(choice.title, "strong", "text"), Qt.AlignmentFlag.AlignHCenter
+            if self._empty:
+                described.setAlignment(aligned)
+                title.setAlignment(aligned)
+            counts = hbox(*(part for one in choice.figures for part in self._figure(*one)), STRETCH, spacing=6)
+            below = vbox(title, described, STRETCH, counts, spacing=4, margins=(16, 10, 16, 10))
+            picture_row = (hbox(STRETCH, above, STRETCH, margins=(0, 70, 0, 8)),) if self._empty else (above,)
+            vbox(*picture_row, (below, 1), spacing=0, margins=RING + 1, parent=self)
+        for part in self.findChildren(QWidget):
+            part.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
-    @property
-    def picture(self) -> str:
-        name = self.choice.source.removeprefix("template:")
-        return name if FOLDER.joinpath(f"{name}.svg").exists() and not self.choice.copy else ""
+    @staticmethod
+    def _figure(icon: str, spoken: str) -> tuple[QWidget | int, ...]:
+        return Icon(icon, "text2", 16), label(spoken.removesuffix(PLANNED), "small", "text2", weight=500), 8
 
-    def sizeHint(self) -> QSize:
-        return QSize(200, 2 * RING + (COPY_PX if self.choice.copy else PICTURE_PX + CARD_WORDS_PX))
-
-    @property
-    def _wide(self) -> int:
-        return self.width() - 2 * RING
+    def _lay_out_copy(self) -> None:
+        sign = Icon("lock" if self.choice.note == SHIPPED else "layers", "text2", 18)
+        title = Clamped(self.choice.title, 2, "label", steady=False)
+        words = vbox(STRETCH, title, cut_text(self.choice.note), STRETCH, spacing=0)
+        hbox(sign, (words, 1), spacing=14, margins=(RING + 22, RING, RING + 12, RING), parent=self)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
@@ -140,76 +468,13 @@ class TemplateButton(Themed, QAbstractButton):
         if self.hasFocus():
             painter.setPen(QPen(QColor(t.accent), 2))
             painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), RADIUS_CARD + RING, RADIUS_CARD + RING)
-        painter.translate(RING, RING)
-        body = QRectF(0, 0, self._wide, self.height() - 2 * RING).adjusted(1, 1, -1, -1)
-        marked, empty = self.isChecked(), not self.picture and not self.choice.copy
+        body = QRectF(self.rect()).adjusted(RING + 1, RING + 1, -RING - 1, -RING - 1)
+        marked, empty = self.isChecked(), self._empty
         fill_rounded(painter, body, RADIUS_CARD, t.hover if self.underMouse() or (empty and not marked) else t.surface)
-        if self.choice.copy:
-            self._paint_copy(painter)
-        elif empty:
-            self._paint_empty(painter)
-        else:
-            paint_picture(painter, self.picture, QRectF(1, 1, self._wide - 2, PICTURE_PX))
-            self._paint_words(painter, PICTURE_PX)
         style = Qt.PenStyle.DashLine if empty and not marked else Qt.PenStyle.SolidLine
         edge = t.accent if marked else t.ctl if empty else t.border
         painter.setPen(QPen(QColor(edge), 2 if marked else 1, style))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
-
-    def _paint_words(self, painter: QPainter, top: int) -> None:
-        t, wide = self.theme, self._wide - 32
-        painter.setPen(QColor(t.text))
-        painter.setFont(font("strong"))
-        painter.drawText(
-            QRectF(16, top + 10, wide, 24),
-            Qt.AlignmentFlag.AlignVCenter,
-            painter.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, wide),
-        )
-        painter.setPen(QColor(t.text2))
-        painter.setFont(font("label", weight=400))
-        words = Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop
-        painter.drawText(QRectF(16, top + 36, wide, 56), words, self.choice.description)
-        self._paint_figures(painter, top + CARD_WORDS_PX - 32)
-
-    def _paint_figures(self, painter: QPainter, top: int) -> None:
-        x = 16.0
-        painter.setFont(font("small", weight=500))
-        for icon, spoken in self.choice.figures:
-            words = spoken.removesuffix(PLANNED)
-            draw_icon(painter, icon, QRectF(x, top, 16, 16), self.theme.text2, 1.8)
-            painter.setPen(QColor(self.theme.text2))
-            painter.drawText(QRectF(x + 22, top - 2, 120, 20), Qt.AlignmentFlag.AlignVCenter, words)
-            x += 22 + QFontMetricsF(painter.font()).horizontalAdvance(words) + 16
-
-    def _paint_copy(self, painter: QPainter) -> None:
-        t = self.theme
-        fill_rounded(painter, QRectF(16, 18, 40, 40), 8, t.sunk)
-        draw_icon(painter, "lock" if self.choice.note == SHIPPED else "layers", QRectF(27, 29, 18, 18), t.text2)
-        painter.setPen(QColor(t.text))
-        wide = self._wide - 80
-        painter.setFont(font("label", weight=600))
-        lines = clamped(self.text(), 2, painter.font(), wide)
-        box = QRectF(68, 8, wide, 36) if len(lines) > 1 else QRectF(68, 16, wide, 22)
-        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, "\n".join(lines))
-        painter.setPen(QColor(t.text2))
-        painter.setFont(font("small"))
-        note = painter.fontMetrics().elidedText(self.choice.note, Qt.TextElideMode.ElideRight, wide)
-        painter.drawText(QRectF(68, box.bottom(), wide, 20), Qt.AlignmentFlag.AlignVCenter, note)
-
-    def _paint_empty(self, painter: QPainter) -> None:
-        t, middle = self.theme, self._wide / 2
-        painter.setPen(QPen(QColor(t.ctl), 1))
-        painter.setBrush(QColor(t.surface))
-        painter.drawEllipse(QRectF(middle - 22, 78, 44, 44))
-        draw_icon(painter, "plus", QRectF(middle - 9, 91, 18, 18), t.text, 2.0)
-        painter.setPen(QColor(t.text))
-        painter.setFont(font("strong"))
-        painter.drawText(QRectF(16, 134, self._wide - 32, 24), Qt.AlignmentFlag.AlignCenter, self.text())
-        painter.setPen(QColor(t.text2))
-        painter.setFont(font("label", weight=400))
-        words = Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
-        painter.drawText(QRectF(28, 166, self._wide - 56, 80), words, self.choice.description)
 
 
 TICKS = 4
@@ -287,11 +552,7 @@ class Questions(Themed, QWidget):
         self._own: list[QWidget] = []
 
     def _field(self, name: str) -> QLineEdit:
-        made = QLineEdit()
-        made.setFont(font("label", weight=400))
-        made.setProperty("dense", "true")
-        made.setFixedHeight(FIELD_PX)
-        made.setAccessibleName(name)
+        made = dense(QLineEdit(), name, FIELD_PX)
         made.returnPressed.connect(self.entered)
         return made
 

@@ -1,23 +1,33 @@
-"""Which step of which session shows an element, and what is played from there on."""
+"""Which step of which session shows an element, what is played from there on, and liquids that are felt in the lab."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from pathlib import Path as File
 from pathlib import Path as Folder
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
+from PySide6.QtCore import QObject, Signal
+
 from study_app.designer.document.document import Document
-from study_app.designer.document.names import languages_of, named_at, named_places
+from study_app.designer.document.elements import title_of
+from study_app.designer.document.fields import languages_of, named_places
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.document.toml_text import Refused
+from study_app.designer.measures.study_facts import valid_part
+from study_app.designer.place.editing import Editing
+from study_app.designer.place.view import DesignerPlace
 from study_app.errors import Problem, StudyError
-from study_app.protocol.groups import numbered_parts
+from study_app.haptics.model.scene import Liquid
+from study_app.lab.ab_comparison import Setting
+from study_app.lab.ab_comparison import Side as LabSide
+from study_app.lab.parameters import parameter
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial, build_schedule
-from study_app.protocol.source.document import Path, entries, value_at
-from study_app.protocol.source.files import unbundled, with_liquid_files
+from study_app.protocol.source.document import Path, has, value_at
+from study_app.protocol.source.files import file_of, unbundled, with_liquid_files
 from study_app.protocol.wording.languages import language_name
 from study_app.session.pages import Page
 from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Moment, Preview, preview
@@ -236,11 +246,6 @@ def last_valid(opened: Document) -> Study | None:
     return None
 
 
-_STEPS: Final = ("pages", "blocks")
-"""Sections whose tables must come in the sequence."""
-_PARTS: Final = ("questionnaires", "tasks", "conditions", "liquids", "scales", "stimuli", "designs", "methods")
-
-
 @dataclass(frozen=True, slots=True)
 class Playable:
     """What is played."""
@@ -254,7 +259,7 @@ class Playable:
 
 
 class NotPlayableError(StudyError):
-    """Faults from a step on, each as ``check`` prints it."""
+    """Faults of a study, each as ``check`` prints it."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
         self.problems = problems
@@ -264,16 +269,15 @@ class NotPlayableError(StudyError):
 def playable(study: Study, path: Path, position: StepPosition | None = None) -> Playable:
     """Return what is played from a position on, or from the first step that shows an element.
 
-    ``position``: where the preview is. Raises NotPlayableError if the study is faulty from there on.
+    ``position``: where the preview is. Raises NotPlayableError if the study has faults, but for texts that are missing
+    in languages that are not shown.
     """
     position = position or StepPosition()
     if not study.is_toml:
         raise NotPlayableError(study.problems)
     language = position.language or languages_of(study.document)[0]
-    filled = _edited(study, tuple(_filled_texts(study, language)))
-    found = filled
-    if filled.protocol is None:
-        found = _from_step(filled, path, position.name)
+    filled = tuple(_filled_texts(study, language))
+    found = study.edited(*filled)[0] if filled else study
     if found.protocol is None:
         known = {(problem.place, problem.message): problem for problem in study.problems}
         own = tuple(one for problem in found.problems if (one := known.get((problem.place, problem.message))))
@@ -290,14 +294,6 @@ def playable(study: Study, path: Path, position: StepPosition | None = None) -> 
     )
 
 
-def _edited(study: Study, edits: tuple[Edit, ...]) -> Study:
-    """Return a study after some edits; the same where one of them cannot be made."""
-    try:
-        return study.edited(*edits)[0] if edits else study
-    except Refused:
-        return study
-
-
 def _filled_texts(study: Study, language: str) -> Iterator[Edit]:
     """Yield the edits that fill in the texts that languages lack that are not shown."""
     for fault in study.faults:
@@ -309,41 +305,138 @@ def _filled_texts(study: Study, language: str) -> Iterator[Edit]:
             yield Set(fault.path, dict.fromkeys(languages_of(study.document), text))
 
 
-def _from_step(study: Study, path: Path, name: str) -> Study:
-    """Return a study that begins with the step of a name, or the first that shows an element, without earlier faults.
-
-    Where sessions differ by group or number nothing is left out: another one may need it.
-    """
-    document, graph = study.document, graph_of(study.document)
-    steps = [named_at(document, place) for place, _ in entries(document, "sequence.*")]
-    if not steps or "groups" in document or "sequences" in document:
-        return study
-    shown = [frozenset[Path]() if step is None else reached(graph, [step]) for step in steps]
-    looked_for = {(section, name) for section in (*_STEPS, "questionnaires")} if name else {path[:2]}
-    first = next((at for at, found in enumerate(shown) if found & looked_for), 0)
-    needed = frozenset[Path]().union(*shown[first:])
-    faulty = {fault.path[:2] for fault in study.faults}
-    tables = [table for section in _STEPS for table in _tables(document, section)]
-    tables += [table for section in _PARTS for table in _tables(document, section) if table in faulty]
-    edits: list[Edit] = [Unset(table) for table in tables if table not in needed]
-    if "analysis" in document and any(table[0] == "analysis" for table in faulty):
-        edits.append(Unset(("analysis",)))
-    written = {table[1]: value_at(document, (*table, "part")) for table in _tables(document, "blocks")}
-    parts = numbered_parts(
-        [str(step[1]) for step in steps[first:] if step is not None],
-        {str(block): part if isinstance(part, int) else None for block, part in written.items()},
-    )
-    edits += [Set(("blocks", block, "part"), part) for block, part in parts.items() if written[block] != part]
-    return _edited(study, (Set(("sequence",), list(value_at(document, ("sequence",))[first:])), *edits))
-
-
-def _tables(document: Mapping[str, Any], section: str) -> list[Path]:
-    return [path for path, _ in entries(document, f"{section}.*")]
-
-
 def _step_at(shown: Preview, position: StepPosition) -> int:
     """Return the index of the step at a position; the nearest trial of its block, or the first step."""
     steps = list(enumerate(shown.schedule.steps))
     named = [at for at, step in steps if step_name(step) == position.name]
     exact = [at for at in named if isinstance(step := steps[at][1], Trial) and step.index == position.trial]
     return next(iter([*exact, *named]), 0)
+
+
+OF_THE_STUDY: Final = frozenset({"scene", "velocity", "knee", "body"})
+"""Tables of the lab's parameters that a study has once for all of its liquids."""
+
+
+@dataclass(frozen=True, slots=True)
+class LabLiquids:
+    """Settings A and B for the lab; ``study`` is what takes them back, "" where the study cannot be changed."""
+
+    a: Setting
+    b: Setting
+    study: str
+
+
+class Feeling(QObject):
+    """Opens liquids of the open study in the lab.
+
+    ``asked`` carries a `LabLiquids`, ``returned`` comes when a liquid was put back.
+    """
+
+    asked = Signal(object)
+    returned = Signal()
+
+    def __init__(self, editing: Editing, place: DesignerPlace) -> None:
+        super().__init__(editing)
+        self.editing, self.place = editing, place
+        self._sides: dict[LabSide, Liquid] = {}
+        self._file = File()
+        place.form.head.feel_asked.connect(self.feel)
+
+    def feel(self, path: Path) -> None:
+        """Open the liquids of an element in the lab, unsaved values included: as A, and a second one as B."""
+        self.place.flush()
+        opened = self.editing.opened
+        if opened is None:
+            return
+        study = opened.study
+        protocol, problems = study.protocol or valid_part(study).protocol, study.problems
+        named = protocol is not None and str(path[1]) in getattr(protocol, str(path[0]))
+        if protocol is None or not named:
+            self.place.message.emit("It cannot be opened in the lab yet", f"Correct this first: {problems[0]}.")
+            return
+        names = _liquids(protocol, path)
+        if not names:
+            self.place.message.emit("It cannot be opened in the lab", "It has no liquid.")
+            return
+        titled = [
+            (title_of(study.document, ("liquids", name)), protocol.scene_of(name)) for name in (names[0], names[-1])
+        ]
+        settings = [Setting(title, scene, scene) for title, scene in titled]
+        self._sides = {"A": settings[0].scene.liquids[0], "B": settings[1].scene.liquids[0]}
+        self._file = opened.file
+        self.asked.emit(LabLiquids(settings[0], settings[1], "" if opened.read_only else opened.file.stem))
+
+    def put_back(self, side: LabSide, setting: Setting) -> None:
+        """Give the liquid of a side the values of a setting, as one step."""
+        opened, before = self.editing.opened, self._sides.get(side)
+        if opened is None or before is None or opened.file != self._file:
+            self.place.message.emit("It was not put back", "Another study is open in the designer now.")
+            return
+        if opened.read_only:
+            self.place.message.emit("It was not put back", opened.read_only)
+            return
+        path: Path = ("liquids", before.id)
+        document = opened.study.document
+        if value_at(document, path) is None:
+            self.place.message.emit("It was not put back", f"The study has no liquid {before.id} any more.")
+            return
+        title = title_of(document, path)
+        if file_of(value_at(document, path)) is not None:
+            sentence = f"{title} is in a liquid file of its own. Save it there as a preset."
+            self.place.message.emit("It was not put back", sentence)
+            return
+        after = setting.scene.liquids[0]
+        edits = tuple(_edits(document, path, _values(before), _values(after)))
+        try:
+            if edits:
+                self.editing.make(f"Put {title} back from the lab", *edits, select=path)
+        except Refused as refusal:
+            self.place.message.emit("It was not put back", f"{refusal}.")
+            return
+        self._sides[side] = after.model_copy(update={"id": before.id})
+        self.editing.select(path)
+        self.returned.emit()
+        shared = [name for name in setting.changed_names() if name.partition(".")[0] in OF_THE_STUDY]
+        if shared:
+            words = ", ".join(parameter(setting.scene, name).label.lower() for name in shared)
+            self.place.message.emit(f"{title} was put back", f"The study has these once for all liquids: {words}.")
+
+
+def _liquids(protocol: Protocol, path: Path) -> tuple[str, ...]:
+    """Return the ids of at most two liquids of an element."""
+    section, name = str(path[0]), str(path[1])
+    if section == "liquids":
+        return (name,)
+    conditions = protocol.conditions_in(name) if section == "blocks" else (name,)
+    found = (liquid for condition in conditions for liquid in protocol.conditions[condition].liquid_ids)
+    return tuple(dict.fromkeys(found))[:2]
+
+
+def _values(liquid: Liquid) -> dict[str, Any]:
+    return liquid.model_dump(exclude_none=True, exclude={"id"})
+
+
+def _edits(
+    document: Mapping[str, Any], path: Path, before: Mapping[str, Any], after: Mapping[str, Any]
+) -> Iterator[Edit]:
+    """Yield the edits of what differs between two tables of a liquid."""
+    for key in before:
+        if key not in after and has(value_at(document, path), key):
+            yield Unset((*path, key))
+    for key, value in after.items():
+        place, old = (*path, key), before.get(key)
+        if old == value:
+            continue
+        if isinstance(value, Mapping) and isinstance(old, Mapping) and has(value_at(document, path), key):
+            yield from _edits(document, place, old, value)
+        else:
+            yield Set(place, _plain(value))
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as it is written: lists, and whole numbers without a decimal point."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, tuple):
+        return [_plain(one) for one in value]
+    return int(value) if isinstance(value, float) and value.is_integer() else value

@@ -53,7 +53,7 @@ from study_app.designer.participant.playable import (
     step_words,
 )
 from study_app.designer.place.editing import Editing
-from study_app.designer.place.segments import Segments
+from study_app.designer.place.segments import Segments, dense
 from study_app.designer.place.view import DesignerPlace, PanePage
 from study_app.gui.display.screens import choose_screens
 from study_app.gui.kit.commands import add_commands, key_cap, tip
@@ -74,7 +74,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.questions import Value
 from study_app.protocol.source.document import Path, value_at
-from study_app.protocol.wording.languages import language_name, words
+from study_app.protocol.wording.languages import words
 from study_app.session.pages import DesignPage, Page, QuestionnairePage, TaskPage
 from study_app.session.simulated.observers import ProgrammedBall
 from study_app.session.tasks import TankView
@@ -356,8 +356,6 @@ def _bare(page: Page | None) -> Page | None:
 NO_ANSWERS: Final[Mapping[str, Value]] = {}
 MOST_IN_ROW: Final = 2
 TRIAL_PX: Final = 48
-BAR_PX: Final = 34
-"""The height of what stands beside the tabs."""
 
 
 class ParticipantPreview(Card):
@@ -380,11 +378,7 @@ class ParticipantPreview(Card):
         self.languages = Segments("Language of the page")
         self.language_key = Cap(key_cap("language"))
         self.language_key.setToolTip(tip("language"))
-        self.screens = Choice()
-        self.screens.setAccessibleName("Screen")
-        self.screens.setFont(font("label"))
-        self.screens.setProperty("dense", "true")
-        self.screens.setFixedHeight(BAR_PX)
+        self.screens = dense(Choice(), "Screen")
         self.screens.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.screens.setMinimumContentsLength(9)
         self.aside = QWidget()
@@ -666,32 +660,16 @@ class ParticipantPreview(Card):
         count = len(study.problems) - len(study.faults) + len(faults)
         if not count:
             return "This page is in no session." if found.session == STANDALONE else ""
-        title = title_of(study.document, self._selected)
-        own = [fault for fault in faults if fault.path[: len(self._selected)] == self._selected]
-        lacks = [fault for fault in faults if fault.missing_language or fault.kind == "one language"]
-        if own and self._protocol is not None:
-            if not self._holds(self._protocol, study):
-                return f"{title} cannot be shown: {own[0].message}"
-            if own[0] in lacks:
-                return f"{title} has no {language_name(self._language)} text; the text of another language is shown."
-            value = "an initial value" if self._valid is None else "the last valid value"
-            value = "the text as it is written" if own[0].kind == "alike" else value
-            return f"{title} has a problem ({own[0].message}): {value} is shown."
-        if len(lacks) == count:
-            return f"{counted(count, 'text')} missing in {language_name(self._language)}: shown in another language."
         values = "only valid parts" if self._valid is None else "the last valid values"
-        return f"{counted(count, 'problem')} elsewhere: {values} are shown."
-
-    def _holds(self, protocol: Protocol, study: Study) -> bool:
-        """Return whether the selected table, or question, is in the protocol that is shown."""
-        section, *rest = self._selected
-        table = getattr(protocol, str(section), None)
-        if not isinstance(table, Mapping) or not rest:
-            return True
-        question = self._question(study)
-        if rest[0] not in table or question is None:
-            return rest[0] in table
-        return any(item.id == question for item in protocol.questionnaires[str(rest[0])].items)
+        own = next((fault for fault in faults if fault.path[: len(self._selected)] == self._selected), None)
+        if own is None:
+            return f"{counted(count, 'problem')} elsewhere: {values} are shown."
+        shown = f"{values} are"
+        if own.kind == "alike":
+            shown = "the text as it is written is"
+        elif own.missing_language or own.kind == "one language":
+            shown = "the text of another language is"
+        return f"{title_of(study.document, self._selected)} has a problem ({own.message}): {shown} shown."
 
     def _place_ball(self, page: TaskPage, condition: str | None) -> None:
         """Put the ball at the beginning of its path, where the tank is another one."""

@@ -10,19 +10,27 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtGui import QGuiApplication
 
-from study_app.designer.document.document import Document, open_file, open_new, open_unsaved
-from study_app.designer.document.fragments import copied
-from study_app.designer.document.names import named_at, renamed
+from study_app.designer.document.additions import copied
+from study_app.designer.document.document import (
+    NO_ANSWERS,
+    Answers,
+    Document,
+    answered,
+    open_file,
+    open_new,
+    open_unsaved,
+    template,
+)
+from study_app.designer.document.fields import named_at, renamed
 from study_app.designer.document.steps import DeleteElement, Do, Paste, RenameElement, Request, Step, Task
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_text import Refused, free_in
 from study_app.designer.form.form import form
 from study_app.designer.measures.measures_controller import MeasuresController
 from study_app.designer.measures.study_facts import facts
-from study_app.designer.new_study.known_studies import header_state, new_choices, source_of, studies
-from study_app.designer.new_study.new_study import NO_ANSWERS, Answers, answered, template
-from study_app.designer.outline.outline_rows import addable, fields_to_go_to, outline_rows
-from study_app.designer.participant.feeling import Feeling
+from study_app.designer.new_study.new_study_page import header_state, new_choices, source_of, studies
+from study_app.designer.outline import addable, outline_rows
+from study_app.designer.participant.playable import Feeling
 from study_app.designer.participant.preview import ParticipantPreview
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.file import file_text
@@ -30,7 +38,7 @@ from study_app.designer.place.header import DesignerView, HeaderState, StudyChoi
 from study_app.designer.place.prompts import DeleteCard, SeriesCard, delete_prompt, series_prompt, series_titles
 from study_app.designer.place.saving import Saving
 from study_app.designer.place.view import DesignerPlace
-from study_app.designer.problems.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
+from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
 from study_app.designer.versions.changes import Changes, KnownRuns, Renaming
 from study_app.errors import StudyError
 from study_app.protocol.source.document import Path as Place
@@ -73,7 +81,6 @@ class DesignerController(QObject):
         }  # fmt: skip
         place.asked.connect(self.take)
         place.new_page.copy_asked.connect(self.ask_for_new)
-        place.adding.typed.connect(self._offer_fields)
         editing.changed.connect(self.show)
         self.preview = ParticipantPreview(editing, place)
         editing.edited.connect(self._resting.start)
@@ -85,7 +92,7 @@ class DesignerController(QObject):
         self.saving.discarded.connect(self._close)
         self.saving.compare_asked.connect(self.changes.compare_with)
         self.runs.changed.connect(self._show_header)
-        self._repairs.found.connect(place.problem_steps.show_repairs)
+        self._repairs.found.connect(place.show_repairs)
         self.measures = MeasuresController(editing, place, self._repairs)
         self.measures.warned.connect(self._show_header)
         self.measures.warned.connect(self._show_warnings)
@@ -243,10 +250,6 @@ class DesignerController(QObject):
         if (opened := self.editing.writable) is not None:
             self.place.show_addable(addable(opened.study, opened.selected))
 
-    def _offer_fields(self, words: str) -> None:
-        if (opened := self.editing.opened) is not None:
-            self.place.adding.offer_fields(fields_to_go_to(opened.study, words, opened.selected))
-
     def _judge_id(self, path: Place, name: str) -> None:
         opened, why, free = self.editing.writable, "", ""
         if opened is None:
@@ -303,7 +306,7 @@ class DesignerController(QObject):
     def _show_warnings(self) -> None:
         if (opened := self.editing.opened) is not None:
             warned = (*self._warnings, *self.measures.warnings)
-            self.place.problem_steps.show_warnings(warning_rows(opened.study, warned))
+            self.place.problems.show_warnings(warning_rows(opened.study, warned))
 
     def _header(self) -> HeaderState:
         warnings = len({*self._warnings, *self.measures.warnings})

@@ -7,7 +7,7 @@ from PySide6.QtCore import QObject, Signal
 
 from study_app.designer.document.document import Document
 from study_app.designer.document.elements import there
-from study_app.designer.document.names import id_at, renamed, suggested_id
+from study_app.designer.document.fields import id_at, renamed, suggested_id
 from study_app.designer.document.steps import AddElement, AddNamed, LeaveText, Recorded, Request, Situation, with_path
 from study_app.designer.document.toml_edits import Edit
 from study_app.designer.document.toml_text import Refused

@@ -25,7 +25,7 @@ from PySide6.QtWidgets import QFrame, QPlainTextEdit, QWidget
 
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import common_ends, shown, spans_of
-from study_app.designer.form.typed_fields import HAND_ON_MS, KEYS_OF_PLACE
+from study_app.designer.form.fields import HAND_ON_MS, KEYS_OF_PLACE
 from study_app.designer.place.segments import cut_text
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
@@ -77,31 +77,31 @@ def _line(text: str, place: int) -> int:
 
 
 LETTERS_PX = 13
-_PIECES = re.compile(r"(#.*$)|(^\s*\[.*?\]\]?)|(\"\"\"|\"(?:[^\"\\]|\\.)*\"|'[^']*')")
+_PIECES = r"(#.*$)|(^\s*\[.*?\]\]?)|(\"\"\"|\"(?:[^\"\\]|\\.)*\"|'[^']*')"
 
 
-class _Colours(QSyntaxHighlighter):
-    """Comments, headers and strings."""
+class Colours(QSyntaxHighlighter):
+    """Colours the groups of a pattern, each with the roles of its ink and its ground ("" for none) and a weight."""
 
-    def __init__(self, document: QTextDocument) -> None:
+    def __init__(self, document: QTextDocument, pattern: str, *roles: tuple[str, str, int]) -> None:
         super().__init__(document)
-        self.formats: list[QTextCharFormat] = []
+        self._pattern, self._roles = re.compile(pattern), roles
+        self._formats: list[QTextCharFormat] = []
 
     def apply_theme(self, theme: Theme) -> None:
-        self.formats = []
-        for ink, weight in ((theme.text3, 400), (theme.accent, 600), (theme.warn, 400)):
+        self._formats = []
+        for ink, ground, weight in self._roles:
             made = QTextCharFormat()
-            made.setForeground(QColor(ink))
+            made.setForeground(QColor(getattr(theme, ink)))
+            if ground:
+                made.setBackground(QColor(getattr(theme, ground)))
             made.setFontWeight(weight)
-            self.formats.append(made)
+            self._formats.append(made)
         self.rehighlight()
 
     def highlightBlock(self, text: str) -> None:
-        if not self.formats:
-            return
-        for match in _PIECES.finditer(text):
-            kind = next(number for number in (1, 2, 3) if match[number] is not None)
-            self.setFormat(match.start(), match.end() - match.start(), self.formats[kind - 1])
+        for match in self._pattern.finditer(text) if self._formats else ():
+            self.setFormat(match.start(), match.end() - match.start(), self._formats[(match.lastindex or 1) - 1])
 
 
 class _Gutter(QWidget):
@@ -142,7 +142,8 @@ class FileEditor(Coloured, QPlainTextEdit):
             "QPlainTextEdit, QPlainTextEdit:focus { border: none; padding: 0; background: transparent; }"
             "QAbstractScrollArea::corner { background: transparent; border: none; }"
         )
-        self._colours = _Colours(self.document())
+        inks = ("text3", "", 400), ("accent", "", 600), ("warn", "", 400)  # comments, headers and strings
+        self._colours = Colours(self.document(), _PIECES, *inks)
         self._gutter = _Gutter(self)
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)

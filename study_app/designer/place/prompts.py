@@ -3,29 +3,20 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QRect, QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import (
-    QApplication,
-    QFrame,
-    QHBoxLayout,
-    QHeaderView,
-    QScrollArea,
-    QTableWidget,
-    QTableWidgetItem,
-    QWidget,
-)
-from shiboken6 import isValid
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QHeaderView, QScrollArea, QTableWidget, QTableWidgetItem, QWidget
 
 from study_app.designer.document.additions import check_values, number_row, number_rows, titles_with
 from study_app.designer.document.elements import element_of, kind_and_title, title_of
-from study_app.designer.document.fields import label_of
-from study_app.designer.document.names import left_without, references_to, with_references
+from study_app.designer.document.fields import label_of, left_without, references_to, with_references
 from study_app.designer.document.steps import DeleteElement, MakeSeries, index_of, titles_of
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import Refused
+from study_app.designer.place.segments import dense
 from study_app.gui.kit.commands import COMMANDS, GROUPS, Command
 from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Cap, Choice, IconButton
@@ -117,9 +108,7 @@ class DeleteCard(Prompt):
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(asked.path, "all", also=asked.also)))
         self.gaps = ActionButton("", "Leave the gaps", height=40)
         self.gaps.clicked.connect(lambda: self.answered.emit(DeleteElement(asked.path, "gaps", also=asked.also)))
-        self.other = Choice()
-        self.other.setFont(font("label"))
-        self.other.setAccessibleName("Use another one in its place")
+        self.other = dense(Choice(), "Use another one in its place", 40)
         self.other.setPlaceholderText("Use another …")
         self.other.setMinimumWidth(180)
         for name, title in asked.others:
@@ -193,9 +182,7 @@ class SeriesCard(Prompt):
             f"Type a value for each copy of {asked.title}; copies are listed in the blocks that list the original.",
         )
         self.asked, self._titles = asked, titles
-        self.number = Choice()
-        self.number.setFont(font("label"))
-        self.number.setAccessibleName("Number that differs")
+        self.number = dense(Choice(), "Number that differs")
         self.number.addItems([words for _, words in asked.fields])
         self.table = QTableWidget(1, 2)
         self.table.setFont(font("label"))
@@ -265,24 +252,21 @@ class SeriesCard(Prompt):
         self.make.setEnabled(bool(titles))
 
 
-KEYS_HIGHEST, WIDEST, MARGIN = 560, 980, 12
+KEYS_HIGHEST, WIDEST = 560, 980
 COLUMNS = ((0,), (1,), (2, 3))
 """The groups of each column."""
-SCROLLS = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1, Qt.Key.Key_PageUp: -10, Qt.Key.Key_PageDown: 10}
 
 
-class KeysCard(Card):
-    """A list of the keys, in groups; it closes when the keyboard goes elsewhere."""
+class KeysCard(Themed, QFrame):
+    """A list of the keys, in groups, over the place; Esc and a click elsewhere close it."""
 
     def __init__(self, place: QWidget) -> None:
-        super().__init__(padding=18, gap=8)
-        self.setParent(place)
+        super().__init__(place, Qt.WindowType.Popup)
         self._place = place
         self.setAccessibleName("Keys")
-        self._before: QWidget | None = None
+        self.setProperty("role", "card")
         self.close_button = IconButton("cross", "Close the list of keys", "Close (Esc)", size=36, role="plain")
-        self.close_button.clicked.connect(self.put_away)
-        top = hbox(label("Keys", "card"), STRETCH, self.close_button)
+        self.close_button.clicked.connect(self.close)
         across = hbox(spacing=28, margins=(0, 0, 8, 0))
         for groups in COLUMNS:
             column = vbox(spacing=5)
@@ -294,11 +278,10 @@ class KeysCard(Card):
             column.addStretch()
             add_layout(across, column, 1)
         self.area = scrolled(across)
-        add_parts(self.column, top, Rule(), (self.area, 1))
-        self.hide()
-        application = QApplication.instance()
-        assert isinstance(application, QApplication)  # noqa: S101 - a window has one
-        application.focusChanged.connect(self._follow_focus)
+        self.area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.area.setAccessibleName("Keys")
+        top = hbox(label("Keys", "card"), STRETCH, self.close_button)
+        vbox(top, Rule(), (self.area, 1), spacing=8, margins=18, parent=self)
 
     @staticmethod
     def _row(one: Command) -> QHBoxLayout:
@@ -307,42 +290,10 @@ class KeysCard(Card):
         words.setAccessibleName(f"{one.words}{where}: {' or '.join(one.shown)}")
         return hbox((words, 1), *(Cap(key) for key in one.shown), spacing=5)
 
-    def switch(self) -> None:
-        if self.isVisible():
-            self.put_away()
-            return
-        self._before = self.window().focusWidget()
-        self.make_room()
-        self.show()
-        self.raise_()
-        self.close_button.setFocus(Qt.FocusReason.ShortcutFocusReason)
-
-    def put_away(self) -> None:
-        """Hide the list; the keyboard goes back to where it was."""
-        before, self._before = self._before, None
-        if before is not None and isValid(before) and before.isVisible():
-            before.setFocus(Qt.FocusReason.OtherFocusReason)
-        self.hide()
-
-    def make_room(self) -> None:
+    def open(self) -> None:
         around = self._place.rect()
         inner = self.area.widget().sizeHint().height() + self.sizeHint().height() - self.area.sizeHint().height()
-        wide, high = (
-            min(WIDEST, around.width() - 2 * MARGIN),
-            min(KEYS_HIGHEST, inner + 4, around.height() - 2 * MARGIN),
-        )
-        self.setGeometry(QRect((around.width() - wide) // 2, (around.height() - high) // 2, wide, high))
-
-    def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
-        if self.isVisible() and now is not None and not self.isAncestorOf(now):
-            self._before = None
-            self.hide()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape:
-            self.put_away()
-        elif lines := SCROLLS.get(Qt.Key(event.key()), 0):
-            bar = self.area.verticalScrollBar()
-            bar.setValue(bar.value() + lines * bar.singleStep())
-        else:
-            super().keyPressEvent(event)
+        self.resize(min(WIDEST, around.width()), min(KEYS_HIGHEST, inner + 4, around.height()))
+        self.move(self._place.mapToGlobal(around.center()) - self.rect().center())
+        self.show()
+        self.area.setFocus(Qt.FocusReason.PopupFocusReason)

@@ -9,9 +9,9 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from study_app.designer.document.document import Document, Standing, check_version
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.document.toml_text import Refused, free_in
-from study_app.designer.new_study.known_studies import source_of
-from study_app.designer.participant.play import Notice
+from study_app.designer.new_study.new_study_page import source_of
 from study_app.designer.place.editing import Editing
+from study_app.designer.place.header import Notice
 from study_app.designer.place.prompts import ConfirmCard
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.versions.changes import FileWatch, KnownRuns, SaveCard, compare, newest, version_of

@@ -25,20 +25,17 @@ from study_app.designer.document.steps import (
     with_path,
 )
 from study_app.designer.form.card import FormCard
+from study_app.designer.form.fields import TypedLine, TypedText
 from study_app.designer.form.rows import Form
-from study_app.designer.form.typed_fields import TypedLine, TypedText
 from study_app.designer.measures.measures_page import FactsRow, MeasuresPage
-from study_app.designer.new_study.known_studies import TemplateChoice
-from study_app.designer.new_study.new_study_page import NewStudyPage, NoStudyCard
-from study_app.designer.outline.card import OutlineCard
-from study_app.designer.outline.outline_rows import Addable, AddList, ElementPath
-from study_app.designer.participant.play import NoticeCard
+from study_app.designer.new_study.new_study_page import NewStudyPage, NoStudyCard, TemplateChoice
+from study_app.designer.outline import Addable, AddList, ElementPath, OutlineCard
 from study_app.designer.place.file import FileCard
-from study_app.designer.place.header import DesignerHeader, DesignerView
+from study_app.designer.place.header import DesignerHeader, DesignerView, NoticeCard
 from study_app.designer.place.prompts import KeysCard, Prompt
 from study_app.designer.place.segments import Segments, small_button
-from study_app.designer.problems.problems import ProblemRow, ProblemsCard, RepairButton
-from study_app.gui.kit.commands import add_commands, key_cap, press, tip
+from study_app.designer.problems import ProblemRow, ProblemsCard, RepairButton
+from study_app.gui.kit.commands import COMMANDS, add_commands, key_cap, press, tip
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import name_bars, remove_widget
 from study_app.gui.widgets.accessible import say
@@ -437,39 +434,10 @@ class ProblemSteps(QObject):
     ) -> None:
         super().__init__(card)
         self._card, self._form, self._file, self._areas, self._ask = card, form, file, areas, ask
-        self._problems: tuple[ProblemRow, ...] = ()
-        self._of_other_study: tuple[ProblemRow, ...] = ()
-        self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
         card.opened.connect(self._open)
         card.next.clicked.connect(self.open_next)
         for part in (card, form):
             part.repair_asked.connect(self._repair)
-
-    def begin(self) -> None:
-        """Begin with another study, whose problems and then warnings are shown next: without any the list closes."""
-        self._of_other_study, self._problems = self._card.rows, ()
-        self._card.begin()
-
-    def show_problems(self, problems: tuple[ProblemRow, ...], element: object) -> None:
-        """Show problems; ``element`` is the selected one. The list closes when the last problem is solved."""
-        before, self._problems = self._problems, problems
-        self._repairs = {row: words for row, words in self._repairs.items() if row in problems}
-        self._form.show_repairs(self._repairs)
-        self._card.show_problems(problems, element, self._repairs)
-        if before and not self._card.rows and not self._card.under_pointer:
-            self._card.hide()
-
-    def show_warnings(self, warnings: tuple[ProblemRow, ...]) -> None:
-        """Show other warnings; the list closes when the last one is solved."""
-        before, self._of_other_study = self._of_other_study or self._card.rows, ()
-        self._card.show_warnings(warnings)
-        if before and not self._card.rows and not self._card.under_pointer:
-            self._card.hide()
-
-    def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
-        self._repairs[row] = words
-        self._form.show_repairs(self._repairs)
-        self._card.show_repairs(row, words)
 
     def open_next(self) -> None:
         if coming := self._card.coming:
@@ -486,7 +454,7 @@ class ProblemSteps(QObject):
 
     def _can_be_repaired(self, row: ProblemRow) -> bool:
         self._ask("repairs", row)
-        return bool(self._repairs.get(row))
+        return bool(self._card.repairs.get(row))
 
     def _open(self, row: ProblemRow) -> None:
         self._card.show()
@@ -504,7 +472,7 @@ class ProblemSteps(QObject):
         by_keys = isinstance(here, RepairButton) and here.by_keys and here.problem == row
         self._card.set_current(row)
         self._ask("repair", row, words)
-        if row in self._problems:
+        if row in self._card.problems:
             return
         coming = [one for one in self._card.coming if not one.warning]
         if by_keys and coming:
@@ -534,7 +502,7 @@ class DesignerPlace(Place):
         self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
         self.sides = self.parts.sides
         self.areas = FocusAreas(self.header, self.parts, self.file, self.problems)
-        self.problem_steps = ProblemSteps(self.problems, self.form, self.file, self.areas, self._ask)
+        self.problem_steps = ProblemSteps(self.problems, self.form, self.file, self.areas, self.finish)
         self.adding, self.nothing, self.keys = AddList(self), NoStudyCard(), KeysCard(self)
         self._lay_out()
         self._connect()
@@ -562,15 +530,14 @@ class DesignerPlace(Place):
         self.nothing.study_asked.connect(self.areas.focus_form)
         self.banner.asked.connect(partial(self.ask, "banner"))
         self.banner.left.connect(self.areas.return_keyboard)
-        outline.chosen.connect(partial(self._ask, "select"))
+        outline.chosen.connect(partial(self.finish, "select"))
         outline.find_changed.connect(partial(self.ask, "find"))
         outline.field_asked.connect(self.areas.focus_field)
         outline.form_asked.connect(self.areas.focus_form)
         outline.element_clicked.connect(lambda: self.areas.focus_form() if self.parts.drawer else None)
         outline.tree.dropped.connect(self._drop)
-        outline.several_changed.connect(lambda: form.show_selected(outline.selected))
         self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
-        self.parts.path.open_asked.connect(partial(self._ask, "select"))
+        self.parts.path.open_asked.connect(partial(self.finish, "select"))
         form.asked.connect(self._take_asked)
         form.head.id_typed.connect(partial(self.ask, "judge id"))
         self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
@@ -580,22 +547,10 @@ class DesignerPlace(Place):
         self.new_page.given_up.connect(self.close_new)
 
     def _take_keys(self) -> None:
-        areas, head = self.areas, self.form.head
-        self.commands = add_commands(
-            self,
-            {
-                "outline": self.parts.focus_outline, "form": areas.focus_form, "views": areas.focus_pane,
-                "problems": areas.focus_problems, "header": areas.focus_header,
-                "next part": partial(areas.cycle, 1), "part before": partial(areas.cycle, -1),
-                "find": self.parts.focus_find, "next problem": self._next_problem, "file": areas.switch_to_file,
-                "back": partial(self.ask, "back"), "add": self.ask_to_add, "duplicate": self.duplicate,
-                "series": self.make_series, "rename": self._rename,
-                "up": partial(self.move_by, -1), "down": partial(self.move_by, 1),
-                "new": lambda: None if self.stack.currentIndex() else self._ask("new"),
-                "open": self.header.open_file, "save": partial(self._ask, "save"),
-                "undo": partial(self._ask, "undo"), "redo": partial(self._ask, "redo"), "keys": self.keys.switch,
-            },
-        )  # fmt: skip
+        head, tree = self.form.head, self.outline.tree
+        runs = {one.id: (one.within, partial(one.run, self)) for one in COMMANDS if one.run is not None}
+        own = add_commands(tree, {name: run for name, (within, run) in runs.items() if within})
+        self.commands = own | add_commands(self, {name: run for name, (within, run) in runs.items() if not within})
         for name, button in (
             ("keys", self.header.keys), ("undo", self.header.undo), ("redo", self.header.redo),
             ("save", self.header.save), ("up", head.up), ("down", head.down), ("duplicate", head.copy),
@@ -603,32 +558,16 @@ class DesignerPlace(Place):
         ):  # fmt: skip
             press(button, self.commands[name])
         head.delete.clicked.connect(self.delete)
-        tree = self.outline.tree
-        tree.addActions([self.commands["add"], self.commands["duplicate"]])
-        copy, paste = lambda: self.ask("copy", self.outline.selected), partial(self.ask, "paste")
-        own = add_commands(tree, {"copy": copy, "paste": paste})
-        tree.addActions([self.commands[name] for name in ("up", "down", "rename")])
-        own |= add_commands(tree, {"delete": self.delete})
+        menu = ("add", "duplicate", "copy", "paste", "up", "down", "rename", "delete")
+        tree.addActions([self.commands[name] for name in menu])
         for action in own.values():  # elsewhere these keys are those of a list or a text
             action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-        self.commands |= own
 
     # the elements of the form and of the outline that are selected
 
     def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
         path = () if self.view.form is None else self.view.form.path
         return path, tuple(one for one in self.outline.selected if one != path)
-
-    def _join(self, path: ElementPath, all_between: bool) -> None:
-        """Select a question with the one of the form, or no longer; where none is edited, open it."""
-        form = self.view.form
-        if form is None or form.path[:-1] != path[:-1]:
-            self._ask("select", path)
-        elif all_between:
-            first, last = sorted((int(form.path[-1]), int(path[-1])))
-            self.outline.select_several(tuple((*path[:-1], at) for at in range(first, last + 1)))
-        else:
-            self.outline.select_several((path,), selects=path not in self.outline.selected)
 
     def duplicate(self) -> None:
         path, also = self._several()
@@ -638,7 +577,7 @@ class DesignerPlace(Place):
 
     def make_series(self) -> None:
         if self.view.form is not None:
-            self._ask("series", self.view.form.path)
+            self.finish("series", self.view.form.path)
 
     def delete(self) -> None:
         path, also = self._several()
@@ -680,16 +619,21 @@ class DesignerPlace(Place):
         self.parts.path.show_form(view.form)
         self.form.show_form(view.form, read_only=view.header.read_only)
         self.file.show_file(view.file, scroll=elsewhere, read_only=view.header.read_only)
-        self.problem_steps.show_problems(view.problems, view.form.path)
+        self.problems.show_problems(view.problems, view.form.path)
+        self.form.show_repairs(self.problems.repairs)
         self.outline.tree.rows.movable = not view.header.read_only
         if self.outline.rows:
             self.outline.mark(view.form.path)
+
+    def show_repairs(self, row: ProblemRow, words: tuple[str, ...]) -> None:
+        self.problems.show_repairs(row, words)
+        self.form.show_repairs(self.problems.repairs)
 
     def begin_study(self) -> None:
         """Show the next view at the top: it is of another study."""
         self.view, self.form.form = DesignerView(), None
         self.outline.begin()
-        self.problem_steps.begin()
+        self.problems.begin()
         self.measures.area.verticalScrollBar().setValue(0)
 
     def show_new(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
@@ -730,7 +674,7 @@ class DesignerPlace(Place):
         """Ask for what is no step of the study."""
         self.asked.emit(Do(what, arguments))
 
-    def _ask(self, what: Task, *arguments: Any) -> None:
+    def finish(self, what: Task, *arguments: Any) -> None:
         """Ask for it after what is being typed, with the id that the element of the form has then."""
         self.asked.emit(self._after_typing(Do(what, arguments)))
 
@@ -741,9 +685,13 @@ class DesignerPlace(Place):
         after = () if self.form.form is None else self.form.form.path
         return asked if before == after else with_path(asked, before, after)
 
+    def begin_new(self) -> None:
+        if not self.stack.currentIndex():
+            self.finish("new")
+
     def ask_to_add(self) -> None:
         if self.view.form is not None and self.outline.add.isEnabled() and not self.stack.currentIndex():
-            self._ask("add")
+            self.finish("add")
 
     def show_addable(self, every: tuple[Addable, ...]) -> None:
         button = self.outline.add if self.outline.add.isVisible() else self.header
@@ -754,8 +702,6 @@ class DesignerPlace(Place):
         if not (isinstance(asked, SetText | LeaveText) or (isinstance(asked, SetValue) and asked.typing)):
             asked = self._after_typing(asked)
         match asked:
-            case Do("join", (path, all_between)):
-                self._join(path, all_between)
             case Do("write", (path,)):
                 self.ask("select", path)
                 self.form.focus((*path, "text"))
@@ -776,12 +722,12 @@ class DesignerPlace(Place):
             self.parts.show_side("form")
             self.form.focus_first_text(filled=bool(several))  # a copy has its texts
 
-    def _next_problem(self) -> None:
+    def open_next_problem(self) -> None:
         if self.view.form is not None:
             self.flush()
             self.problem_steps.open_next()
 
-    def _rename(self) -> None:
+    def rename(self) -> None:
         if self.form.head.id.isVisible() and not self.view.header.read_only:
             self.form.head.edit_id()
 
@@ -820,4 +766,3 @@ class DesignerPlace(Place):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.parts.arrange(self.width())
-        self.keys.make_room()

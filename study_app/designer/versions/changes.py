@@ -11,19 +11,18 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from PySide6.QtCore import QFileSystemWatcher, QObject, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QColor, QFontDatabase, QGuiApplication, QSyntaxHighlighter, QTextCharFormat
+from PySide6.QtGui import QFontDatabase, QGuiApplication
 from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.designer.document.document import Document, Standing
-from study_app.designer.document.names import references_to
-from study_app.designer.document.steps import RenameElement, Request
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_text import Comment, comments_naming, shown
+from study_app.designer.document.toml_text import shown
 from study_app.designer.place.editing import Editing
+from study_app.designer.place.file import Colours
 from study_app.designer.place.prompts import ConfirmCard, Prompt
-from study_app.designer.place.segments import small_button
+from study_app.designer.place.segments import dense, small_button
 from study_app.designer.place.view import DesignerPlace, PanePage
-from study_app.designer.problems.problems import NameRefusal
+from study_app.designer.problems import NameRefusal
 from study_app.designer.versions.version_rows import (
     FILE,
     Comparison,
@@ -157,25 +156,6 @@ NOTHING = "There is no version to compare with: no session was run, and nothing 
 LETTERS_PX = 12
 
 
-class _Colours(QSyntaxHighlighter):
-    """Lines that are gone, new, and the places where lines were left out."""
-
-    theme: Theme | None = None
-
-    def highlightBlock(self, text: str) -> None:
-        if self.theme is None or text[:1] not in {"-", "+", "@"}:
-            return
-        made = QTextCharFormat()
-        ink, ground = {
-            "-": (self.theme.bad, self.theme.bad_bg),
-            "+": (self.theme.ok, self.theme.ok_bg),
-            "@": (self.theme.text2, self.theme.sunk),
-        }[text[0]]
-        made.setForeground(QColor(ink))
-        made.setBackground(QColor(ground))
-        self.setFormat(0, len(text), made)
-
-
 class DifferenceText(Coloured, QPlainTextEdit):
     """A difference of texts, to be read and copied: lines that are gone begin with "-", new ones with "+"."""
 
@@ -191,7 +171,8 @@ class DifferenceText(Coloured, QPlainTextEdit):
         )
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.setTabChangesFocus(True)
-        self._colours = _Colours(self.document())
+        inks = ("bad", "bad_bg", 400), ("ok", "ok_bg", 400), ("text2", "sunk", 400)
+        self._colours = Colours(self.document(), r"(^-.*)|(^\+.*)|(^@.*)", *inks)  # gone, new, and lines left out
 
     def show_lines(self, lines: Sequence[str]) -> None:
         if (text := "\n".join(lines)) != self.toPlainText():
@@ -200,8 +181,7 @@ class DifferenceText(Coloured, QPlainTextEdit):
             self.verticalScrollBar().setValue(scrolled)
 
     def apply_theme(self, theme: Theme) -> None:
-        self._colours.theme = theme
-        self._colours.rehighlight()
+        self._colours.apply_theme(theme)
 
 
 class SaveCard(Prompt):
@@ -366,9 +346,7 @@ class Changes(Card):
         self._asked: Run | None = None
         self._choices: tuple[tuple[str, str], ...] = ()
         self.setAccessibleName("Changes")
-        self.version = Choice()
-        self.version.setFont(font("label"))
-        self.version.setAccessibleName("Version to compare with")
+        self.version = dense(Choice(), "Version to compare with")
         self.version.setMinimumWidth(120)
         self.restore = small_button("undo", "Restore", height=34)
         self.restore.setToolTip("Give the study the text of this version, as one step")
@@ -476,25 +454,16 @@ BREAKS: Final = (
 
 
 class Renaming(QObject):
-    """Locks the ids of questions with recorded answers; after a rename counts references, and offers comments.
-
-    It notes a rename before `Editing` makes it: construct it before requests are connected to that.
-    """
+    """Locks the ids of questions with recorded answers, until it is said what another id breaks."""
 
     def __init__(self, editing: Editing, place: DesignerPlace, runs: KnownRuns) -> None:
         super().__init__(editing)
         self.editing, self.place, self.runs = editing, place, runs
         self._unlocked: Place = ()
-        self._renamed: tuple[str, int] | None = None
-        self._listed: tuple[Place, tuple[Comment, ...]] = ((), ())
         editing.recorded = self._recorded
-        place.asked.connect(self._note)
         editing.changed.connect(self._lock)
-        editing.edited.connect(self._tell)
-        editing.refused.connect(self._forget)
         runs.changed.connect(self._lock)
         place.form.head.unlock_asked.connect(self._explain)
-        place.form.head.comments_asked.connect(self._go_to_comment)
 
     def _id(self, path: Place) -> str:
         opened = self.editing.opened
@@ -518,10 +487,6 @@ class Renaming(QObject):
         path = self.editing.selected
         if path != self._unlocked:
             self._unlocked = ()
-        if path != self._listed[0]:
-            self._listed = ((), ())
-            self.place.form.head.show_comments("")
-            self.place.form.head.show_followed("")
         self.place.form.head.show_lock(path, self._why(path))
 
     def _explain(self) -> None:
@@ -535,34 +500,3 @@ class Renaming(QObject):
         self._unlocked = path
         self._lock()
         self.place.form.head.edit_id()
-
-    def _note(self, asked: Request) -> None:
-        self._renamed, opened = None, self.editing.opened
-        if isinstance(asked, RenameElement) and opened is not None:
-            self._renamed = (self._id(asked.path), len(references_to(opened.study.document, asked.path)))
-
-    def _forget(self) -> None:
-        """Forget a rename that was refused: the next step is another one."""
-        self._renamed = None
-
-    def _tell(self) -> None:
-        """Say how many references followed a rename, and which comments mention the old id."""
-        renamed, self._renamed = self._renamed, None
-        opened, head = self.editing.opened, self.place.form.head
-        if renamed is None or opened is None:
-            head.show_followed("")
-            return
-        name, references = renamed
-        head.show_followed(f"{counted(references, 'place')} updated" if references else "")
-        found = comments_naming(opened.study.text, name)
-        if found:
-            self._listed = (self.editing.selected, found)
-            mention = "comment mentions" if len(found) == 1 else "comments mention"
-            head.show_comments(f"{len(found)} {mention} “{name}”")
-
-    def _go_to_comment(self) -> None:
-        """Show the next of these comments in the file."""
-        path, (first, *others) = self._listed
-        self._listed = (path, (*others, first))
-        self.place.show_tab("file")
-        self.place.file.editor.go_to(first.line - 1)

@@ -1,8 +1,8 @@
-"""Commands: one table for the shortcuts, tips, buttons, menus and the list of keys, and the `QAction` of each."""
+"""Commands: one table for shortcuts, tips, buttons, menus, the list of keys and what each does; their `QAction`s."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence
@@ -27,6 +27,8 @@ class Command:
         Which part of the window listens to its keys; "" for the whole window.
     held : bool
         Whether the key is held, not pressed.
+    run : callable
+        What it does in the study designer, whose place it takes; None where a part of the place does it.
     """
 
     id: str
@@ -35,6 +37,7 @@ class Command:
     group: int
     within: str = ""
     held: bool = False
+    run: Callable[[Any], object] | None = None
 
     @property
     def shown(self) -> tuple[str, ...]:
@@ -52,39 +55,39 @@ class Command:
 
 LISTS: Final = "outline, lists"
 COMMANDS: Final = (
-    Command("outline", "Outline", ("Ctrl+1",), 0),
-    Command("form", "Form", ("Ctrl+2",), 0),
-    Command("views", "Views, then their tabs", ("Ctrl+3",), 0),
-    Command("problems", "Problems", ("Ctrl+4",), 0),
-    Command("header", "Header", ("Ctrl+5",), 0),
-    Command("next part", "Next of these parts", ("F6",), 0),
-    Command("part before", "Previous part", ("Shift+F6",), 0),
-    Command("find", "Find in the study", ("Ctrl+F",), 0),
-    Command("next problem", "Next problem", ("F8",), 0),
-    Command("file", "File, and back", ("Ctrl+E",), 0),
-    Command("back", "Previous element", ("Alt+Left",), 0),
+    Command("outline", "Outline", ("Ctrl+1",), 0, run=lambda place: place.parts.focus_outline()),
+    Command("form", "Form", ("Ctrl+2",), 0, run=lambda place: place.areas.focus_form()),
+    Command("views", "Views, then their tabs", ("Ctrl+3",), 0, run=lambda place: place.areas.focus_pane()),
+    Command("problems", "Problems", ("Ctrl+4",), 0, run=lambda place: place.areas.focus_problems()),
+    Command("header", "Header", ("Ctrl+5",), 0, run=lambda place: place.areas.focus_header()),
+    Command("next part", "Next of these parts", ("F6",), 0, run=lambda place: place.areas.cycle(1)),
+    Command("part before", "Previous part", ("Shift+F6",), 0, run=lambda place: place.areas.cycle(-1)),
+    Command("find", "Find in the study", ("Ctrl+F",), 0, run=lambda place: place.parts.focus_find()),
+    Command("next problem", "Next problem", ("F8",), 0, run=lambda place: place.open_next_problem()),
+    Command("file", "File, and back", ("Ctrl+E",), 0, run=lambda place: place.areas.switch_to_file()),
+    Command("back", "Previous element", ("Alt+Left",), 0, run=lambda place: place.ask("back")),
     Command("page", "Participant's page", ("Ctrl+Return",), 0),
     Command("leave page", "Leave that page", ("Escape",), 0, "page"),
     Command("language", "That page in the next language", ("Ctrl+L",), 0),
-    Command("add", "Add", ("Insert",), 1),
+    Command("add", "Add", ("Insert",), 1, run=lambda place: place.ask_to_add()),
     Command("open entry", "Open what an entry names", ("Return",), 1, "lists"),
-    Command("duplicate", "Duplicate", ("Ctrl+D",), 1),
-    Command("series", "Copies that differ in one number", ("Ctrl+Shift+D",), 1),
-    Command("rename", "Rename", ("F2",), 1),
-    Command("delete", "Delete", ("Delete",), 1, LISTS),
-    Command("up", "Move up", ("Alt+Up",), 1),
-    Command("down", "Move down", ("Alt+Down",), 1),
-    Command("copy", "Copy", ("Ctrl+C",), 1, LISTS),
-    Command("paste", "Paste", ("Ctrl+V",), 1, LISTS),
+    Command("duplicate", "Duplicate", ("Ctrl+D",), 1, run=lambda place: place.duplicate()),
+    Command("series", "Copies that differ in one number", ("Ctrl+Shift+D",), 1, run=lambda place: place.make_series()),
+    Command("rename", "Rename", ("F2",), 1, run=lambda place: place.rename()),
+    Command("delete", "Delete", ("Delete",), 1, LISTS, run=lambda place: place.delete()),
+    Command("up", "Move up", ("Alt+Up",), 1, run=lambda place: place.move_by(-1)),
+    Command("down", "Move down", ("Alt+Down",), 1, run=lambda place: place.move_by(1)),
+    Command("copy", "Copy", ("Ctrl+C",), 1, LISTS, run=lambda place: place.ask("copy", place.outline.selected)),
+    Command("paste", "Paste", ("Ctrl+V",), 1, LISTS, run=lambda place: place.ask("paste")),
     Command("several", "Select several", ("Shift+Up", "Shift+Down"), 1, LISTS),
-    Command("new", "New study …", ("Ctrl+N",), 2),
-    Command("open", "Open file …", ("Ctrl+O",), 2),
-    Command("save", "Save", ("Ctrl+S",), 2),
-    Command("undo", "Undo", ("Ctrl+Z",), 2),
-    Command("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), 2),
+    Command("new", "New study …", ("Ctrl+N",), 2, run=lambda place: place.begin_new()),
+    Command("open", "Open file …", ("Ctrl+O",), 2, run=lambda place: place.header.open_file()),
+    Command("save", "Save", ("Ctrl+S",), 2, run=lambda place: place.finish("save")),
+    Command("undo", "Undo", ("Ctrl+Z",), 2, run=lambda place: place.finish("undo")),
+    Command("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), 2, run=lambda place: place.finish("redo")),
     Command("play", "Play from here", ("F5",), 2),
     Command("stop", "Stop playing", ("Escape",), 2, "windows while playing", held=True),
-    Command("keys", "Keys", ("Shift+F1",), 2),
+    Command("keys", "Keys", ("Shift+F1",), 2, run=lambda place: place.keys.open()),
     Command("next field", "Next field", ("Tab",), 3, "field"),
     Command("accept", "Accept", ("Return",), 3, "field"),
     Command("restore", "Restore", ("Escape",), 3, "field"),

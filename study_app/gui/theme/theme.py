@@ -251,6 +251,13 @@ QPushButton[role='danger']:focus {{ border-color: {t.accent}; }}
 QPushButton[role='plain'] {{ background: transparent; border-color: transparent; color: {t.text2}; }}
 QPushButton[role='plain']:hover {{ background: {t.hover}; }}
 QPushButton[role='plain']:focus {{ border: 2px solid {t.accent}; }}
+QPushButton[role='segment'] {{ background: transparent; border: 1px solid transparent; color: {t.text2};
+    border-radius: {RADIUS_CONTROL - 2}px; padding: 0 8px; min-height: 26px; font-weight: 500; }}
+QPushButton[role='segment']:checked {{ background: {t.surface}; border-color: {t.accent}; color: {t.text};
+    font-weight: 600; }}
+QPushButton[role='segment']:checked:disabled {{ background: {t.sunk}; border-color: {t.ctl}; }}
+QPushButton[role='segment']:focus {{ border: 2px solid {t.accent}; padding: 0 7px; min-height: 24px; }}
+QWidget[role='segments'] {{ background: {t.sunk}; border: none; border-radius: {RADIUS_CONTROL}px; }}
 QPushButton[role='stop'] {{ background: {t.stop}; color: {t.on_stop}; border: 1px solid {t.stop};
   border-radius: {RADIUS_CARD}px; }}
 QPushButton[role='stop']:focus {{ border: 3px solid {t.text}; }}

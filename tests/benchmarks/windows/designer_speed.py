@@ -89,7 +89,7 @@ def main(edits: int = 60) -> None:
         rows.append(("selection in outline → form painted", "50", selected))
         controller.editing.select(ITEM)
         QTest.qWait(500)
-        row = next(one for one in controller.place.form.rows if one.row.row.path == (*ITEM, "text"))
+        row = next(one for one in controller.place.form.rows if one.row.path == (*ITEM, "text"))
         field = (row.field.findChildren(QLineEdit) or row.field.findChildren(QPlainTextEdit))[0]
         field.setFocus()
         keys = []

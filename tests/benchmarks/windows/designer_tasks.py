@@ -1,4 +1,4 @@
-"""Actions per task of the study designer: python tests/benchmarks/windows/designer_tasks.py [--only N[,N]].
+"""Actions and seconds per task of the study designer: python tests/benchmarks/windows/designer_tasks.py [--only N[,N]].
 
 Prints a table. ``--only`` does the tasks of these numbers, after the first one of the table, 1, which opens the
 designer; 8 needs 7.
@@ -12,6 +12,7 @@ import argparse
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from PySide6.QtWidgets import QLabel
 
 from study_app.designer.document.study import read
 from study_app.designer.place.header import DesignerHeader
-from study_app.designer.problems.problems import ProblemsCard
+from study_app.designer.problems import ProblemsCard
 from study_app.designer.versions.changes import DifferenceText
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import shipped_file
@@ -179,13 +180,13 @@ def act_tasks(kind: str, folder: Path, *numbers: str) -> None:
     def act(user: User) -> None:
         tasks = Tasks(user, folder)
         for task in (TASKS[int(number) - 1] for number in numbers):
-            before = user.actions
+            before, since = user.actions, time.monotonic()
             try:
                 task(tasks)
             except AssertionError as error:
                 print(f"not done ({error})\t{task.__doc__}", flush=True)
             else:
-                print(f"{user.actions - before}\t{task.__doc__}", flush=True)
+                print(f"{user.actions - before} in {time.monotonic() - since:.0f} s\t{task.__doc__}", flush=True)
 
     use(kind, act)
 
@@ -208,12 +209,13 @@ def act_continued(kind: str, folder: Path) -> None:
     """Continue a study after a kill."""
 
     def act(user: User) -> None:
+        since = time.monotonic()
         user.press("Study designer")
         user.press("Continue Killed (killed.toml) with its unsaved changes")
         wait_until(lambda: user.sees("Save"), "the study")
         save(user, folder / "protocols" / "killed.toml")
         assert "before the kill" in (folder / "protocols" / "killed.toml").read_text()
-        print(f"{user.actions}\t{AFTER_A_KILL}", flush=True)
+        print(f"{user.actions} in {time.monotonic() - since:.0f} s\t{AFTER_A_KILL}", flush=True)
 
     use(kind, act)
 

@@ -5,31 +5,39 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.additions import added, check_values, number_row, titles_with
-from study_app.designer.document.changes import filled_in, followed, moved, switched, texts_of, with_language
-from study_app.designer.document.fields import initial
-from study_app.designer.document.fragments import copied, pasted
-from study_app.designer.document.names import (
+from study_app.designer.document.additions import (
+    added,
+    check_values,
+    copied,
+    filled_in,
+    followed,
+    moved,
+    number_row,
+    pasted,
+    texts_of,
+    with_language,
+)
+from study_app.designer.document.document import template
+from study_app.designer.document.fields import (
     check_id,
     choices_at,
     deletions,
+    initial,
     left_without,
     named_at,
     references_to,
     renamed,
     with_references,
 )
-from study_app.designer.document.steps import MakeSeries, Situation
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.measures.study_facts import copied_texts, facts, missing_texts
-from study_app.designer.new_study.new_study import template
 from study_app.designer.new_study.templates import FOLDER
 from study_app.ids import MAX_ID
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.source.document import Path, entries, value_at
+from study_app.protocol.source.document import Path, entries
 from tests.designer.document.grown import PROTOCOLS, texts
 from tests.designer.document.random_edits import at, owners
 
@@ -75,18 +83,6 @@ def _name(document: Any, thing: Path) -> Any:
     return document["id"] if isinstance(thing[-1], int) else thing[-1]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "thing", [("liquids", "water"), ("scales", "agreement"), ("tasks", "explore"), ("pages", "rest")]
-)
-def test_with_references_leaves_none_that_dangles(thing: Path) -> None:
-    study = study_of("rek2024")
-    paths = with_references(study.document, thing, study.needs)
-    assert paths[-1] == thing
-    changed, _ = study.edited(*deletions(paths))
-    assert not [fault for fault in changed.faults if "there is no" in fault.message and '"' in fault.message], thing
-
-
 @pytest.mark.parametrize(
     ("thing", "place"), [(("tasks", "reach"), ("blocks", "delay", "task")),
                          (("liquids", "water"), ("stimuli", "delay", "condition"))],
@@ -106,14 +102,6 @@ def test_the_only_condition_leaves_its_liquid_to_what_leaves_its_name_out() -> N
     assert not changed.faults
     assert left_without(study.document, [condition, liquid]) == (("stimuli", "delay", "condition"),)
     assert {condition, ("stimuli", "delay")} <= {*with_references(study.document, liquid, study.needs)}
-
-
-def test_with_references_leaves_no_list_empty() -> None:
-    study = read((FOLDER / "compare-liquids.toml").read_bytes(), FOLDER)
-    gone = with_references(study.document, ("liquids", "syrup"), study.needs)
-    assert gone == (("sequence", 1), ("blocks", "practice"), ("conditions", "practice"), ("liquids", "syrup"))
-    changed, _ = study.edited(*deletions(gone))
-    assert not changed.faults
 
 
 def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
@@ -147,29 +135,8 @@ def test_a_new_liquid_exerts_a_force_and_a_new_ball_fits_the_tank() -> None:
     assert initial(study.document, (*path, "body", "diameter_m")) == 0.068
 
 
-TASK = ("tasks", "explore")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["reach", "follow"])
-def test_switched_keeps_what_both_kinds_have_and_gives_back_the_rest(kind: str) -> None:
-    study = study_of("slime")
-    edits, left = switched(study, TASK, kind, {})
-    assert set(left) == {"min_s", "max_s"}
-    other, _ = study.edited(*edits)
-    table = other.document["tasks"]["explore"]
-    assert table["kind"] == kind
-    assert table["instruction"] == study.document["tasks"]["explore"]["instruction"]
-    assert not {"min_s", "max_s"} & set(table)
-    assert not [fault for fault in other.faults if "missing" in fault.message or "unknown" in fault.message]
-    back, _ = other.edited(*switched(other, TASK, "explore", left)[0])
-    assert back.document == study.document
-
-
 REK = (PROTOCOLS / "rek2024.toml").read_text(encoding="utf-8")
-TITLE_LINE = 'title = { en = "Baseline settings", nl = "Basisinstellingen" }'
 NO_DELAY = ("conditions", "delay_0")
-REPETITIONS = ("blocks", "liquids", "repetitions")
 
 
 @pytest.fixture(scope="module")
@@ -192,37 +159,6 @@ def test_values_are_refused_in_one_sentence(study: Study, values: tuple[float, .
     row = number_row(study.document, NO_DELAY, (*NO_DELAY, "delay_ms"))
     with pytest.raises(Refused, match=f"^{why}$"):
         check_values(study.document, row, values)
-
-
-@pytest.mark.parametrize(
-    ("title", "titles"),
-    [
-        (TITLE_LINE.removeprefix("title = "), {"en": "Baseline settings, 3", "nl": "Basisinstellingen, 3"}),
-        ('"Liquids 2"', "Liquids 2, 3"),
-        ('"Level A-1"', "Level A-3"),
-        ('"Level -1"', "Level -1, 3"),
-        ('"Times 1.0"', "Times 3"),
-    ],
-)
-def test_the_number_of_the_element_is_replaced_in_each_title_and_else_added(title: str, titles: Any) -> None:
-    study = read(REK.replace(TITLE_LINE, f"title = {title}").encode(), PROTOCOLS)
-    row = number_row(study.document, REPETITIONS[:2], REPETITIONS)
-    found = dict(titles_with(study.document, REPETITIONS[:2], row, 3))
-    assert found == (
-        {("title", code): text for code, text in titles.items()} if isinstance(titles, dict) else {("title",): titles}
-    )
-
-
-def test_copies_are_listed_after_the_original_where_the_block_can_take_them(study: Study) -> None:
-    step = MakeSeries(NO_DELAY, (*NO_DELAY, "delay_ms"), (30, 60)).step(Situation(study))
-    after, _ = study.edited(*step.edits)
-    assert after.faults == ()
-    assert step.several == (("conditions", "delay_30"), ("conditions", "delay_60"))
-    assert value_at(after.document, ("conditions", "delay_60", "delay_ms")) == 60
-    assert list(value_at(after.document, ("blocks", "baseline", "conditions"))) == ["delay_0"]
-    assert list(value_at(after.document, ("blocks", "delays", "conditions")))[:4] == [
-        "delay_0", "delay_30", "delay_60", "delay_50",
-    ]  # fmt: skip
 
 
 TEXTS = texts()

@@ -9,6 +9,7 @@ import pytest
 
 from study_app.analysis.planning import threshold_studies
 from study_app.designer.document.additions import repairs
+from study_app.designer.document.document import template
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures import simulation
@@ -21,7 +22,6 @@ from study_app.designer.measures.study_facts import (
     texts_by_language,
     valid_part,
 )
-from study_app.designer.new_study.new_study import template
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.protocol.checks.expected_precision import ThresholdPlan, expected, threshold_plan
 from study_app.protocol.describe import describe

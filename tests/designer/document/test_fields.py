@@ -101,10 +101,7 @@ def shown_at(study: Study, fault: Fault) -> str:
     found: Form = form(study, element_of(study, fault.path))
     sentence = f"{fault.message[:1].upper()}{fault.message[1:]}"
     places = (
-        (
-            "row",
-            [words for row in found.rows if fault.path[: len(row.row.path)] == row.row.path for words in row.faults],
-        ),
+        ("row", [words for row in found.rows if fault.path[: len(row.path)] == row.path for words in row.faults]),
         ("section", [words for section in found.sections for words in section.faults]),
         ("id", list(found.id_faults)),
         ("element", list(found.faults)),

@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.additions import number_rows
+from study_app.designer.document.additions import copied, number_rows
 from study_app.designer.document.fields import Row, row_at, rows
-from study_app.designer.document.fragments import copied
 from study_app.designer.document.steps import (
     AddElement,
     AddEntry,
@@ -33,7 +32,7 @@ from study_app.designer.document.steps import (
 )
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.outline.outline_rows import addable
+from study_app.designer.outline import addable
 from study_app.protocol.source.document import Path, entries
 from tests.designer.document.grown import PROTOCOLS
 from tests.golden import compare

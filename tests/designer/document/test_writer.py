@@ -13,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 from study_app.designer.document.document import Document
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset, WriterError, apply
-from study_app.designer.document.toml_text import Refused, comments_naming, tables, written
+from study_app.designer.document.toml_text import Refused, tables, written
 from tests.designer.document.grown import texts
 from tests.designer.document.random_edits import check_edit, edit_of, holds_nothing
 
@@ -208,26 +208,3 @@ def test_apply_refuses_its_own_mistakes(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("study_app.designer.document.toml_edits.written", lambda *_: "7")
     with pytest.raises(WriterError, match="another document than the one meant"):
         apply("a = 1\n", Set(("a",), 2))
-
-
-TEXT = '''# "honey" first
-a = "# `honey` in a string"  # the [honey, water]
-b = """
-# `honey` in a text
-"""
-c = 'honey'  # `honey_2`, "honeyed" and the honey's smell
-d = 1  # more of liquids.honey.\r
-# The late_60 condition; honey = thick, late_600 and liquids.late_60
-# Honey and honey are common words.
-'''
-
-
-def test_comments_are_found_by_whole_names_and_strings_are_none() -> None:
-    lines = TEXT.splitlines()
-    found = comments_naming(TEXT, "honey")
-    assert [comment.line for comment in found] == [1, 2, 7, 8]
-    assert found[0].text == lines[0]
-    assert found[2].text == "# more of liquids.honey."
-    assert [comment.line for comment in comments_naming(TEXT, "late_60")] == [8]
-    assert comments_naming(TEXT, "x") == ()
-    assert comments_naming(TEXT, "common") == ()  # a plain word of the language names nothing

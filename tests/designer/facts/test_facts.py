@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.designer.document.additions import repairs
+from study_app.designer.document.document import template
 from study_app.designer.document.elements import element_of, outline, used_by
-from study_app.designer.document.names import blocks_using
+from study_app.designer.document.fields import blocks_using
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.document.toml_text import retyped, shown
@@ -20,12 +21,11 @@ from study_app.designer.measures.measures_page import clipped_sentence
 from study_app.designer.measures.measures_view import MeasuresView, measures_view
 from study_app.designer.measures.simulation import Controls, GroupPrecision, Measurable, Observed, Simulated
 from study_app.designer.measures.study_facts import facts, restored_part
-from study_app.designer.new_study.new_study import template
 from study_app.designer.new_study.templates import FOLDER, templates
-from study_app.designer.outline.outline_rows import outline_rows
+from study_app.designer.outline import outline_rows
 from study_app.designer.participant.playable import NotPlayableError, playable, showing
 from study_app.designer.place.file import file_text
-from study_app.designer.problems.problems import problem_rows
+from study_app.designer.problems import problem_rows
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.files import shipped, shipped_file
 from tests.designer.document.grown import PROTOCOLS
@@ -184,7 +184,7 @@ def test_every_key_of_every_element_is_in_its_form_with_its_value(file: pathlib.
         if value_at(study.document, element) is None:
             continue
         made = form(study, element)
-        rows = {row.row.path: row.row.value for row in made.rows}
+        rows = {row.path: row.value for row in made.rows}
         for leaf in leaves(value_at(study.document, element), element):
             if leaf[-1] == "id" and len(leaf) > 3:
                 assert made.id is not None

@@ -26,10 +26,10 @@ from study_app.designer.measures.simulation import (
     Simulated,
 )
 from study_app.designer.measures.study_facts import facts
-from study_app.designer.outline.outline_rows import addable, fields_to_go_to, outline_rows
+from study_app.designer.outline import addable, outline_rows
 from study_app.designer.place.file import file_text
 from study_app.designer.place.prompts import series_prompt, series_titles
-from study_app.designer.problems.problems import problem_rows
+from study_app.designer.problems import problem_rows
 from study_app.protocol.source.document import Path
 from tests.designer.document.test_study_transcripts import elements, generic, studies
 from tests.golden import compare
@@ -78,8 +78,6 @@ class Shown:
             yield f"find {words}"
             yield from self.note("rows found", outline_rows(study, times, words))
             yield from self.note("fields found", found_fields(study, words))
-            fields = fields_to_go_to(study, words, ("study",))
-            yield from self.note("fields to go to", [f"{one.words} | {one_line(one.asks)}" for one in fields])
 
     def of_element(self, study: Study, path: Path) -> Iterator[str]:
         document = study.document

@@ -13,7 +13,7 @@ LEFT, NONE = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 def axis_of(designer: Any) -> Any:
     designer.controller.begin("template:viscosity-jnd", "thicker")
     designer.editing.select(("stimuli", "damping"))
-    return designer.field(*LEVELS).view
+    return designer.field(*LEVELS).extra
 
 
 def ends(designer: Any) -> tuple[float, float]:
@@ -69,7 +69,7 @@ def test_each_phase_of_a_trial_leads_to_its_field(qtbot: Any, designer: Any) -> 
         (5, ("designs", "pair", "between_s")),
     )):  # fmt: skip
         designer.go_to("blocks", "training")
-        button = designer.field("blocks", "training", "design").view.phases[phase]
+        button = designer.field("blocks", "training", "design").extra.phases[phase]
         if number % 2:
             button.setFocus()
             qtbot.keyClick(button, Qt.Key.Key_Space)
@@ -77,7 +77,7 @@ def test_each_phase_of_a_trial_leads_to_its_field(qtbot: Any, designer: Any) -> 
             qtbot.mouseClick(button, LEFT)
         assert designer.editing.selected == field[:2]
         form = designer.place.form
-        reached = [row.row.row.path for row in form.rows if row.isAncestorOf(form.focusWidget())]
+        reached = [row.row.path for row in form.rows if row.isAncestorOf(form.focusWidget())]
         added = [path for path, made in form.adds.items() if made is form.focusWidget()]
         assert reached + added == [field]
         assert button.accessibleName()

@@ -8,6 +8,7 @@ import pytest
 from PySide6.QtCore import QSize, Qt
 
 from study_app.analysis.planning.threshold_studies import Precisions, plans, sweep, threshold_markdown
+from study_app.designer.document.document import template
 from study_app.designer.document.steps import DuplicateElement, RetypeFile, Situation
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set, Unset
@@ -25,7 +26,6 @@ from study_app.designer.measures.simulation import (
     simulation_of,
     start_measure_worker,
 )
-from study_app.designer.new_study.new_study import template
 from study_app.gui.participant.page_widgets import parts_of
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.protocol.checks.expected_precision import imprecise

@@ -3,7 +3,7 @@
 import pytest
 
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_edits import Edit, Set, Unset
+from study_app.designer.document.toml_edits import Edit, Unset
 from study_app.designer.measures.study_facts import restored_part
 from study_app.designer.participant.playable import (
     STANDALONE,
@@ -15,7 +15,7 @@ from study_app.designer.participant.playable import (
     showing,
     step_name,
 )
-from study_app.protocol.load import load, parse
+from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import PageStep, Trial
 from study_app.protocol.source.files import source_bytes
 from study_app.session.transitions.page_builder import preview
@@ -122,18 +122,3 @@ def test_a_missing_text_of_another_language_prevents_nothing() -> None:
     (problem,) = refused.value.problems
     assert problem.place == "pages.debrief.title"
     assert problem.line is not None
-
-
-@pytest.mark.slow
-def test_a_fault_prevents_only_playing_its_step_and_earlier_ones() -> None:
-    document = Study(source_bytes("rek2024").decode()).document
-    (*_, last) = [name for name in document["sequence"] if name in document["blocks"]]
-    study = edited("rek2024", Set(("pages", document["sequence"][0], "body"), 3))
-    with pytest.raises(NotPlayableError, match=r"pages\..*\.body"):
-        playable(study, ("pages", document["sequence"][0]))
-    found = playable(study, ("blocks", last))
-    assert found.step == 0
-    assert found.protocol == parse(found.source, "played")
-    step = preview(found.protocol).schedule.steps[0]
-    assert isinstance(step, Trial)
-    assert step.block == last

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QAbstractButton
 from study_app.app.failures import Patience
 from study_app.app.session import playing
 from study_app.app.session.bridge import SessionBridge
-from study_app.designer.new_study.new_study import template
+from study_app.designer.document.document import template
 from study_app.designer.participant.playable import StepPosition
 from study_app.errors import DeviceLost
 from study_app.gui.operator.window import OperatorWindow

@@ -8,7 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.session.playing import Playing
-from study_app.designer.outline.card import ROW_ROLE
+from study_app.designer.outline import ROW_ROLE
 from study_app.designer.place.controller import DesignerController
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.widgets.main_view import Place
@@ -108,7 +108,7 @@ class Designer(KeyUser):
 
     def form_row(self, *path: str | int) -> Any:
         """The form's row of a place."""
-        return next(row for row in self.place.form.rows if row.row.row.path == path)
+        return next(row for row in self.place.form.rows if row.row.path == path)
 
     def field(self, *path: str | int) -> Any:
         """The field of a place in the form."""

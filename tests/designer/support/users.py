@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from study_app.designer.form.card import FormCard
-from study_app.designer.outline.card import ROW_ROLE, OutlineCard
+from study_app.designer.outline import ROW_ROLE, OutlineCard
 from study_app.designer.place.segments import Segments
 from study_app.gui.participant.intervals.answer_page import ChoiceWidget
 from study_app.gui.participant.pages.page_widget import GoButton
@@ -29,7 +29,7 @@ from study_app.gui.participant.window import ParticipantWindow
 from tests.designer.support.inputs import Hand, name_of, wait_until, window_in_front
 
 MOST_TABS = 120
-COLUMN_PX = 480
+COLUMN_PX = 400
 STEP_MS = 40
 VIEWS = "View of the study"
 """The tabs of the views, to which their key goes when it is pressed again."""

@@ -1,7 +1,7 @@
 """The problems of a study, as ``check`` prints them, with their repairs: found, listed, and pressed."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
@@ -14,7 +14,7 @@ from study_app.designer.document.additions import Repair, additions_for, repairs
 from study_app.designer.document.elements import FIRST, element_of, kind_and_title, place_words
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.study import Study
-from study_app.designer.outline.outline_rows import icon_of
+from study_app.designer.outline import icon_of
 from study_app.designer.place.segments import Segments, small_button
 from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.theme.theme import Theme, font
@@ -321,14 +321,14 @@ class ProblemsCard(Card):
     def __init__(self) -> None:
         super().__init__(padding=16, gap=8)
         self.setAccessibleName("Problems")
-        self._problems: tuple[ProblemRow, ...] = ()
+        self.problems: tuple[ProblemRow, ...] = ()
         self._warnings: tuple[ProblemRow, ...] = ()
-        self._moved = False
+        self._had = False
         self.lines: list[ProblemLine] = []
         self._element: object = None
         self._here_only = False
         self._listed: tuple[ProblemRow, ...] | None = None
-        self._repairs: dict[ProblemRow, tuple[str, ...]] = {}
+        self.repairs: dict[ProblemRow, tuple[str, ...]] = {}
         self.at: ProblemRow | None = None
         self._number = 0
         self.heading = label("", "card")
@@ -347,31 +347,35 @@ class ProblemsCard(Card):
         self.close_button.clicked.connect(self.close_asked)
 
     def begin(self) -> None:
-        """Begin with the next problems as if there had been none: in their order, from the first one on."""
-        self._problems = self._warnings = ()
-        self.lines, self._listed, self._moved = [], None, False
+        """Begin with another study: its problems and then warnings are shown next, and without any the list closes."""
+        self._had = bool(self.rows)
+        self.problems = self._warnings = ()
+        self.lines, self._listed = [], None
         self.at, self._number = None, 0
         self.area.verticalScrollBar().setValue(0)
 
-    def show_problems(
-        self, rows: tuple[ProblemRow, ...], element: object, repairs: Mapping[ProblemRow, tuple[str, ...]]
-    ) -> None:
-        self._problems, self._element, self._repairs = rows, element, dict(repairs)
-        self._show()
+    def show_problems(self, rows: tuple[ProblemRow, ...], element: object) -> None:
+        """Show problems; ``element`` is the selected one. The list closes when the last problem is solved."""
+        had, self.problems, self._element = bool(self.problems), rows, element
+        self.repairs = {row: words for row, words in self.repairs.items() if row in rows}
+        self._show(closes=had)
 
     def show_warnings(self, rows: tuple[ProblemRow, ...]) -> None:
-        self._warnings = rows
-        self._show()
+        """Show other warnings; the list closes when the last one is solved."""
+        had, self._had, self._warnings = self._had or bool(self.rows), False, rows
+        self._show(closes=had)
 
     @property
     def rows(self) -> tuple[ProblemRow, ...]:
-        return (*self._problems, *self._warnings)
+        return (*self.problems, *self._warnings)
 
-    def _show(self) -> None:
+    def _show(self, *, closes: bool = False) -> None:
         rows = self.rows
+        if closes and not rows and not self.under_pointer:
+            self.hide()
         if self.at is not None:
             self.at = followed([self.at], rows)[0] or self.at
-        counts = ((len(self._problems), "problem"), (len(self._warnings), "warning"))
+        counts = ((len(self.problems), "problem"), (len(self._warnings), "warning"))
         counted = [f"{count} {word}{'s' * (count != 1)}" for count, word in counts if count]
         self.heading.setText(", ".join(counted) or "No problems")
         self.limit.show_values(((False, "All"), (True, "Here only")), self._here_only)
@@ -381,10 +385,11 @@ class ProblemsCard(Card):
         self.setFixedHeight(max(wanted, self.height()) if self.under_pointer else wanted)
         if listed == self._listed:
             return
-        self._listed = listed
-        if self.under_pointer and self.lines:
-            self._keep_places(listed)
+        if self.under_pointer and self.lines:  # no line moves: solved ones are marked, others come when it leaves
+            for line, now in zip(self.lines, followed([line.row for line in self.lines], listed), strict=True):
+                line.follow(now)
             return
+        self._listed = listed
         inside = QWidget()
         self._column = column = vbox(spacing=0, margins=0, parent=inside)
         if rows and not listed:
@@ -397,25 +402,13 @@ class ProblemsCard(Card):
 
     def _add_line(self, row: ProblemRow) -> None:
         narrow = (self.parentWidget() or self).width() < NARROW_BELOW
-        made = ProblemLine(row, self._repairs.get(row, ()), narrow=narrow)
+        made = ProblemLine(row, self.repairs.get(row, ()), narrow=narrow)
         made.opened.connect(lambda: self.open(made.row))
         made.repair_asked.connect(lambda words: self.repair_asked.emit(made.row, words))
         made.here = row == self.at
         for part in (made, Rule()):
             self._column.insertWidget(self._column.count() - 1, part)
         self.lines.append(made)
-
-    def _keep_places(self, listed: tuple[ProblemRow, ...]) -> None:
-        """Leave every line where it is while someone points at one: solved ones are marked, others come last."""
-        self._moved = True
-        known = followed([line.row for line in self.lines], listed)
-        for line, now in zip(self.lines, known, strict=True):
-            line.follow(now)
-        for row in listed:
-            if row not in known:
-                self._add_line(row)
-        inside = self.area.widget()  # at once: a layout that lacks room makes every line lower
-        inside.resize(inside.width(), max(inside.height(), self._column.minimumSize().height()))
 
     @property
     def under_pointer(self) -> bool:
@@ -424,20 +417,12 @@ class ProblemsCard(Card):
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
-        self._show()
-        if self._moved:  # later: Qt says that the pointer leaves where what is under it is replaced, too
-            QTimer.singleShot(0, self, self._order)
+        QTimer.singleShot(0, self, self._show)  # Qt also says so where what is under the pointer is replaced
         if not self.rows:
             self.close_asked.emit()
 
-    def _order(self) -> None:
-        """List the problems in the order of their lines again."""
-        if self._moved and not self.under_pointer:
-            self._moved, self._listed = False, None
-            self._show()
-
     def show_repairs(self, row: ProblemRow, repairs: tuple[str, ...]) -> None:
-        self._repairs[row] = repairs
+        self.repairs[row] = repairs
         for line in self.lines:
             if line.row == row:
                 line.show_repairs(repairs)

@@ -1,1 +1,0 @@
-"""The outline: elements in their order, dragging them, and what can be added."""

@@ -1,1 +1,0 @@
-"""Problems and warnings of the open study, and their repairs."""
