@@ -55,7 +55,6 @@ class PlugIn:
     package: str
     version: str
     origin: str
-    module: str
     fault: str = ""
 
     @property
@@ -63,15 +62,19 @@ class PlugIn:
         """What a receipt records of it."""
         return {"kind": self.kind, "name": self.name, "package": self.package, "version": self.version}
 
-    def __str__(self) -> str:
-        return f"{self.kind} {self.name} of {self.package} {self.version}"
-
 
 @cache
 def _points() -> tuple[EntryPoint, ...]:
     """Return the entry points of all groups, read once: that takes 10 to 30 ms."""
     found = entry_points()
     return tuple(point for kind in REGISTRIES for point in found.select(group=f"liquid_study.{kind}s"))
+
+
+def _of_kind(kind: str) -> Iterator[tuple[EntryPoint, PlugIn]]:
+    """Yield the entry points of a kind, with what their packages say of them."""
+    for point in _points():
+        if point.group == f"liquid_study.{kind}s" and (dist := point.dist) is not None:
+            yield point, PlugIn(kind, point.name, dist.name, dist.version, str(dist.locate_file("")))
 
 
 class Registry(Mapping[str, T], Generic[T]):
@@ -86,38 +89,33 @@ class Registry(Mapping[str, T], Generic[T]):
     def __init__(self, kind: str, own: Mapping[str, T], base: type, key: Literal["name", "key", "kind"]) -> None:
         self.kind, self.own = kind, own
         self._base, self._key = base, key
-        self._others: dict[str, T] = {}
-        self._plug_ins: tuple[PlugIn, ...] | None = None
+        self._found: tuple[tuple[PlugIn, ...], Mapping[str, T]] | None = None
 
     @property
     def plug_ins(self) -> tuple[PlugIn, ...]:
         """All plug-ins of this kind, with those that cannot be used."""
-        if self._plug_ins is None:
-            self._others = {}
-            points = [point for point in _points() if point.group == f"liquid_study.{self.kind}s"]
-            self._plug_ins = tuple(map(self._loaded, points))
-        return self._plug_ins
+        return self._read()[0]
 
     @property
     def others(self) -> Mapping[str, T]:
         """Those of plug-ins alone."""
-        return self._others if self.plug_ins else {}
+        return self._read()[1]
 
     def plug_in(self, name: str) -> PlugIn | None:
         """Return the plug-in that has a name; None if it is the program's own, or none has it."""
-        return None if name in self.own else next((one for one in self.plug_ins if one.name == name), None)
+        found = () if name in self.own else self.plug_ins
+        return next((one for one in found if one.name == name and not one.fault), None)
 
     def missing(self, name: str) -> tuple[str, str]:
         """Return why the name of a plug-in is not here, and what to do."""
         package = name.partition(":")[0]
-        here = next((one for one in self.plug_ins if _canonical(one.package) == package), None)
-        if here is None:
-            return (
-                f'"{name}" is a {self.kind} of the plug-in {package}, which is not installed',
-                f"pip install {package}",
-            )
-        why = here.fault or "it has no such one"
-        return f'"{name}" is a {self.kind} that the plug-in {package} {here.version} does not give: {why}', UPDATE
+        versions = [one.dist.version for one in _points() if one.dist and _canonical(one.dist.name) == package]
+        if not versions:
+            words = f'"{name}" is a {self.kind} of the plug-in {package}, which is not installed'
+            return words, f"pip install {package}"
+        faults = [one.fault for one in self.plug_ins if one.fault and _canonical(one.package) == package]
+        words = f'"{name}" is a {self.kind} that the plug-in {package} {versions[0]} does not give'
+        return ": ".join([words, *faults]), UPDATE
 
     def __getitem__(self, name: str) -> T:
         return self.own[name] if name in self.own else self.others[name]
@@ -128,26 +126,28 @@ class Registry(Mapping[str, T], Generic[T]):
     def __len__(self) -> int:
         return len(self.own) + len(self.others)
 
-    def _loaded(self, point: EntryPoint) -> PlugIn:
-        """Load an entry point; what is wrong with it is its fault."""
-        package, version, origin = point.module.partition(".")[0], "", ""
-        if point.dist is not None:
-            package, version, origin = point.dist.name, point.dist.version, str(point.dist.locate_file(""))
-        plug_in = PlugIn(self.kind, point.name, package, version, origin, point.module)
-        try:
-            found = point.load()
-            name = self._name_of(found, point, package)
-        except Exception as error:  # noqa: BLE001 - code of another package: it must not end this program
-            return replace(plug_in, fault=_line(error))
-        self._others[name] = found
-        return replace(plug_in, name=name)
+    def _read(self) -> tuple[tuple[PlugIn, ...], Mapping[str, T]]:
+        """Load the entry points, once; what is wrong with one is its fault."""
+        if self._found is None:
+            plug_ins, others = [], dict[str, T]()
+            for point, plug_in in _of_kind(self.kind):
+                try:
+                    found = point.load()
+                    name = self._name_of(found, point.value, plug_in.package, others)
+                except Exception as error:  # noqa: BLE001 - code of another package: it must not end this program
+                    plug_ins.append(replace(plug_in, fault=_line(error)))
+                else:
+                    plug_ins.append(replace(plug_in, name=name))
+                    others[name] = found
+            self._found = tuple(plug_ins), others
+        return self._found
 
-    def _name_of(self, found: Any, point: EntryPoint, package: str) -> str:
+    def _name_of(self, found: Any, place: str, package: str, others: Mapping[str, T]) -> str:
         """Return the name of what an entry point holds; a StudyError says why it has none."""
         if self._key == "name" and not isinstance(found, self._base):
-            raise StudyError(f"{point.value} is not a {self._base.__name__} but a {type(found).__name__}")
+            raise StudyError(f"{place} is not a {self._base.__name__} but a {type(found).__name__}")
         if self._key != "name" and not (isinstance(found, type) and issubclass(found, self._base)):
-            raise StudyError(f"{point.value} is not a class that extends {self._base.__name__}")
+            raise StudyError(f"{place} is not a class that extends {self._base.__name__}")
         name, begins = getattr(found, self._key, ""), f"{_canonical(package)}:"
         if self._key == "kind":
             found.model_json_schema()  # what its keys lack is said now, not by a form
@@ -155,14 +155,14 @@ class Registry(Mapping[str, T], Generic[T]):
         if self._key == "kind" and not re.fullmatch(rf"{begins}[a-z][a-z0-9_]*", str(name)):
             raise StudyError(f"its kind is {name!r}: call it '{begins}' and small letters, digits or underscores")
         if not isinstance(name, str) or not name:
-            raise StudyError(f"{point.value} has no {self._key}: give it one")
-        if name in self.own or name in self._others:
-            raise StudyError(f"a {self.kind} named '{name}' exists already: give it another name")
+            raise StudyError(f"{place} has no {self._key}: give it one")
+        if name in self.own or name in others:
+            raise StudyError(f"{self.kind} '{name}' exists already: rename it")
         return name
 
     def forget(self) -> None:
         """Look for plug-ins again when one is asked for."""
-        self._plug_ins = None
+        self._found = None
         _points.cache_clear()
 
 
@@ -177,13 +177,8 @@ UPDATE: Final = "update or uninstall the plug-in"
 def _line(error: BaseException) -> str:
     """Return an error in one line."""
     words = " ".join(str(error).split())
-    return (
-        words
-        if isinstance(error, StudyError)
-        else f"{type(error).__name__}: {words}"
-        if words
-        else type(error).__name__
-    )
+    kind = "" if isinstance(error, StudyError) else type(error).__name__
+    return ": ".join(filter(None, (kind, words)))
 
 
 def registry(kind: str) -> Registry[Any]:
@@ -196,8 +191,11 @@ def plug_ins() -> tuple[PlugIn, ...]:
     """Return all plug-ins of all kinds, with those that cannot be used."""
     found: list[PlugIn] = []
     for kind in REGISTRIES:
-        if any(point.group == f"liquid_study.{kind}s" for point in _points()):
-            found += registry(kind).plug_ins
+        named = [plug_in for _, plug_in in _of_kind(kind)]
+        try:
+            found += registry(kind).plug_ins if named else ()
+        except ModuleNotFoundError as error:  # the extra for the analysis is not installed
+            found += [replace(plug_in, fault=_line(error)) for plug_in in named]
     return tuple(found)
 
 

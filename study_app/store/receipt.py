@@ -90,7 +90,7 @@ def plug_ins_of(protocol: Protocol, device: str, outlets: Iterable[str]) -> list
     if others := set(outlets) - {kind.title for kind in sinks.own.values()}:
         asked += [("outlet", kind.name) for kind in sinks.others.values() if kind.title in others]
     found = {one for kind, name in asked if (one := registry(kind).plug_in(name)) is not None}
-    return [one.described for one in sorted(found, key=str)]
+    return [one.described for one in sorted(found, key=lambda one: (one.kind, one.name))]
 
 
 def recorded_plug_ins(receipts: Iterable[Path]) -> dict[str, list[str]]:

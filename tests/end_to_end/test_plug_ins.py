@@ -115,8 +115,9 @@ def test_it_is_installed_and_uninstalled(built: Path, tmp_path: Path) -> None:
     assert program("check", str(STUDY))[0] == 0
     pip("--python", python, "uninstall", *PIP, "-y", PACKAGE)
     assert program("plugins") == none
-    code, (_, *problems) = program("check", str(STUDY))
+    code, (first, *problems) = program("check", str(STUDY))
     assert code == 2
+    assert program("run", str(STUDY), "--participant", "P001", "--windowed") == (2, [first, *problems])
     assert [line.partition(": ")[2] for line in problems] == [
         f'{place}.kind: "{PACKAGE}:{name}" is a {kind} of the plug-in {PACKAGE}, which is not installed '
         f"(pip install {PACKAGE})"
@@ -126,6 +127,18 @@ def test_it_is_installed_and_uninstalled(built: Path, tmp_path: Path) -> None:
             ("questionnaires.mood.items.1", "question", "grid"),
         )
     ]
+
+
+def test_the_designer_names_a_plug_in_that_is_not_installed(
+    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    designer = Designer(tmp_path)
+    designer.file.write_text(STUDY.read_text().replace('name = "plugins"', 'name = "kitchen"'))
+    designer.open("kitchen", "tasks", "circle")
+    missing = f'"{PACKAGE}:circle" is a task of the plug-in {PACKAGE}, which is not installed (pip install {PACKAGE})'
+    assert designer.form_row("tasks", "circle", "kind").row.faults == (missing,)
+    designer.close()
 
 
 @pytest.mark.usefixtures("template")

@@ -585,7 +585,7 @@ class RecordedMethod(Method):
     kind: str
 
     def presentations(self, stimulus: Stimulus) -> int:
-        raise PlugInError(f"{': '.join(KINDS.missing(self.kind))}")
+        raise PlugInError(": ".join(KINDS.missing(self.kind)))
 
     def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
         return stimulus.levels

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, NamedTupl
 from pydantic import ConfigDict, Field, model_validator
 
 from study_app.discovery import Registry
+from study_app.errors import PlugInError
 from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Localised, OfKinds, Table, invalid
 
@@ -301,6 +302,10 @@ class RecordedTask(Task):
     model_config = ConfigDict(extra="allow")
 
     kind: str
+
+    @property
+    def limit_s(self) -> float:
+        raise PlugInError(": ".join(KINDS.missing(self.kind)))
 
 
 KINDS: Final = Registry[type[Task]]("task", {"explore": Explore, "reach": Reach, "follow": Follow}, Task, "kind")

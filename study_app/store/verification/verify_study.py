@@ -16,7 +16,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
-from study_app.discovery import plug_ins
+from study_app.discovery import registry
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.streams import group_of
@@ -48,8 +48,8 @@ from study_app.store.verification.proofs import Proof, read_proof, records
 from study_app.store.verification.verify_session import CheckedSession, Findings, check_session, check_table
 from study_app.store.withdrawals import Tombstone, describe_session, proof_of_withdrawal, tombstones
 
-RECORDED_KINDS: Final = ("question", "task", "method")
-"""Kinds of plug-ins without which a session cannot be checked in full."""
+IN_FILES: Final = ("question", "task", "method")
+"""The kinds of plug-ins without which a session cannot be checked in full."""
 Sessions: TypeAlias = list[CheckedSession]
 
 
@@ -124,9 +124,11 @@ def _plug_ins(study: StudyFolder, found: Findings) -> None:
     """Name the plug-ins that the sessions used, and those that are not here."""
     used = receipt.recorded_plug_ins(one.receipt for one in study.sessions())
     found.plug_ins |= used
-    here = {f"{one.kind} {one.name}" for one in plug_ins() if not one.fault} if used else set()
     for package, names in used.items():
-        if missing := [name for name in names if name not in here and name.split()[0] in RECORDED_KINDS]:
+        asked = {name: name.partition(" ") for name in names}
+        if missing := [
+            name for name, (kind, _, own) in asked.items() if kind in IN_FILES and own not in registry(kind)
+        ]:
             what = f"sessions used {', '.join(missing)} of {package}, which is not installed"
             found.warning(study.data, f"{what}: what only the plug-in can tell was not checked")
 

@@ -9,11 +9,13 @@ from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QLabel
 
+from study_app.errors import StudyError
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.widgets.main_view import EscapeKey
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.session.transitions.events import EndRequested
 from tests.app.world import begin_trial
+from tests.plug_in_packages import forget, install
 
 pytestmark = pytest.mark.slow
 
@@ -34,6 +36,24 @@ def test_what_breaks_in_a_slot_is_zero_force_and_told_and_written_once(bridge, w
     world.broken_clock = False
     bridge.show_tiles()
     assert "the clock fell off the wall" in bridge.operator.banner.what.text()
+
+
+def test_a_plug_in_that_fails_is_zero_force_and_named(bridge, world, caplog, tmp_path, monkeypatch):
+    install(tmp_path, "toy-plug", "task", {"toy": "toy_plug:draw"}, toy_plug="def draw(_now_ns):\n    return 1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    forget()
+    begin_trial(bridge, world)
+    assert world.force_is_on
+    monkeypatch.setattr(bridge.runner, "view", pkgutil.resolve_name("toy_plug:draw"))
+    bridge.draw_frame()
+    assert not world.force_is_on
+    said = "the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero): update or uninstall the plug-in"
+    assert isinstance(bridge.failure, StudyError), "so that it ends with a line and exit code 2"
+    assert [record.getMessage() for record in caplog.records] == [f"the session failed: {said}"]
+    assert said[1:] in bridge.operator.banner.what.text()
+    assert world.events().count("broke") == 1
+    caplog.clear()
+    forget("toy_plug")
 
 
 BROKEN = "no such colour"
