@@ -152,12 +152,13 @@ class SimulatedParticipant(ABC):
         before: list[float] = []
         last: str | int | float | None = None
         for number in sorted(one for one in sensed if one <= trial):
-            if number == trial or number not in self._said:
+            answered = len(sensed[number]) == design.intervals  # else it was passed over after its last attempt
+            if number == trial or (answered and number not in self._said):
                 source = draw if number == trial else self._stream(f"{number}/answers")
                 course = Course(self._courses[number], last)
                 attended = self._attended(number)
                 self._said[number] = attended.answer(self._study, design, sensed[number], before, source, course)
-            last = self._said[number]
+            last = self._said.get(number, last)
             before += sensed[number]
         return self._said[trial]
 
