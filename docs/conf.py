@@ -1,6 +1,7 @@
 """The website of the documentation: ``sphinx-build -W docs build/docs``; it needs no network."""
 
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
@@ -12,8 +13,10 @@ author = "The liquid-study authors"
 copyright = f"2026, {author}"
 version = release = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "pages"]
-source_suffix = {".md": "markdown"}
+NOTEBOOKS = find_spec("myst_nb") is not None  # of the extra docs: else notebooks are files to download
+extensions = ["myst_nb" if NOTEBOOKS else "myst_parser", "sphinx.ext.autodoc", "numpydoc", "pages"]
+source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"} if NOTEBOOKS else {".md": "markdown"}
+nb_execution_mode, nb_execution_raise_on_error, nb_execution_timeout = "force", True, 600
 exclude_patterns = ["examples", "_ext"]
 myst_heading_anchors = 4
 myst_enable_extensions = ["strikethrough", "tasklist"]

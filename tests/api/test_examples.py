@@ -1,0 +1,79 @@
+"""The examples and notebooks of the documentation run, and do what they say."""
+
+import json
+import runpy
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app import api
+from study_app.store.verification.verify_study import verify
+from tests.compiled import needs_servo
+from tests.documented import ROOT
+from tests.protocol.trials import level_studies
+
+pytestmark = [pytest.mark.slow, needs_servo]
+
+EXAMPLES = ROOT / "docs" / "examples"
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+
+
+def example(name: str) -> dict[str, Any]:
+    """Return the names of an example, which has at most 60 lines."""
+    assert len((EXAMPLES / name).read_text(encoding="utf-8").splitlines()) <= 60
+    return runpy.run_path(str(EXAMPLES / name))
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_runs_from_top_to_bottom(path: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    cells = [one for one in json.loads(path.read_text(encoding="utf-8"))["cells"] if one["cell_type"] == "code"]
+    assert [one["outputs"] for one in cells] == [[]] * len(cells), "outputs are made where the pages are built"
+    names: dict[str, Any] = {}
+    for cell in cells:
+        exec("".join(cell["source"]), names)  # noqa: S102 - a page of this documentation
+    assert sum(len(one["source"]) for one in cells) <= 60
+    if path.stem == "threshold":
+        assert names["one"]["low"] < 0.15 < names["one"]["high"]
+    if path.stem == "force":
+        assert names["rows"] > 100
+        assert names["lost"] == 0
+
+
+@pytest.mark.parametrize("study", ["short", pytest.param("viscosityjnd", marks=pytest.mark.nightly)])
+def test_an_own_observer_runs_a_session_whose_thresholds_follow_its_noise(tmp_path: Path, study: str) -> None:
+    if study == "short":
+        study = str(tmp_path / "short.toml")
+        Path(study).write_text(level_studies.text_of(*level_studies.SHORT), encoding="utf-8")
+    found = example("own_observer.py")["main"](tmp_path / "results", study)
+    assert verify(tmp_path / "results").errors == ()
+    assert len(found) > 0
+    if study == "viscosityjnd":
+        assert ((found["low"] < 0.2) & (found["high"] > 0.08)).all()
+
+
+def test_an_own_loop_feels_the_liquid_sixty_times_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened, loops = api.open_force, []
+
+    @contextmanager
+    def moved(*scene: Any, **options: Any) -> Iterator[api.ForceLoop]:
+        """Open a loop whose scripted hand strokes through the tank."""
+        with opened(*scene, **options) as loop:
+            loops.append(loop)
+            loop._rig.device.reach_to(0.04, 0.0, 0.0, duration_s=0.6)
+            yield loop
+
+    monkeypatch.setattr(api, "open_force", moved)
+    shown = example("own_loop.py")["main"](frames=45)
+    times_s, places_m, forces_n = (np.array(each) for each in zip(*shown, strict=True))
+    assert np.median(np.diff(times_s)) == pytest.approx(1 / 60, rel=0.2)
+    assert np.ptp(places_m[:, 0]) > 0.03
+    assert 0.05 < np.linalg.norm(forces_n, axis=1).max() <= 2.0
+    with pytest.raises(api.StudyError, match="has ended"):
+        loops[0].read()
