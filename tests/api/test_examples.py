@@ -46,7 +46,9 @@ def test_a_notebook_runs_from_top_to_bottom(path: Path, monkeypatch: pytest.Monk
         assert names["lost"] == 0
 
 
-@pytest.mark.parametrize("study", ["short", pytest.param("viscosityjnd", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(
+    "study", ["short", pytest.param("viscosityjnd", marks=[pytest.mark.nightly, pytest.mark.timeout(900)])]
+)
 def test_an_own_observer_runs_a_session_whose_thresholds_follow_its_noise(tmp_path: Path, study: str) -> None:
     if study == "short":
         study = str(tmp_path / "short.toml")

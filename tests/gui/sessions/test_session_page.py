@@ -122,12 +122,12 @@ def test_choices_that_were_not_confirmed_stay_visible(qtbot, tmp_path):
 
 def test_a_page_shows_the_motion_of_a_trial_once_it_may_be_seen(qtbot, study):
     sealed = page_of(qtbot, study)
-    assert sealed.motion.accessibleDescription().startswith("Hidden while the study is blinded")
+    assert sealed.motion.sentence.text().startswith("Hidden while the study is blinded")
     assert "once the study is unblinded" in sealed.limits.text()
     unblind(study, by="AK", reason="over")
     page = page_of(qtbot, study)
     qtbot.waitUntil(lambda: page.motion.points > 100)
-    assert page.motion.accessibleDescription().startswith("Position of the hand over ")
+    assert page.motion.plot.accessibleDescription().startswith("Position of the hand over ")
     row = next(row for row, one in enumerate(page.model.rows) if one.number != page.chosen.number)
     page.trials.selectRow(row)
     assert page.motion.points == 0, "another trial's motion is not shown meanwhile"
