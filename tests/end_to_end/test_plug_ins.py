@@ -157,7 +157,7 @@ class TestTemplate:
         labels = {}
         for path in (("questionnaires", "mood", "items", 0), ("tasks", "circle"), ("methods", "limits")):
             designer.go_to(*path)
-            labels[path[0]] = {row.row.row.label for row in designer.place.form.rows}
+            labels[path[0]] = {row.row.label for row in designer.place.form.rows}
         assert {"Left", "Right", "Lower", "Upper", "Cells"} <= labels["questionnaires"]
         assert {"Circle", "Turns", "Turn", "Instruction"} <= labels["tasks"]
         assert {"Levels", "Series"} <= labels["methods"]
