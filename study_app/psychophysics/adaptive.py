@@ -192,10 +192,10 @@ class Observers:
         From 5 to 95 %, in u.
     guess, lapse : float or (tracks,) array
         Guess rate and lapse rate.
-    moves : float or (tracks,) array
-        By how much the threshold rises from the first trial to the last, in u.
     presented : callable, optional
         Maps requested to presented levels, both in u; by default they are equal.
+    moves : float or (tracks,) array
+        By how much the threshold rises from the first trial to the last, in u.
     """
 
     family: Family
@@ -203,8 +203,8 @@ class Observers:
     width: ArrayLike
     guess: float | Floats
     lapse: float | Floats
-    moves: float | Floats = 0.0
     presented: Callable[[Floats], Floats] | None = None
+    moves: float | Floats = 0.0
 
     def probability(self, levels: ArrayLike, done: ArrayLike = 0.5) -> Floats:
         """Return the probability of a success at ``levels``, one for each track or one for all.

@@ -278,7 +278,7 @@ class ThresholdPlan:
         presented = None if self.clipping is None else self.presented
         moves = np.log10(change) if stimulus.spacing == "log" else thresholds * np.log(change)
         observers = Observers(
-            assumed.family, thresholds, assumed.width_prior[0] * width, guess, lapse, moves, presented
+            assumed.family, thresholds, assumed.width_prior[0] * width, guess, lapse, presented, moves
         )
         noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
         tracks, yes = [], np.zeros(len(thresholds))
