@@ -27,7 +27,7 @@ from study_app.session.watch import Kind, Watched
 LEAST_N, LEAST_MPS = 0.05, 0.01  # lower peaks are not drawn larger
 MOST_POINTS: Final = 800  # of a curve
 AXIS_PX: Final = 60  # of the plot's numbers
-FORCES_HIDDEN: Final = "Hidden while the study is blinded", "Forces would reveal the liquid. After liquid-study unblind they are shown."
+FORCES_HIDDEN: Final = "Hidden while the study is blinded", "liquid-study unblind RESULTS shows forces."
 
 
 class WatchedTank(TankWidget):
