@@ -220,7 +220,8 @@ def _path_in_study(study: Study, path: Any) -> str:
 def r_script(study: Study) -> str:
     """Return the script, which reads the exported tables and tests.csv."""
     script = resources.files("study_app.analysis.report").joinpath("templates", "report.R").read_text("utf-8")
-    return "".join(f"# {line}\n" for line in credit_lines(study)) + script
+    sealed = "FALSE" if study.revealed else "TRUE"
+    return "".join(f"# {line}\n" for line in credit_lines(study)) + f"sealed <- {sealed}  # the key\n{script}"
 
 
 HASHES_SHOWN = 12

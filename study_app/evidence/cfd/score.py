@@ -261,7 +261,7 @@ def row(name: str, scores: Sequence[Score], let: Sequence[Releases]) -> list[str
         *(f"{np.median(of):.1%}" if of else "" for of in (fitted, [it.rms for it in others])),
         f"{max(it.greatest for it in others):.1%}" if others else "",
         f"{tick_ns:.0f} ns" if tick_ns < 1e4 else f"{tick_ns / 1e3:.0f} µs",
-        f"{1e3 * given_j:.3g} mJ" if math.isfinite(given_j) else "no end" if let else "",
+        "" if math.isnan(given_j) else f"{1e3 * given_j:.2g} mJ" if given_j < 1 else f"{given_j:.2g} J",
         *(borne.get(name, "") for name in LIQUIDS),
     ]
 

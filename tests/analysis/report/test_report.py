@@ -121,6 +121,14 @@ def test_r_finds_a_number_that_was_changed(of_twelve: Path, tmp_path: Path) -> N
     assert done.stdout.rstrip().endswith("numbers that differ: 1")
 
 
+def test_r_says_why_it_compares_nothing(small: Results, tmp_path: Path) -> None:
+    small.add("P001", lambda _condition, _item: 4)
+    report(small.folder, tmp_path / "report")
+    done = run_in_r(tmp_path / "report")
+    assert done.returncode == 1
+    assert "nothing to compare: the key was sealed" in done.stdout
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("sessions", [2, 3])
 def test_r_compares_sessions(sessions: int, rek: Results, tmp_path: Path) -> None:

@@ -169,7 +169,12 @@ numbers <- numbers + sum(!is.na(thresholds[c("d_prime", "criterion")])) + NROW(e
   sum(!is.na(adjusted[c("pse", "low", "high", "jnd", "constant_error", "hysteresis")]))
 
 cat(compared, "of", numbers, "numbers compared\n")
-if (compared == 0) quit(status = 1)
+if (compared == 0) {
+  cat("nothing to compare:", if (sealed)
+    "the key was sealed, and nothing is compared between settings; after liquid-study unblind, write these files again\n"
+  else "no test, threshold or setting has a number that R computes\n")
+  quit(status = 1)
+}
 if (differing == 0) cat("every number that R computes is the report's\n") else {
   cat("numbers that differ:", differing, "\n")
   quit(status = 1)
