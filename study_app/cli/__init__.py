@@ -62,9 +62,11 @@ def _shortened(message: str) -> str:
 
 def _leave(ended: list[int]) -> None:
     if ended:
-        logging.shutdown()
-        sys.stdout.flush()
-        os._exit(ended[0])
+        try:
+            logging.shutdown()
+            sys.stdout.flush()
+        finally:  # also where the output is closed, or a windowed program has none
+            os._exit(ended[0])
 
 
 def main() -> None:

@@ -212,3 +212,18 @@ def test_a_blinded_report_says_once_how_to_open_the_key_and_which_limits_were_br
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
     assert re.search("4 of 4 trials broke one: [^.]*frame gap at most 2 ms in 4", page)
     assert page.count("liquid-study unblind RESULTS --by NAME --reason TEXT") == 1
+
+
+@pytest.mark.parametrize("output", ["None", "open('/dev/full', 'w')"], ids=["no output", "a full disk"])
+def test_a_program_ended_by_a_signal_ends_at_once_without_an_output(output: str) -> None:
+    program = f"""
+import sys
+import PySide6.QtCore
+from study_app import app, cli
+sys.argv = ["liquid-study"]
+app.home = lambda: print("ended") or 130
+sys.stdout = {output}
+cli.main()
+"""
+    finished = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (finished.returncode, finished.stderr) == (130, "")
