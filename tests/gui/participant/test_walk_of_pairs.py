@@ -1,4 +1,4 @@
-"""The smallest study of pairs in its real windows at 1366 × 768 on one screen: by keys alone and by the mouse alone.
+"""The smallest study of pairs in its real windows at 1366 × 768 on one screen, by the mouse alone.
 
 The session's own transitions say what comes next; the same widgets, laid out off screen, say where it lies.
 """
@@ -86,15 +86,16 @@ NUMBER = 12
 
 
 class Walker:
-    """Goes through the study; how a page is answered is the subclass's affair."""
+    """Goes through the study by the mouse."""
 
-    device = ""
-
-    def __init__(self, display: str, folder: Path) -> None:
+    def __init__(self, display: str, folder: Path, qtbot: Any) -> None:
+        self._plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True, strip=Strip())
+        self._plan.may_close = True
+        qtbot.addWidget(self._plan)
         file = folder / "smallest.toml"
         file.write_text(STUDY, encoding="utf-8")
         results = folder / "results" / "smallest"
-        given = ("--participant", "P001", "--seed", "3", "--device", self.device, "--results", str(results))
+        given = ("--participant", "P001", "--seed", "3", "--device", "mouse", "--results", str(results))
         self.orders: set[str] = set()
         self.program = Program(display, folder, "run", str(file), *given)
         self.window = ""
@@ -102,15 +103,6 @@ class Walker:
     def xdotool(self, *orders: str) -> str:
         self.orders |= set(orders)
         return self.program.xdotool(*orders)
-
-    def answer_form(self, asked: QuestionnairePage) -> None:
-        raise NotImplementedError
-
-    def choose(self, asked: ChoicePage, value: str) -> None:
-        raise NotImplementedError
-
-    def enter(self, asked: NumberPage) -> None:
-        raise NotImplementedError
 
     def walk(self) -> None:
         """Go from the first page to the last."""
@@ -141,56 +133,6 @@ class Walker:
             self.enter(asked)
         self.program.wait_for_event("responses", answered + 1)
         return 1
-
-
-def opened() -> SessionState:
-    """Return the same session before its first event; its levels are others, and no page shows any."""
-    protocol = parse(STUDY.encode(), "smallest.toml")
-    key = key_of(protocol)
-    schedule = build_schedule(protocol, "P001", 3)
-    state = open_session(protocol, schedule, key.codes, "en", secret=key.secret)
-    return advance(state, Begin(0.0))[0]
-
-
-def ahead(state: SessionState, at_s: float) -> SessionState:
-    """Return the session one page further."""
-    match state.phase:
-        case Phase.TASK:
-            return advance(state, TaskDone(at_s, "complete", {}))[0]
-        case Phase.RESTING | Phase.FEEDBACK:
-            return advance(state, TimeUp(at_s))[0]
-        case _:
-            given = {"choice_2ifc": PRESSED[0], "estimation": NUMBER, **ANSWERS}
-            for item in (one for one in state.items if one in given):
-                state = advance(state, Chosen(at_s, item, given[item]))[0]
-            return advance(state, Submitted(at_s))[0]
-
-
-class ByKeys(Walker):
-    device = "scripted"
-
-    def press(self, *keys: str) -> None:
-        assert self.xdotool("getwindowfocus") == self.window
-        self.xdotool("key", "--delay", "30", *keys)
-
-    def answer_form(self, _asked: QuestionnairePage) -> None:
-        self.press("4", "2", "Return", "2", "End", "Down", "Return")
-
-    def choose(self, _asked: ChoicePage, value: str) -> None:
-        self.press({"first": "1", "second": "Right"}[value])
-
-    def enter(self, _asked: NumberPage) -> None:
-        self.press("1", "2", "Return")
-
-
-class ByMouse(Walker):
-    device = "mouse"
-
-    def __init__(self, display: str, folder: Path, qtbot: Any) -> None:
-        super().__init__(display, folder)
-        self._plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True, strip=Strip())
-        self._plan.may_close = True
-        qtbot.addWidget(self._plan)
 
     def shown(self, asked: Any) -> QWidget:
         self._plan.show_page(asked)
@@ -225,6 +167,29 @@ class ByMouse(Walker):
         self.click(*(place_in(self._plan, part) for part in (keys["1"], keys["2"], widget.button)))
 
 
+def opened() -> SessionState:
+    """Return the same session before its first event; its levels are others, and no page shows any."""
+    protocol = parse(STUDY.encode(), "smallest.toml")
+    key = key_of(protocol)
+    schedule = build_schedule(protocol, "P001", 3)
+    state = open_session(protocol, schedule, key.codes, "en", secret=key.secret)
+    return advance(state, Begin(0.0))[0]
+
+
+def ahead(state: SessionState, at_s: float) -> SessionState:
+    """Return the session one page further."""
+    match state.phase:
+        case Phase.TASK:
+            return advance(state, TaskDone(at_s, "complete", {}))[0]
+        case Phase.RESTING | Phase.FEEDBACK:
+            return advance(state, TimeUp(at_s))[0]
+        case _:
+            given = {"choice_2ifc": PRESSED[0], "estimation": NUMBER, **ANSWERS}
+            for item in (one for one in state.items if one in given):
+                state = advance(state, Chosen(at_s, item, given[item]))[0]
+            return advance(state, Submitted(at_s))[0]
+
+
 @pytest.fixture
 def display() -> Iterator[str]:
     with virtual_display(size=SCREEN) as number:
@@ -253,18 +218,8 @@ def check(walker: Walker) -> None:
         assert found.returncode == 0, found.stdout + found.stderr
 
 
-def test_pairs_and_numbers_are_answered_by_keys_alone(display: str, tmp_path: Path) -> None:
-    walker = ByKeys(display, tmp_path)
-    try:
-        walker.walk()
-        check(walker)
-    finally:
-        walker.program.close()
-    assert not walker.orders & {"click", "mousedown", "mousemove", "mousemove_relative"}
-
-
 def test_pairs_and_numbers_are_answered_by_the_mouse_alone(display: str, tmp_path: Path, qtbot: Any) -> None:
-    walker = ByMouse(display, tmp_path, qtbot)
+    walker = Walker(display, tmp_path, qtbot)
     try:
         walker.walk()
         check(walker)
