@@ -20,6 +20,9 @@ def test_numbers_come_on_every_screen_and_go_with_the_place(real_place, qtbot):
     assert number.isVisible()
     qtbot.keyClick(number, Qt.Key.Key_Space)
     assert not number.isVisible()
+    number.show()
+    qtbot.mouseClick(number, Qt.MouseButton.LeftButton)
+    assert not number.isVisible()
     with qtbot.waitSignal(number.destroyed):
         real_place.leave()
     assert real_place.numbers == []
