@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 from random import Random
 
-from study_app.devices.registry import discover
+from study_app.devices.registry import all_devices
 from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import StudyError
 from study_app.haptics.kernels.compiled import following_compilation
@@ -15,7 +15,7 @@ from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
 
 with tempfile.TemporaryDirectory() as folder, following_compilation(lambda _share: None) as counter:
-    for device in discover().devices:
+    for device in all_devices():
         if device.kind != "simulated" and device.name != "mouse":
             continue
         try:
