@@ -134,7 +134,7 @@ class Registry(Mapping[str, T], Generic[T]):
                 try:
                     found = point.load()
                     name = self._name_of(found, point.value, plug_in.package, others)
-                except Exception as error:  # noqa: BLE001 - code of another package: it must not end this program
+                except (Exception, SystemExit) as error:  # noqa: BLE001 - code of another package
                     plug_ins.append(replace(plug_in, fault=_line(error)))
                 else:
                     plug_ins.append(replace(plug_in, name=name))
@@ -148,12 +148,17 @@ class Registry(Mapping[str, T], Generic[T]):
             raise StudyError(f"{place} is not a {self._base.__name__} but a {type(found).__name__}")
         if self._key != "name" and not (isinstance(found, type) and issubclass(found, self._base)):
             raise StudyError(f"{place} is not a class that extends {self._base.__name__}")
+        if self._key != "name" and (lacking := getattr(found, "__abstractmethods__", None)):
+            raise StudyError(f"{place} lacks {', '.join(sorted(lacking))}: define them")
         name, begins = getattr(found, self._key, ""), f"{_canonical(package)}:"
         if self._key == "kind":
             found.model_json_schema()  # what its keys lack is said now, not by a form
-            name = found.model_fields["kind"].default if "kind" in found.model_fields else ""
-        if self._key == "kind" and not re.fullmatch(rf"{begins}[a-z][a-z0-9_]*", str(name)):
-            raise StudyError(f"its kind is {name!r}: call it '{begins}' and small letters, digits or underscores")
+            kind = found.model_fields.get("kind")
+            if kind is not None and kind.is_required():
+                raise StudyError("its kind has no default: give it the value of its Literal")
+            name = "" if kind is None else kind.default
+            if not re.fullmatch(rf"{begins}[a-z][a-z0-9_]*", str(name)):
+                raise StudyError(f"its kind is {name!r}: call it '{begins}' and small letters, digits or underscores")
         if not isinstance(name, str) or not name:
             raise StudyError(f"{place} has no {self._key}: give it one")
         if name in self.own or name in others:
@@ -207,7 +212,7 @@ def explained(error: BaseException) -> BaseException:
     while trace is not None:
         modules.append(str(trace.tb_frame.f_globals.get("__name__", "")).partition(".")[0])
         trace = trace.tb_next
-    packages = {point.module.partition(".")[0]: point.dist for point in _points()}
+    packages = {re.split(r"\W", point.value)[0]: point.dist for point in _points()}
     dist = next((packages[one] for one in reversed(modules) if packages.get(one) is not None), None)
     if dist is None:
         return error

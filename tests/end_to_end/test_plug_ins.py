@@ -283,6 +283,7 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
     study, folder = tmp_path / "toy.toml", tmp_path / "results"
     study.write_text(TOY_STUDY)
     points = {"toy": "toy_plug:Toy"}
+    install(site, "toy_typo", "outlet", {"toy": "toy-typo:Toy"})
     install(site, "toy-plug", "question", points, toy_plug=QUESTION.format(problem="1 / 0", measure="1 / 0"))
     code, _, said = run("rehearse", study, "--participants", 1, "--results", folder)
     line = "the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero): update or uninstall the plug-in"
@@ -307,6 +308,8 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
     ("source", "reason"),
     [
         ("raise RuntimeError('no such\\nlibrary')", "RuntimeError: no such library"),
+        ("raise SystemExit('no licence')", "SystemExit: no licence"),
+        (QUESTION.replace(' = "toy-plug:toy"', ""), "its kind has no default: give it the value of its Literal"),
         ("Toy = 3", "toy_plug:Toy is not a class that extends Question"),
         (QUESTION.replace("toy-plug:toy", "mood"), "its kind is 'mood': call it 'toy-plug:' and"),
         (QUESTION.replace("Literal[", "Liberal["), "NameError: name 'Liberal' is not defined"),
@@ -329,3 +332,26 @@ def test_what_cannot_be_used_is_a_line_and_hides_no_other(
     assert code == 2
     assert f'"toy-plug:toy" is a question that the plug-in toy-plug 1.0 does not give: {reason}' in said
     assert run("check", "demo")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "base", "lacks"),
+    [
+        ("method", "trials.methods:Method", "level, levels_of, presentations"),
+        ("task", "trials.tasks:Task", "limit_s"),
+    ],
+)
+def test_a_class_that_lacks_what_it_must_have_is_named(
+    run: Any, site: Path, kind: str, base: str, lacks: str
+) -> None:
+    module, _, name = base.partition(":")
+    source = f"""
+        from typing import Literal
+        from study_app.protocol.{module} import {name}
+
+        class Toy({name}):
+            kind: Literal["toy-plug:toy"] = "toy-plug:toy"
+    """
+    install(site, "toy-plug", kind, {"toy": "toy_plug:Toy"}, toy_plug=source)
+    code, said, _ = run("plugins")
+    assert (code, f"toy: toy_plug:Toy lacks {lacks}: define them; update" in said) == (3, True)

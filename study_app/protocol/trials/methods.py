@@ -171,7 +171,8 @@ class Method(Table):
                 number, sources = len(heard), [np.random.default_rng(seed).random for seed in seeds]
                 level = self.level(track, number, heard, sources)
                 levels[one, number] = stimulus.coordinate(level)
-                right = bool(of_track[number] < observers.probability(levels[one, number])[one])
+                done = number / max(1, trials - 1)
+                right = bool(of_track[number] < observers.probability(levels[one, number], done)[one])
                 successes[one, number] = right
                 heard.append(TrialResult(number, "", level, right, right))
         return Answers(levels, successes)

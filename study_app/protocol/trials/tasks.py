@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from functools import reduce
 from itertools import pairwise
 from operator import or_
@@ -73,9 +74,9 @@ class Task(Table):
         return f"{self.activity} for {self.limit_s:g} s"
 
     @property
+    @abstractmethod
     def limit_s(self) -> float:
         """The time after which it ends by itself [s]."""
-        raise NotImplementedError(self.kind)
 
     @property
     def expected_s(self) -> float:

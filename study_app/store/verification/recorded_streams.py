@@ -83,8 +83,10 @@ def _markers(
     texts = [row[0] for row in stream["time_series"]]
     known = Counter(text for one in expected.values() for text in one)
     unknown = sum(text not in known for text in texts)
-    for session, sent in expected.items():
-        at = {text: place for place, text in enumerate(texts) if text in set(sent)}
+    for session, all_sent in expected.items():
+        sent = [text for text in all_sent if known[text] == 1]  # sessions begin with the same text
+        wanted = set(sent)
+        at = {text: place for place, text in enumerate(texts) if text in wanted}
         there = [number for number, text in enumerate(sent) if text in at]
         name = f"{session.path.parent.name}/{session.path.name}"
         if not there:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import study_app
 from study_app.errors import StoreError
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
@@ -62,7 +63,13 @@ def reproduced(session_folder: Path) -> Reproduced:
         ) from None
     found = Reproduced([*reproduce(protocol, seed, participant, recorded, complete=complete, row_of=row_of)])
     if lines and events.start_of(lines).intervals:
-        _levels(_Compared(protocol, Key(key.codes, key.nonce), schedule), lines, key, found)
+        compared = _Compared(protocol, Key(key.codes, key.nonce), schedule)
+        _levels(compared, lines, key, found)
+        version = ran["versions"].get("liquid-study")
+        if compared.differences and version != study_app.__version__:
+            found.followed.append(
+                f"liquid-study {version} ran the session and may choose levels by other rules: compare with that version"
+            )
     return found
 
 

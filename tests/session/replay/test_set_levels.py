@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from study_app import __version__
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
 from study_app.store.blinded.blinding import opened, read_key, whole_protocol
@@ -113,6 +114,9 @@ def test_what_was_changed_with_the_key_at_hand_is_found(
     found = reproduced(session)
     assert any(named in line for line in found.differences), found.differences
     assert found.followed == ["matching: 2 of 3 levels follow from the answers"]
+    path = session / "receipt.json"
+    path.write_text(path.read_text().replace(f'"liquid-study": "{__version__}"', '"liquid-study": "0.2.0"'))
+    assert "liquid-study 0.2.0 ran the session and may choose levels by other rules" in reproduced(session).followed[-1]
 
 
 def test_a_step_that_took_effect_at_another_scene_is_found_by_replay(session: Path) -> None:
