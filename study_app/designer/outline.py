@@ -150,7 +150,7 @@ def icon_of(path: Path, document: Mapping[str, Any]) -> str:
     """Return the icon of an element."""
     if len(path) == 2 and path[0] == "pages":
         value = value_at(document, path)
-        return PAGES.get(value.get("kind"), ICONS["pages"]) if isinstance(value, Mapping) else ICONS["pages"]
+        return PAGES.get(str(value.get("kind")), ICONS["pages"]) if isinstance(value, Mapping) else ICONS["pages"]
     return "list" if "items" in path else ICONS.get(str(path[0]), "ring") if path else "ring"
 
 
