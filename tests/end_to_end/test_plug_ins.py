@@ -336,14 +336,9 @@ def test_what_cannot_be_used_is_a_line_and_hides_no_other(
 
 @pytest.mark.parametrize(
     ("kind", "base", "lacks"),
-    [
-        ("method", "trials.methods:Method", "level, levels_of, presentations"),
-        ("task", "trials.tasks:Task", "limit_s"),
-    ],
+    [("method", "trials.methods:Method", "level, levels_of, presentations"), ("task", "trials.tasks:Task", "limit_s")],
 )
-def test_a_class_that_lacks_what_it_must_have_is_named(
-    run: Any, site: Path, kind: str, base: str, lacks: str
-) -> None:
+def test_a_class_that_lacks_what_it_must_have_is_named(run: Any, site: Path, kind: str, base: str, lacks: str) -> None:
     module, _, name = base.partition(":")
     source = f"""
         from typing import Literal

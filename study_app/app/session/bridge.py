@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtWidgets import QWidget
 
 from study_app.app.failures import ThreadExceptions, UncaughtExceptions, guarded_session_slot
 from study_app.app.session.operator import OperatorMonitor, Parts, Reconnection, WatchedJournal
@@ -232,7 +233,8 @@ class SessionBridge(QObject):
         if frame is None or not isinstance(error, Exception) or frame.f_code.co_name not in {"paint", "paintEvent"}:
             paints_here = False
         else:
-            paints_here = not frame.f_globals["__name__"].startswith("study_app.gui.participant")
+            parts = (self.participant, *self.participant.findChildren(QWidget))  # also of plug-ins
+            paints_here = all(getattr(type(one).paintEvent, "__code__", None) is not frame.f_code for one in parts)
         (self.operator.tell_of_failure if paints_here else self.fail)(error)
         return paints_here
 

@@ -68,7 +68,7 @@ def reproduced(session_folder: Path) -> Reproduced:
         version = ran["versions"].get("liquid-study")
         if compared.differences and version != study_app.__version__:
             found.followed.append(
-                f"liquid-study {version} ran the session and may choose levels by other rules: compare with that version"
+                f"liquid-study {version} ran the session and may choose levels by other rules: run reproduce of it"
             )
     return found
 

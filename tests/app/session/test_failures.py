@@ -7,7 +7,7 @@ import weakref
 import pytest
 from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from study_app.errors import StudyError
 from study_app.gui.kit.dialogs import Question
@@ -129,6 +129,26 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
     assert BROKEN in bridge.operator.banner.what.text()
     assert BROKEN in caplog.text
     breaking.on = False
+    bridge.uncaught.previous = before
+    caplog.clear()
+
+
+@pytest.mark.qt_log_ignore("QBackingStore::endPaint")
+def test_a_part_of_the_participants_window_from_elsewhere_that_cannot_be_painted_is_zero_force(
+    make, world, qtbot, caplog
+):
+    class Field(QWidget):  # as a plug-in's, or one that both windows share
+        def paintEvent(self, _event):  # noqa: N802 - as Qt calls it
+            raise ValueError(BROKEN)
+
+    bridge = make()
+    before, bridge.uncaught.previous = bridge.uncaught.previous, lambda *_error: None
+    begin_trial(bridge, world)
+    field = Field(bridge.participant)
+    field.show()
+    qtbot.waitUntil(lambda: not world.force_is_on)
+    field.hide()
+    assert BROKEN in bridge.operator.banner.what.text()
     bridge.uncaught.previous = before
     caplog.clear()
 
