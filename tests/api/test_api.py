@@ -160,10 +160,10 @@ def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_
         pass
 
 
-def to_twice_the_standard(question: Any) -> int:
+def to_twice_the_standard(question: Any) -> np.int64:
     """Adjust until what is felt resists twice as much as the standard did."""
     standard, now = (one.force_mean_n / one.speed_rms_mps for one in question.felt)
-    return 0 if abs(now / standard - 2) < 0.1 else 1 if now < 2 * standard else -1
+    return np.int64(0 if abs(now / standard - 2) < 0.1 else 1 if now < 2 * standard else -1)  # as numpy counts
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ had by arithmetic alone, but opinions rest on the wake's push, on how rough a fo
 too.
 """
 
+import operator
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -303,9 +304,10 @@ class RehearsedSession(SimulatedParticipant):
         if given is None:
             sensed = self._attended(page.trial).sensed(now)
             return setting.observer.steps(sensed, self._remembered(page.trial, sensed))
-        if not isinstance(given, int):
-            raise SessionError(f"{given!r} is no number of steps: give a whole one, 0 where the level is set")
-        return given
+        try:
+            return operator.index(given)  # type: ignore[arg-type]  # of numpy, too
+        except TypeError:
+            raise SessionError(f"{given!r} is no number of steps: give a whole one, 0 where the level is set") from None
 
     def look(self, senses: SensedTrial) -> TankView | None:
         """Show the frames that are due since the last look; return what the newest showed, None where none was due."""
