@@ -20,6 +20,7 @@ from typing import Any, Final, TypeAlias
 
 import psutil
 
+from study_app.discovery import explained
 from study_app.errors import MissingExtra, StudyError, naming_the_extra
 
 Send: TypeAlias = Callable[[Any], object]
@@ -119,7 +120,9 @@ def serve(orders: Connection, answers: Connection, task: str, *, background: boo
                 with naming_the_extra():
                     carry_out: Task = resolve_name(task)
                     last = carry_out(order, partial(_send, answers, number), lambda: not waiting.empty())
-            except StudyError as error:
+            except Exception as raised:
+                if not isinstance(error := explained(raised), StudyError):
+                    raise
                 last = Refused(str(error), isinstance(error, Stopped), isinstance(error, MissingExtra))
             answers.send((number, last, True))
 

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import psutil
@@ -20,6 +21,7 @@ from study_app.errors import StudyError
 from study_app.workers import client as clients
 from study_app.workers.client import WorkerClient
 from study_app.workers.server import Crashed, Refused, Send, Stop, Stopped
+from tests.plug_in_packages import install
 
 SOON_S = 60.0
 
@@ -32,6 +34,8 @@ def carry_out(order: str, send: Send, stop: Stop) -> object:
             raise StudyError("it cannot be done")
         case "mistake":
             raise ZeroDivisionError
+        case "plug-in":
+            resolve_name("toy_plug:fail")()
         case "die":
             os.kill(os.getpid(), signal.SIGKILL)
         case "wait":
@@ -107,6 +111,19 @@ def test_orders_are_carried_out_one_after_the_other_and_a_refusal_is_a_sentence(
         (last, "last begun"),
         (last, "last"),
     ]
+    assert worker.works
+
+
+@pytest.mark.slow
+def test_a_plug_in_that_fails_is_named_and_the_worker_goes_on(
+    start: Callable[..., Tried], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, "toy-plug", "method", {"toy": "toy_plug:fail"}, toy_plug="def fail():\n    return 1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    worker = start()
+    (*_, refused) = answers_until(worker, worker.order("plug-in"), is_last)
+    assert isinstance(refused, Refused)
+    assert refused.sentence.startswith("the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero)")
     assert worker.works
 
 

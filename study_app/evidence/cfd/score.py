@@ -307,10 +307,11 @@ class Program:
             said = stdout.readline()
         except OSError:
             said = ""
-        self._asked_s = math.inf
         if not said:
-            why = f"gave no answer within {ANSWER_S:g} s" if self._late else f"ended with code {self._process.wait()}"
+            code = self._process.wait()  # a program that only closed its output is ended, too
+            why = f"gave no answer within {ANSWER_S:g} s" if self._late else f"ended with code {code}"
             raise EngineError(f"{self._name} {why}")
+        self._asked_s = math.inf
         return said.strip()
 
     def _watch(self) -> None:
