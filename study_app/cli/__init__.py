@@ -96,10 +96,11 @@ def main() -> None:
         if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG and error.filename:
             click.echo(f"liquid-study: {_shortened(str(error.filename))}: the file name is too long", err=True)
             sys.exit(EXIT_USER_ERROR)
-        bug = (said := explained(error)) is error
-        logging.getLogger(__name__).critical("a bug ended the program" if bug else str(said), exc_info=True)
-        if bug:
+        log = logging.getLogger(__name__)
+        if (said := explained(error)) is error:
+            log.critical("a bug ended the program", exc_info=True)
             raise
+        log.info("%s", said, exc_info=True)  # in the log alone: the terminal has the line below
         click.echo(f"liquid-study: {_shortened(str(said))}", err=True)
         sys.exit(EXIT_USER_ERROR)
     code = code if isinstance(code, int) else 0

@@ -23,6 +23,7 @@ from types import TracebackType
 from typing import Any, Final, ParamSpec, TypeVar
 
 import study_app
+from study_app.discovery import explained
 from study_app.errors import WorkerError
 from study_app.workers.server import CONTEXT, compute_in_one_thread, ignore_interrupts
 
@@ -53,7 +54,7 @@ class ProcessExecutor(ProcessPoolExecutor):
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Compute a case; a process that cannot be started is a `WorkerError`."""
         try:
-            return super().submit(fn, *args, **kwargs)
+            return super().submit(_run, fn, args, kwargs)
         except OSError as error:
             raise _lost_process() from error
 
@@ -175,7 +176,17 @@ def _compute(expected: Mapping[str, str], fn: Callable[..., T], args: tuple[Any,
             f"the worker on {socket.gethostname()} has {differing}: install the same versions on every worker, since "
             "results could differ"
         )
-    return fn(*args, **kwargs)
+    return _run(fn, args, kwargs)
+
+
+def _run(fn: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
+    """Compute a case; where a plug-in fails, say which: the modules of a trace are known in this process alone."""
+    try:
+        return fn(*args, **kwargs)
+    except Exception as error:
+        if (said := explained(error)) is error:
+            raise
+        raise said from error
 
 
 @cache

@@ -287,7 +287,7 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
     install(site, "toy-plug", "question", points, toy_plug=QUESTION.format(problem="1 / 0", measure="1 / 0"))
     code, _, said = run("rehearse", study, "--participants", 1, "--results", folder)
     line = "the plug-in toy-plug 1.0 failed (ZeroDivisionError: division by zero): update or uninstall the plug-in"
-    assert (code, said.splitlines()[-1]) == (2, f"liquid-study: {line}")
+    assert (code, said.splitlines()[-1], "Traceback" in said) == (2, f"liquid-study: {line}", False)
     (logged,) = caplog.records  # with its trace, which no terminal shows
     assert (logged.getMessage(), bool(logged.exc_info)) == (line, True)
     caplog.clear()

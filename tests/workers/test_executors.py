@@ -9,14 +9,16 @@ import sys
 import textwrap
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import psutil
 import pytest
 
-from study_app.errors import Problem, ProtocolError, StudyError, WorkerError
+from study_app.errors import PlugInError, Problem, ProtocolError, StudyError, WorkerError
 from study_app.workers.executors import Workers, open_executor
 from study_app.workers.server import CONTEXT
+from tests.plug_in_packages import forget, install
 from tests.workers.worker_cases import die, draw, loaded, refuse, refuse_file
 
 pytestmark = pytest.mark.slow
@@ -46,6 +48,15 @@ def test_a_case_that_kills_its_process_is_one_clear_line() -> None:
     ):
         list(executor.map(die, range(4)))
     assert "\n" not in str(raised.value)
+
+
+def test_a_plug_in_that_fails_in_a_case_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path, "toy-plug", "method", {"toy": "toy_plug:fail"}, toy_plug="def fail():\n    return 1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    fail = resolve_name("toy_plug:fail")
+    with pytest.raises(PlugInError, match=r"toy-plug 1\.0 failed \(ZeroDivisionError"), open_executor() as executor:
+        executor.submit(fail).result()
+    forget("toy_plug")
 
 
 @posix
@@ -91,6 +102,7 @@ ENDLESS = """
     import os, signal, sys, time
     from study_app.workers.executors import Workers, open_executor
     from tests.workers.worker_cases import report_and_wait
+
     if __name__ == "__main__":
         signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
         try:
