@@ -255,6 +255,14 @@ def _receipt(folder: SessionFolder, lines: list[events.Event], key: Key | None, 
         differing = ["what the session began with"]
     if differing:
         found.error(path, f"{', '.join(differing)}: differ from the journal")
+    told = {str(entry.get("at")) for entry in held.get("resumed", ()) if isinstance(entry, dict)}
+    again = [one.at for one in lines if isinstance(one, events.SessionResumed) and one.receipt_hash is not None]
+    if lacking := [at for at in again if at not in told]:
+        found.warning(
+            path,
+            f"lacks what the session was resumed with at {', '.join(lacking)}: the program was ended meanwhile, or it "
+            "was removed",
+        )
     if key is not None and not _is_protocol(held, start, key):
         found.error(path, "its protocol was changed: restore it from a copy")
     if receipt.other_format(held, start):

@@ -144,3 +144,5 @@ def test_every_change_to_the_receipt_of_a_session_that_has_not_ended_is_an_error
     for change in changes:
         receipt.write(path, held | change)
         assert "sub-P009/ses-01/receipt.json: " in told(verify(study)), change
+    receipt.write(path, held | {"resumed": []})  # so does a program leave it that is killed while it resumes
+    assert "sub-P009/ses-01/receipt.json: lacks what the session was resumed with" in warned(verify(study))
