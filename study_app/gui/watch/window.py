@@ -55,6 +55,7 @@ class WatchWindow(Themed, QDialog):
         self.export_dialog: Work | None = None
         self._reader = Background(self)
         self._reader.done.connect(self._show)
+        self._reader.failed.connect(self._show)
         self._timer = QTimer(self, interval=PAINT_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._play_on)
         self._since = (0.0, 0.0)
@@ -121,13 +122,13 @@ class WatchWindow(Themed, QDialog):
         self.pause()
         self._reader.run(partial(_result, self._folder, self._trial, interval))
 
-    def _show(self, shown: Watched | StudyError) -> None:
+    def _show(self, shown: Watched | Exception) -> None:
         if self.stage is not None:
             remove_widget(self.stage)
             self.stage = None
         self._enable(isinstance(shown, Watched))
-        if isinstance(shown, StudyError):
-            sentence = str(shown)
+        if not isinstance(shown, Watched):
+            sentence = str(shown) or type(shown).__name__
             self.sentence.setText(f"{sentence[:1].upper()}{sentence[1:]}.")
             return
         if self.interval.count() != shown.intervals:
