@@ -227,3 +227,16 @@ def no_window_left() -> Iterator[None]:
     for widget in left:
         widget.hide()
     assert not named, f"left on the screen: {', '.join(named)}"
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Return a folder that packages with plug-ins can be installed into."""
+    from tests.plug_in_packages import forget  # loads the model of studies, which most tests need not
+
+    folder = tmp_path / "packages"
+    folder.mkdir()
+    monkeypatch.syspath_prepend(folder)
+    forget()
+    yield folder
+    forget("toy_")

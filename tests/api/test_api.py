@@ -174,7 +174,7 @@ def test_an_own_observer_sets_levels(tmp_path: Path) -> None:
     with api.open_session(study, "P001", results=tmp_path / "r", seed=3, answer=to_twice_the_standard) as session:
         session.run()
     with (
-        pytest.raises(SessionError, match="'more' is no number of steps"),
+        pytest.raises(SessionError, match="'more' is not a number of steps"),
         api.open_session(study, "P002", results=tmp_path / "r", seed=3, answer=lambda _: "more") as session,
     ):
         session.run()

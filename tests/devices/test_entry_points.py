@@ -15,7 +15,7 @@ from study_app.gui.kit.devices import devices_shown
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from tests.compiled import needs_servo
-from tests.plug_in_packages import forget, install
+from tests.plug_in_packages import install
 
 pytestmark = pytest.mark.slow
 
@@ -67,17 +67,6 @@ DRIVER = """
             super().__init__(handle, request.workspace_m or (0.05, 0.05, 0.05), request.force_limit_n or 8.0)
             self._tremble(request.random, 1e-5)
 """
-
-
-@pytest.fixture
-def site(tmp_path, monkeypatch):
-    """Return a folder that packages can be installed into."""
-    folder = tmp_path / "site"
-    folder.mkdir()
-    monkeypatch.syspath_prepend(folder)
-    forget()
-    yield folder
-    forget("toy_")
 
 
 @pytest.fixture

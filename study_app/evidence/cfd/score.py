@@ -84,7 +84,7 @@ class Motion:
 
     @property
     def setup(self) -> dict[str, float]:
-        """What an engine is told of the liquid and the ball."""
+        """What an engine receives about the liquid and the ball."""
         return {name: float(self.notes[name]) for name in ("density_kg_m3", "viscosity_pa_s", "diameter_m")}
 
 

@@ -30,6 +30,8 @@ from study_app.store.atomic import write_file
 from study_app.video.encoding import VideoWriter
 
 SIZE: Final = (1180, 800)
+LEAST: Final = (980, 560)
+"""In narrower windows the instruction covers what is below it."""
 PAINT_MS: Final = 15
 VIDEO_HZ: Final = 30
 SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
@@ -87,6 +89,7 @@ class WatchWindow(Themed, QDialog):
         self._connect()
         apply_theme(self, theme)
         available = self.screen().availableSize()
+        self.setMinimumSize(*LEAST)
         self.resize(min(SIZE[0], available.width() - 40), min(SIZE[1], available.height() - 60))
         self._read(1)
 

@@ -307,7 +307,9 @@ class RehearsedSession(SimulatedParticipant):
         try:
             return operator.index(given)  # type: ignore[arg-type]  # of numpy, too
         except TypeError:
-            raise SessionError(f"{given!r} is no number of steps: give a whole one, 0 where the level is set") from None
+            raise SessionError(
+                f"{given!r} is not a number of steps: give a whole one, 0 where the level is set"
+            ) from None
 
     def look(self, senses: SensedTrial) -> TankView | None:
         """Show the frames that are due since the last look; return what the newest showed, None where none was due."""
