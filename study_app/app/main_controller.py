@@ -585,6 +585,6 @@ def _watch(page: SessionPage) -> None:
 
 
 def _draft_words() -> DraftWords:
-    from study_app.designer.versions import version_rows  # noqa: PLC0415 - only where there is a draft
+    from study_app.designer import version_rows  # noqa: PLC0415 - only where there is a draft
 
     return version_rows

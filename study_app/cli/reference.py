@@ -9,7 +9,7 @@ import click
 
 from study_app.cli import commands
 from study_app.cli.options import GROUPS
-from study_app.designer.new_study.new_study_page import TEMPLATES
+from study_app.designer.new_study_page import TEMPLATES
 from study_app.devices.descriptors import DEVICES
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.layout import LIMITERS

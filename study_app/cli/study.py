@@ -18,7 +18,7 @@ from study_app.cli.options import (
     study_at,
     takes_session,
 )
-from study_app.designer.new_study.templates import templates
+from study_app.designer.templates import templates
 from study_app.devices import DEFAULT_DEVICE
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 from study_app.number_text import counted

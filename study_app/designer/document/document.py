@@ -18,7 +18,7 @@ from study_app.designer.document.fields import languages_of
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set
 from study_app.designer.document.toml_text import Refused, Splices, reverted
-from study_app.designer.new_study.templates import FOLDER, templates
+from study_app.designer.templates import FOLDER, templates
 from study_app.errors import StoreError
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.number_text import counted

@@ -28,7 +28,7 @@ from study_app.designer.document.toml_text import Refused, free_in
 from study_app.designer.form.form import form
 from study_app.designer.measures.measures_controller import MeasuresController
 from study_app.designer.measures.study_facts import facts
-from study_app.designer.new_study.new_study_page import header_state, new_choices, source_of, studies
+from study_app.designer.new_study_page import header_state, new_choices, source_of, studies
 from study_app.designer.outline import addable, outline_rows
 from study_app.designer.participant.playable import Feeling
 from study_app.designer.participant.preview import ParticipantPreview
@@ -39,7 +39,7 @@ from study_app.designer.place.prompts import DeleteCard, SeriesCard, delete_prom
 from study_app.designer.place.saving import Saving
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
-from study_app.designer.versions.changes import Changes, KnownRuns, Renaming
+from study_app.designer.versions import Changes, KnownRuns, Renaming
 from study_app.errors import StudyError
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import find

@@ -13,7 +13,7 @@ from study_app.designer.form.rows import Form
 from study_app.designer.measures.cards import INKS
 from study_app.designer.place.file import FileText
 from study_app.designer.problems import ProblemRow
-from study_app.designer.versions.version_rows import VersionChip
+from study_app.designer.version_rows import VersionChip
 from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
 from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.theme.theme import RADIUS_CARD, Tone, font

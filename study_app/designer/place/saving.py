@@ -9,13 +9,13 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from study_app.designer.document.document import Document, Standing, check_version
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.document.toml_text import Refused, free_in
-from study_app.designer.new_study.new_study_page import source_of
+from study_app.designer.new_study_page import source_of
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.header import Notice
 from study_app.designer.place.prompts import ConfirmCard
 from study_app.designer.place.view import DesignerPlace
-from study_app.designer.versions.changes import FileWatch, KnownRuns, SaveCard, compare, newest, version_of
-from study_app.designer.versions.version_rows import FILE, Comparison
+from study_app.designer.version_rows import FILE, Comparison
+from study_app.designer.versions import FileWatch, KnownRuns, SaveCard, compare, newest, version_of
 from study_app.errors import StudyError
 from study_app.gui.home.study_facts import time_words
 from study_app.number_text import counted

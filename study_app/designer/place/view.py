@@ -28,7 +28,7 @@ from study_app.designer.form.card import FormCard
 from study_app.designer.form.fields import TypedLine, TypedText
 from study_app.designer.form.rows import Form
 from study_app.designer.measures.measures_page import FactsRow, MeasuresPage
-from study_app.designer.new_study.new_study_page import NewStudyPage, NoStudyCard, TemplateChoice
+from study_app.designer.new_study_page import NewStudyPage, NoStudyCard, TemplateChoice
 from study_app.designer.outline import Addable, AddList, ElementPath, OutlineCard
 from study_app.designer.place.file import FileCard
 from study_app.designer.place.header import DesignerHeader, DesignerView, NoticeCard

@@ -24,7 +24,7 @@ from PySide6.QtWidgets import QLabel
 from study_app.designer.document.study import read
 from study_app.designer.place.header import DesignerHeader
 from study_app.designer.problems import ProblemsCard
-from study_app.designer.versions.changes import DifferenceText
+from study_app.designer.versions import DifferenceText
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import shipped_file
 from study_app.store.drafts import draft_of

@@ -33,7 +33,7 @@ from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.measures.study_facts import copied_texts, facts, missing_texts
-from study_app.designer.new_study.templates import FOLDER
+from study_app.designer.templates import FOLDER
 from study_app.ids import MAX_ID
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.orders.schedule import build_schedule

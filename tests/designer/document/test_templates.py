@@ -12,8 +12,8 @@ from study_app.designer.document.document import Answers, answered, copy_of, tem
 from study_app.designer.document.fields import row_at
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.new_study.new_study_page import KnownAnswer, known_answers
-from study_app.designer.new_study.templates import FOLDER, QUESTIONS, templates
+from study_app.designer.new_study_page import KnownAnswer, known_answers
+from study_app.designer.templates import FOLDER, QUESTIONS, templates
 from study_app.errors import StudyError
 from study_app.protocol.checks.expected_precision import threshold_plan
 from study_app.protocol.checks.warnings import level_warnings

@@ -21,11 +21,11 @@ from study_app.designer.measures.measures_page import clipped_sentence
 from study_app.designer.measures.measures_view import MeasuresView, measures_view
 from study_app.designer.measures.simulation import Controls, GroupPrecision, Measurable, Observed, Simulated
 from study_app.designer.measures.study_facts import facts, restored_part
-from study_app.designer.new_study.templates import FOLDER, templates
 from study_app.designer.outline import outline_rows
 from study_app.designer.participant.playable import NotPlayableError, playable, showing
 from study_app.designer.place.file import file_text
 from study_app.designer.problems import problem_rows
+from study_app.designer.templates import FOLDER, templates
 from study_app.protocol.source.document import Path, entries, value_at
 from study_app.protocol.source.files import shipped, shipped_file
 from tests.designer.document.grown import PROTOCOLS

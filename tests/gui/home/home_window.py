@@ -2,7 +2,7 @@
 
 from PySide6.QtCore import Qt
 
-from study_app.designer.versions import version_rows
+from study_app.designer import version_rows
 from study_app.gui.home.cards import StudyCard
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.view import HomePlace

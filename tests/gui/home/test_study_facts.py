@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.designer.versions import version_rows
+from study_app.designer import version_rows
 from study_app.errors import ProtocolError
 from study_app.gui.home.study_facts import (
     BrokenFacts,

@@ -23,14 +23,7 @@ from study_app.designer.place.prompts import ConfirmCard, Prompt
 from study_app.designer.place.segments import dense, small_button
 from study_app.designer.place.view import DesignerPlace, PanePage
 from study_app.designer.problems import NameRefusal
-from study_app.designer.versions.version_rows import (
-    FILE,
-    Comparison,
-    VersionChip,
-    counts,
-    version_chip,
-    version_choices,
-)
+from study_app.designer.version_rows import FILE, Comparison, VersionChip, counts, version_chip, version_choices
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Coloured
