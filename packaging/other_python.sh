@@ -39,5 +39,5 @@ exec unshare --mount --pid --fork bash -c '
             [ -e /venv ] || python3 -m venv /venv
             /venv/bin/pip install --quiet --upgrade --upgrade-strategy eager -e \".[test,proofs]\"
             /venv/bin/python --version
-            /venv/bin/pip list | grep -iE \"^(pyside6|numpy|numba|pandas|pyarrow|pyqtgraph|scipy) \"
+            /venv/bin/pip list | grep -iE \"^(pyside6_essentials|numpy|numba|pandas|pyarrow|pyqtgraph|scipy) \"
             exec /venv/bin/python -m pytest \"\$@\"" bash "$@"' bash "$@"

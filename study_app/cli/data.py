@@ -115,7 +115,7 @@ def report(results: Path, to: Path) -> None:
     failed: list[str] = []
     with progress() as show:
         files = write_report(results, to, progress=show, warn=partial(click.echo, err=True), failed=failed.append)
-    click.echo(f"{files[0]}  and {len(files) - 1} more files in its folder")
+    click.echo(f"{files[0]}  and {counted(len(files) - 1, 'more file')} in its folder")
     _say(failed)
 
 
@@ -255,7 +255,7 @@ def rebuild(session: Path) -> None:
     for path in made.swept:
         click.echo(f"removed    {path}, an incomplete file")
     if made.torn_bytes:
-        click.echo(f"the journal ends with {made.torn_bytes} bytes of an incomplete line; they are kept")
+        click.echo(f"the journal ends with an incomplete line, which is kept: {counted(made.torn_bytes, 'byte')}")
     if not (made.rewritten or made.swept):
         click.echo("nothing to do: every table agrees with the journal")
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 import study_app
 from study_app.errors import OutletError
 from study_app.haptics.model.layout import SAMPLE_FIELDS
+from study_app.number_text import counted
 
 MARKERS: Final = "liquid-study markers"
 SAMPLES: Final = "liquid-study samples"
@@ -189,7 +190,7 @@ class SampleStream:
         """Send the samples since the last time; called in the stream's thread."""
         samples = self._reader.read()
         if self._reader.dropped:
-            self.lost = f"{self._reader.dropped} samples were not sent in time: this computer is too busy"
+            self.lost = f"{counted(self._reader.dropped, 'sample')} not sent in time: this computer is too busy"
         if len(samples) == 0:
             return
         self.mapping.measure_if_due()

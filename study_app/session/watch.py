@@ -52,7 +52,7 @@ class Watched:
 
     ``presented`` is the condition, or what the interval was, "" while the study is ``blinded``: then forces and delay
     are not shown either. ``samples`` (n,), at ``times_s``, have positions that are believed. Frames were painted at
-    ``painted_s`` (k,) and showed the hand of ``shown_s`` (k,).
+    ``painted_s`` (k,) and showed the hand of ``shown_s`` (k,); ``lacking`` says why they cannot be read, if so.
     """
 
     page: TaskPage
@@ -66,6 +66,7 @@ class Watched:
     marks: tuple[Mark, ...]
     painted_s: NDArray[np.float64] = field(default_factory=partial(np.empty, 0))
     shown_s: NDArray[np.float64] = field(default_factory=partial(np.empty, 0))
+    lacking: str = ""
 
     @property
     def begins_s(self) -> float:
@@ -163,7 +164,10 @@ def watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 
     )
     if shown is None:  # the delay between a sample and its frame is sealed
         return found
-    frames = recordings.read_frames(session.path / stored.recording_frames, secret)
+    try:
+        frames = recordings.read_frames(session.path / stored.recording_frames, secret)
+    except StoreError as error:
+        return replace(found, lacking=f"Without the frames of the participant's screen: {error}.")
     start_ns = samples["time_ns"][0] - round(found.begins_s * 1e9)
     painted_s, shown_s = ((frames[name] - start_ns) * 1e-9 for name in ("painted_ns", "sample_ns"))
     return replace(found, painted_s=painted_s, shown_s=shown_s)
@@ -208,7 +212,7 @@ def _told(line: events.Event) -> tuple[Kind, str] | None:
         case events.TargetReached():
             return "target", f"target {line.target + 1} reached"
         case events.Stepped():
-            return "answer", f"set {line.steps:+d} steps"
+            return "answer", f"set {line.steps:+d} {'step' if abs(line.steps) == 1 else 'steps'}"
         case events.Choice():
             return "answer", f"{line.item}: {'cannot judge' if line.value is None else line.value}"
         case events.AnswerRemoved():

@@ -16,6 +16,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app import cli
+from study_app.analysis.findings import all_findings
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.load import load
@@ -321,6 +322,23 @@ def test_what_cannot_be_used_is_a_line_and_hides_no_other(
     assert code == 2
     assert f'"toy-plug:toy" is a question that the plug-in toy-plug 1.0 does not give: {reason}' in said
     assert run("check", "demo")[0] == 0
+
+
+@pytest.mark.parametrize(("name", "value"), [("place", "'first'"), ("row_place", "None")])
+def test_a_finding_whose_place_is_no_number_is_a_line_and_is_left_out(
+    run: Any, site: Path, name: str, value: str
+) -> None:
+    source = f"""
+        from study_app.analysis.findings.finding import Finding
+
+        class Toy(Finding):
+            key = "toy"
+            {name} = {value}
+    """
+    install(site, "toy-plug", "finding", {"toy": "toy_plug:Toy"}, toy_plug=source)
+    code, said, _ = run("plugins")
+    assert (code, f"toy: toy_plug:Toy has the {name} {value}: give a number; update" in said) == (3, True)
+    assert "toy" not in {one.key for one in all_findings()}
 
 
 @pytest.mark.parametrize(

@@ -160,7 +160,7 @@ def score(engine: Engine, motion: Motion) -> Score:
     return Score(motion, rms, float(np.abs(error_n).max() / np.abs(motion.force_n).max()), tick_ns)
 
 
-def let_go(
+def release(
     engine: Engine, setup: Mapping[str, float], handle_kg: float, phase: float, delay: int
 ) -> tuple[float, bool]:
     """Move a handle through a liquid, let it go, and follow it.
@@ -179,7 +179,7 @@ def let_go(
     Returns
     -------
     given_j : float
-        Greatest kinetic energy after the release beyond that at the release [J].
+        Greatest kinetic energy after the release beyond that at the release [J]; infinite if a force is not finite.
     fails : bool
         Whether that exceeds what the hand had put into the liquid, or the handle rings on.
     """
@@ -201,7 +201,7 @@ def let_go(
             continue
         v_mps += acting_n / handle_kg * period_s
         x_m += v_mps * period_s
-        if not abs(v_mps) < 100.0:
+        if not (abs(v_mps) < 100.0 and math.isfinite(put_in_j)):
             return math.inf, True
         given_j = max(given_j, 0.5 * handle_kg * v_mps**2 - start_j)
         if v_mps * heading < -RINGS_MPS:
@@ -214,7 +214,7 @@ def releases(engine: Engine, motion: Motion, delays: Sequence[int] = DELAYS) -> 
     given_j, borne = 0.0, -1
     for delay in delays:
         cases = itertools.product(HANDLES_KG, PHASES)
-        found = [let_go(engine, motion.setup, handle_kg, phase, delay) for handle_kg, phase in cases]
+        found = [release(engine, motion.setup, handle_kg, phase, delay) for handle_kg, phase in cases]
         if delay <= 1:
             given_j = max(given_j, *(one_j for one_j, _ in found))
         if any(fails for _, fails in found):
@@ -234,13 +234,23 @@ def measure(
     for motion in over:
         progress(motion.name)
         scores.append(score(engine, motion))
+    return scores, all_releases(engine, over, delays, progress)
+
+
+def all_releases(
+    engine: Engine,
+    over: Sequence[Motion],
+    delays: Sequence[int] = DELAYS,
+    progress: Callable[[str], object] = lambda _line: None,
+) -> list[Releases]:
+    """Return an engine's releases in each liquid of some motions."""
     first = {it.notes["liquid"]: it for it in reversed(over)}
     let = []
     for name in LIQUIDS:
         if name in first:
             progress(f"handles let go in {name}")
             let.append(releases(engine, first[name], delays))
-    return scores, let
+    return let
 
 
 HEADINGS: Final = (
@@ -249,18 +259,22 @@ HEADINGS: Final = (
 )  # fmt: skip
 
 
-def row(name: str, scores: Sequence[Score], let: Sequence[Releases]) -> list[str]:
-    """Return the cells of an engine below `HEADINGS`: medians over motions of errors and time, the worst release."""
+def row(name: str, scores: Sequence[Score], let: Sequence[Releases], against: Sequence[Score] = ()) -> list[str]:
+    """Return the cells of an engine below `HEADINGS`: medians over motions of errors and time, the worst release.
+
+    The time is a multiple of ``against``, another engine's scores along the same motions in turn, if they are given.
+    """
     fitted = [it.rms for it in scores if it.motion.fitted]
     others = [it for it in scores if not it.motion.fitted]
     tick_ns = float(np.median([it.tick_ns for it in scores]))
+    times = float(np.median([it.tick_ns / other.tick_ns for it, other in zip(scores, against, strict=False)] or [1.0]))
     borne = {it.liquid: f"{it.delay / RATE_HZ * 1e3:g} ms" if it.delay >= 0 else "none" for it in let}
     given_j = max((it.given_j for it in let), default=math.nan)
     return [
         name,
         *(f"{np.median(of):.1%}" if of else "" for of in (fitted, [it.rms for it in others])),
         f"{max(it.greatest for it in others):.1%}" if others else "",
-        f"{tick_ns:.0f} ns" if tick_ns < 1e4 else f"{tick_ns / 1e3:.0f} µs",
+        f"× {times:.2f}" if against else f"{tick_ns:.0f} ns" if tick_ns < 1e4 else f"{tick_ns / 1e3:.0f} µs",
         "" if math.isnan(given_j) else f"{1e3 * given_j:.2g} mJ" if given_j < 1 else f"{given_j:.2g} J",
         *(borne.get(name, "") for name in LIQUIDS),
     ]

@@ -325,7 +325,7 @@ def interrupted(
             source=source,
             participant=session.participant,
             heading=f"{kind}{session.participant}, session {session.session} of {session.study} stopped {where}",
-            line=f"{stopped}. {session.answers}{whole} answers are on disk; nothing before that point is missing.",
+            line=f"{stopped}. Answers on disk: {session.answers}{whole}; nothing before that point is missing.",
         )
     return None
 

@@ -30,8 +30,6 @@ from study_app.store.atomic import write_file
 from study_app.video.encoding import VideoWriter
 
 SIZE: Final = (1180, 800)
-LEAST: Final = (980, 560)
-"""In narrower windows the instruction covers what is below it."""
 PAINT_MS: Final = 15
 VIDEO_HZ: Final = 30
 SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
@@ -64,6 +62,7 @@ class WatchWindow(Themed, QDialog):
         self._writing = QTimer(self, interval=0)
         self.sentence = label("Reading …", "body", "text2", wraps=True)
         self.sentence.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.lacking = label("", "label", "warn", wraps=True)
         self.room = QStackedWidget()
         self.room.addWidget(self.sentence)
         self.presented = Chip("neutral", "lock", "Blinded: shown by code")
@@ -89,7 +88,6 @@ class WatchWindow(Themed, QDialog):
         self._connect()
         apply_theme(self, theme)
         available = self.screen().availableSize()
-        self.setMinimumSize(*LEAST)
         self.resize(min(SIZE[0], available.width() - 40), min(SIZE[1], available.height() - 60))
         self._read(1)
 
@@ -101,7 +99,7 @@ class WatchWindow(Themed, QDialog):
         head = hbox(title, self.presented, STRETCH, self.interval, self.seen, self.export, spacing=12)
         before, after = [*self.steps.values()][:2], [*self.steps.values()][2:]
         foot = hbox(*before, self.play, *after, self.speed, STRETCH, self.close_button, spacing=8)
-        vbox(head, (self.room, 1), foot, spacing=10, margins=(24, 16, 24, 16), parent=self)
+        vbox(head, self.lacking, (self.room, 1), foot, spacing=10, margins=(24, 16, 24, 16), parent=self)
         for button in (self.play, self.export, self.close_button, *self.steps.values()):
             button.setAutoDefault(False)
             button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves the keys with the time line
@@ -139,6 +137,8 @@ class WatchWindow(Themed, QDialog):
             self.interval.addItems([f"Interval {number + 1}" for number in range(shown.intervals)])
         self.interval.setVisible(shown.intervals > 1)
         self.seen.setVisible(len(shown.painted_s) > 0)
+        self.lacking.setText(shown.lacking)
+        self.lacking.setVisible(bool(shown.lacking))
         self.presented.show()
         if not shown.blinded:
             self.presented.show_state("neutral", "eye", shown.presented)
@@ -153,7 +153,7 @@ class WatchWindow(Themed, QDialog):
         for part in (self.play, self.export, self.seen, self.interval, self.speed, *self.steps.values()):
             part.setEnabled(able)
         if not able:
-            for part in (self.interval, self.seen, self.presented):
+            for part in (self.interval, self.seen, self.presented, self.lacking):
                 part.hide()
             self.room.setCurrentWidget(self.sentence)
 

@@ -93,19 +93,20 @@ def _markers(
             continue
         first, last = there[0], there[-1]
         if lost := [text for text in sent[first : last + 1] if text not in at]:
-            found.error(session.path, f"{len(lost)} of its markers are not in {file.name}; the first: {lost[0]}")
+            what = f"{file.name} lacks {counted(len(lost), 'marker')} of its journal"
+            found.error(session.path, f"{what}; the first: {lost[0]}")
         span = texts[min(at.values()) : max(at.values()) + 1]
         if added := [text for text in span if text not in known]:
-            what = f"{len(added)} markers in {file.name} are not in its journal; the first: {added[0]}"
+            what = f"{file.name} has {counted(len(added), 'marker')} that its journal lacks; the first: {added[0]}"
             found.error(session.path, f"{what}. The journal was changed, or another program sent them")
             unknown -= len(added)
         if outside := len(sent) - 1 - (last - first):
-            when = f"{first} markers before the recording and {len(sent) - 1 - last} after it"
-            found.warning(session.path, f"{outside} of its {len(sent)} markers are outside {file.name}: {when}")
+            when = f"{first} before the recording and {len(sent) - 1 - last} after it"
+            found.warning(session.path, f"{file.name} does not cover {outside} of its {len(sent)} markers: {when}")
         counts = f"{len(there)} of {len(sent)} recorded, {len(lost)} lost"
         yield f"markers of {name}: {counts}; time within {_error_ms(session, stream, at):.2g} ms"
     if unknown:
-        found.warnings += (Finding(file.name, f"{unknown} markers are of no session of this study"),)
+        found.warnings += (Finding(file.name, f"{counted(unknown, 'marker')} of no session of this study"),)
     if not any(text in known for text in texts):
         found.errors += (Finding(file.name, "it has no marker of this study's sessions"),)
 
@@ -138,8 +139,8 @@ def _samples(file: Path, stream: Mapping[str, Any], found: Findings) -> Iterator
     lost = int((steps[gaps] - 1).sum())
     if lost:
         first_s = stamps_s[int(np.argmax(gaps))] - stamps_s[0]
-        words = f"{lost} samples were lost, in {int(gaps.sum())} gaps; the first after {first_s:.3f} s of the stream"
-        found.errors += (Finding(file.name, words),)
+        words = f"{counted(lost, 'sample')} lost in {counted(int(gaps.sum()), 'gap')}"
+        found.errors += (Finding(file.name, f"{words}; the first after {first_s:.3f} s of the stream"),)
     late_s = intervals_s[(steps == 1) & (intervals_s > LATE / float(stream["info"]["nominal_srate"][0]))]
     worst = f", at most {1e3 * late_s.max():.3g} ms between two ticks" if len(late_s) else ""
     yield f"samples: {len(stamps_s)} recorded, {lost} lost, {len(late_s)} late{worst}"
@@ -149,7 +150,7 @@ def clock_drift(stream: Mapping[str, Any]) -> str:
     """Return the drift of a stream's clock against the recorder's, by its measured offsets between two resets."""
     times_s, values_s = (np.asarray(stream.get(name, ()), float) for name in ("clock_times", "clock_values"))
     if len(times_s) < 2:
-        return f"{len(times_s)} offsets were measured: too few for its drift"
+        return f"{counted(len(times_s), 'offset')} measured: too few for its drift"
     resets = np.flatnonzero((np.diff(times_s) < 0) | (np.abs(np.diff(values_s)) > RESET_S)) + 1
     parts = zip(np.split(times_s, resets), np.split(values_s, resets), strict=True)
     said = []

@@ -19,6 +19,7 @@ from typing import Any
 
 import study_app
 from study_app.errors import PlugInError, StoreError
+from study_app.number_text import counted
 from study_app.store import receipt
 from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporaries
 from study_app.store.blinded.blinding import Key, opened, opened_key, whole_protocol
@@ -209,7 +210,7 @@ def _journal(folder: SessionFolder, found: Findings, *, running: bool) -> Conten
     if contents.damage is not None:
         found.error(folder.journal, contents.damage.removeprefix(f"{folder.journal}, "))
     if contents.torn_bytes and not running:
-        found.warning(folder.journal, f"its last {contents.torn_bytes} bytes are an incomplete line")
+        found.warning(folder.journal, f"it ends with an incomplete line of {counted(contents.torn_bytes, 'byte')}")
     if not contents.lines:
         if running or never_begun(folder.path):
             if not running:

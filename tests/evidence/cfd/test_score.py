@@ -95,6 +95,26 @@ def test_the_delay_borne_is_the_one_of_theory(damping_nspm: float, delay: int) -
     assert (found.given_j > 1e-3) == (damping_nspm < 0)
 
 
+def test_a_force_that_is_no_number_while_the_hand_moves_is_no_delay_borne() -> None:
+    found = score.releases(
+        lambda _setup: lambda t_s, _x_m, v_mps: math.nan if t_s == 0.1 else -v_mps, score.motions(only=NAME)[0]
+    )
+    assert (found.given_j, found.delay) == (math.inf, -1)
+
+
+@pytest.mark.slow
+def test_the_models_of_the_program_are_scored_with_times_as_multiples_of_the_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (motion,) = score.motions(only=NAME)
+    monkeypatch.setattr(score, "motions", lambda: (motion,))
+    monkeypatch.setattr(score, "LIQUIDS", ())  # no handles
+    _, _, first, *others = fits.score_all().text.splitlines()
+    assert (len(others), "| × 1.00 |" in first) == (5, True)
+    sent, history, *_ = [float(line.split("×")[1].split("|")[0]) for line in others]
+    assert 0.7 < sent < 1.4 < history < 10  # the safety layer is computed for each; sums of history take longest
+
+
 @pytest.mark.slow
 def test_the_safety_layer_bears_delays_that_the_law_alone_does_not() -> None:
     motion = score.motions(only=NAME)[0]

@@ -173,3 +173,11 @@ def test_no_word_is_cut_or_runs_into_another(
     seen = opening(None, size, said, text_scale)
     show(seen, page)
     assert misplaced(seen.window, drawn_by(seen.window)) == []
+
+
+@pytest.mark.parametrize("said", ["en", "de", "ar"])
+def test_in_a_narrow_window_two_lines_of_instruction_do_not_touch_what_is_below(opening: Opening, said: str) -> None:
+    seen = opening(None, (880, 420), said, 1.0)
+    long = "Move the ball through the liquid in all directions, slowly and fast, and feel what it does to your arm."
+    show(seen, task_page(explore(), instruction=long))
+    assert misplaced(seen.window, drawn_by(seen.window)) == []

@@ -176,6 +176,19 @@ def test_what_cannot_be_read_is_one_line(opened, sealed, whole, tmp_path, harm, 
     assert "thick" not in said(window)
 
 
+def test_without_its_frames_a_trial_is_shown_and_one_line_says_what_is_missing(opened, whole, tmp_path):
+    study = Path(shutil.copytree(whole, tmp_path / "results" / "demo"))
+    (frames,) = (study / "data" / "sub-P001" / "ses-01").glob(TRIAL.replace(".parquet", "*frames*"))
+    frames.unlink()
+    window = opened(study)
+    assert window.stage.forces.sent.yData.max() > 0.1
+    assert (window.lacking.isVisible(), window.seen.isVisible()) == (True, False)
+    assert window.lacking.text().startswith(f"Without the frames of the participant's screen: {frames}")
+    assert "\n" not in window.lacking.text()
+    window.step("frame", 1)
+    assert window.stage.at_s > window.stage.shown.begins_s
+
+
 def test_while_the_study_is_blinded_nothing_tells_force_delay_or_condition(
     opened, sealed, whole, tmp_path, monkeypatch
 ):
@@ -241,7 +254,7 @@ def test_intervals_are_chosen_and_nothing_is_cut(opened, tmp_path, qtbot):
     qtbot.waitUntil(lambda: window.stage is not None and window.stage is not first)
     assert seen | {window.presented.word} == {"standard", "comparison"}
     assert window.stage.shown.page.interval.number == 2
-    for size in ((984, 580), (1366, 768), (1880, 1020)):
+    for size in ((window.minimumSizeHint().width(), 560), (984, 580), (1366, 768), (1880, 1020)):
         settle(window, size)
         assert cut(window) == []
         assert window.size().toTuple() == size

@@ -63,7 +63,8 @@ class Captions:
         """Return the height [px] that instruction and foot need under the tank; the same for most instructions."""
         self._size_words(width, height)
         lines = max(2, self._instruction_lines())
-        foot = height - self._top_of_foot(stacked=True) if self._text_scale > 1 else 0.0
+        stacked = self._stacked()
+        foot = height - self._top_of_foot(stacked=True) if stacked or self._text_scale > 1 else 0.0
         return max(168 * self._scale, foot + (lines + 0.3) * self._line) + self._controls_above
 
     def above(self, width: float, height: float) -> float:
@@ -83,13 +84,11 @@ class Captions:
             across = min(across, (width - marks) / 2 - margin - 24 * scale)
         self._head = self._placed(QRectF(margin, head - 20 * scale, across, 40 * scale))
         self._count = self._placed(QRectF(width - margin - count, head - 26 * scale, count, 70 * scale))
-        start = max(margin, PATCH_ROOM + 12) if self._words.right_to_left else margin
-        room = width - start - (margin if self._words.right_to_left else PATCH_ROOM + 12)
+        start, room = self._room_of_foot()
         if self._foot_width() > room:
             self._pause_font = font("statement", scale=self._fine * room / self._foot_width())
         self._foot = QRectF(start, self._foot_middle() - small, min(self._foot_width(), room), 2 * small)
-        longest = max(QFontMetricsF(self._small).horizontalAdvance(text) for text in self._longest_hints()) + 8
-        stacked = self._foot.right() + 24 > (width - longest) / 2
+        longest, stacked = self._longest_hint(), self._stacked()
         middle = self._foot_middle() - (1.25 * small if stacked else 0)
         self._hint = QRectF((width - longest) / 2, middle - 0.62 * small, longest, 1.24 * small)
         if stacked:
@@ -115,6 +114,20 @@ class Captions:
         room = QRectF(0, 0, INSTRUCTION * self._width, 1e4)
         texts = (self._page.instruction, self._page.question)
         return max(1, *(round(metrics.boundingRect(room, CENTRED, text).height() / self._line) for text in texts))
+
+    def _room_of_foot(self) -> tuple[float, float]:
+        """Return where the foot begins, read from left to right, and how wide it may be [px]."""
+        margin = 64 * caption_scale(self._width, self._height)
+        start = max(margin, PATCH_ROOM + 12) if self._words.right_to_left else margin
+        return start, self._width - start - (margin if self._words.right_to_left else PATCH_ROOM + 12)
+
+    def _longest_hint(self) -> float:
+        return max(QFontMetricsF(self._small).horizontalAdvance(text) for text in self._longest_hints()) + 8
+
+    def _stacked(self) -> bool:
+        """Return whether the hint has no room next to the foot, so that it is above it."""
+        start, room = self._room_of_foot()
+        return start + min(self._foot_width(), room) + 24 > (self._width - self._longest_hint()) / 2
 
     def _foot_middle(self) -> float:
         small = QFontMetricsF(self._small).height()

@@ -168,5 +168,5 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
     with looking(step):
         assert app.home(results.parent) == 0
     assert steps[0] == "P001, session 1 of demo stopped in part 1, liquid setting 2 of 2"
-    assert "2 of 8 answers are on disk" in steps[1]
+    assert "Answers on disk: 2 of 8" in steps[1]
     assert steps[2:] == ["Trial 2 of 4", ["withdrawn"], False]
