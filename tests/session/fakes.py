@@ -12,7 +12,7 @@ from study_app.haptics.model.scene import Scene
 from study_app.session.pages import TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
-from study_app.session.transitions.events import Begin, Chosen, Continue, Submitted
+from study_app.session.transitions.events import Chosen, Continue, Submitted
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.store.journals.journal_events import Event
 from tests.session import small
@@ -168,19 +168,6 @@ class World:
         if self.paints and isinstance(page, TaskPage):
             self.runner.frame_shown(self.servo.now_ns(), self.servo.now_ns())
         self.on_page(page)
-
-
-def at_block(block: str, *, delayed: bool = False, seed: int = 1) -> World:
-    """Return a world at the beginning of a trial of ``block``."""
-    world = World(seed)
-    world.runner.post(Begin(0.0))
-    for _ in range(200):
-        state = world.state
-        there = state.phase is Phase.TASK and state.trial.block == block
-        if there and (not delayed or state.plan.protocol.delay_s(state.plan.condition(state.trial)) > 0):
-            return world
-        step(world)
-    raise AssertionError(block)
 
 
 def step(world: World) -> None:

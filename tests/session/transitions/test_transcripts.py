@@ -1,21 +1,14 @@
 """What each event of a session commands: whole sequences, as files that people review."""
 
+from pathlib import Path
+
 import pytest
 
-from tests.session.transitions.transcribed import FOLDER, Transcript, regenerate, transcripts
-
-FILES = sorted(FOLDER.glob("*.txt"))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _written_anew(pytestconfig: pytest.Config) -> None:
-    if pytestconfig.getoption("regenerate"):
-        for file in FILES:
-            regenerate(file)
+from tests.golden import compare
+from tests.session.transitions.transcribed import FOLDER, play
+from tests.transcripts import played
 
 
-@pytest.mark.parametrize(
-    "transcript", [pytest.param(one, id=f"{file.stem}: {one.name}") for file in FILES for one in transcripts(file)]
-)
-def test_events_command_what_they_did(transcript: Transcript) -> None:
-    assert tuple(transcript.played()) == transcript.lines
+@pytest.mark.parametrize("file", sorted(FOLDER.glob("*.txt")), ids=lambda file: file.stem)
+def test_events_command_what_they_did(file: Path, pytestconfig: pytest.Config) -> None:
+    compare(file, played(file, play), pytestconfig)

@@ -1,16 +1,11 @@
-"""Transcripts of sessions: events, and all that each one commands, in files that people review.
+"""Transcripts of sessions: events, all that each one commands, and what becomes of the state."""
 
-A transcript is a name (``=== name``), the state it starts from, events, and after each event (``>``) its commands and
-what became of the state. ``--regenerate`` writes the lines with ``>`` anew.
-"""
-
-import ast
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from study_app.errors import SessionError
 from study_app.protocol.load import load, parse
@@ -26,6 +21,7 @@ from tests.protocol.trials.matching import ALONE, matching
 from tests.session import pairs, small
 from tests.session.transitions.states import EVENTS as ALL_EVENTS
 from tests.session.transitions.states import state_in
+from tests.transcripts import value_of
 
 FOLDER = Path(__file__).parent / "transcripts"
 EVENTS: Mapping[str, type[Any]] = {kind.__name__: kind for kind in ALL_EVENTS}
@@ -117,47 +113,19 @@ STARTS: dict[str, Callable[[], SessionState]] = {
 }
 
 
-class Transcript(NamedTuple):
-    """Where a session starts, and lines of events and of what they command."""
-
-    name: str
-    start: str
-    lines: tuple[str, ...]
-
-    def played(self) -> Iterator[str]:
-        """Yield each event with what it commands."""
-        state = STARTS[self.start]()
-        for line in self.lines:
-            if not line.startswith(">"):
-                yield line
-                try:
-                    after, commands = advance(state, _event(line))
-                except SessionError as error:
-                    yield f"> refused: {error}"
-                    continue
-                yield from (f"> {said(command)}" for command in commands)
-                yield f"> {_state(state, after)}"
-                state = after
-
-
-def transcripts(file: Path) -> Iterator[Transcript]:
-    """Yield the transcripts of a file."""
-    for part in file.read_text(encoding="utf-8").removeprefix("=== ").split("\n=== "):
-        name, start, *lines = part.strip("\n").split("\n")
-        yield Transcript(name, start.removeprefix("start: "), tuple(lines))
-
-
-def regenerate(file: Path) -> None:
-    """Write what the events command anew."""
-    parts = ("\n".join((f"=== {one.name}", f"start: {one.start}", *one.played())) for one in transcripts(file))
-    file.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
-
-
-def _event(line: str) -> Any:
-    call = ast.parse(line, mode="eval").body
-    assert isinstance(call, ast.Call)
-    assert isinstance(call.func, ast.Name)
-    return EVENTS[call.func.id](*map(ast.literal_eval, call.args))
+def play(start: str, lines: list[str]) -> Iterator[str]:
+    """Yield each event with what it commands."""
+    state = STARTS[start]()
+    for line in lines:
+        yield line
+        try:
+            after, commands = advance(state, value_of(line, EVENTS))
+        except SessionError as error:
+            yield f"> refused: {error}"
+            continue
+        yield from (f"> {said(command)}" for command in commands)
+        yield f"> {_state(state, after)}"
+        state = after
 
 
 def _state(before: SessionState, after: SessionState) -> str:
