@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,12 +13,9 @@ from click.testing import CliRunner
 
 from study_app.cli import commands, main
 from study_app.cli.options import GROUPS
-from study_app.protocol.load import load
 from study_app.protocol.source.files import source_bytes
 from study_app.session import replay
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import MachineSettings, save
-from study_app.store.workstation import load as load_settings
 from tests.compiled import needs_servo
 
 pytestmark = pytest.mark.slow
@@ -112,17 +108,6 @@ def test_a_replay_that_compared_nothing_does_not_say_that_all_is_the_same(monkey
     assert replayed(2, differences=("trial 1 differs",), uncompared=("trial 2 has a gap",)) == (3, differ)
 
 
-def test_verify_ends_with_a_verdict_and_its_exit_code(tmp_path: Path, liquid_study: Run) -> None:
-    study = tmp_path / "study"
-    shutil.copytree(Path(__file__).parents[2] / "results" / "sample-rek2024", study)
-    verified = liquid_study("verify", "study")
-    assert (verified.returncode, verified.stdout.splitlines()[-1]) == (0, "12 sessions: sound")
-    table = study / "data" / "study-rek2024_description-participants_data.csv"
-    table.write_bytes(table.read_bytes() + b"\n")
-    verified = liquid_study("verify", "study")
-    assert (verified.returncode, verified.stdout.splitlines()[-1]) == (3, "12 sessions: not sound")
-
-
 def test_interrupting_a_command_ends_it_with_130(liquid_study: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(**_: object) -> None:
         raise KeyboardInterrupt
@@ -133,25 +118,6 @@ def test_interrupting_a_command_ends_it_with_130(liquid_study: Run, monkeypatch:
 
 
 IN_GROUPS = [name for names in GROUPS.values() for name in names.split()]
-
-
-@pytest.fixture
-def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """P007 of demo, begun in the workspace; the program starts elsewhere."""
-    folder = tmp_path / "workspace" / "results" / "demo"
-    for person in ("P007", "P008"):
-        begin(
-            folder,
-            load("demo"),
-            source_bytes("demo"),
-            SessionStart(
-                person, seed=1, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=False
-            ),
-        ).close()
-    (tmp_path / "start").mkdir()
-    monkeypatch.chdir(tmp_path / "start")
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path / "workspace"))
-    return folder
 
 
 def said(*words: str, code: int = 0) -> str:
@@ -167,29 +133,6 @@ def test_help_lists_every_command_once_under_its_heading_with_its_whole_sentence
         part = shown.split(f"\n{heading}:\n")[1].split("\n\n")[0]
         assert [line.split()[0] for line in part.splitlines() if not line.startswith("   ")] == names.split()
         assert "..." not in part, "a command's first sentence is cut off"
-
-
-def test_a_session_goes_by_the_name_that_sessions_lists(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    listed = said("sessions")
-    assert [line.split()[0] for line in listed.splitlines()] == ["demo/P007/1", "demo/P008/1"]
-    assert "unfinished" in listed
-    assert said("sessions", "demo") == listed
-    for words in (("demo/P007/1",), ("demo/P007",), ("P007/1", "--results", str(study))):
-        assert "nothing to do" in said("rebuild", *words)
-    (elsewhere,) = [line.split()[0] for line in said("sessions", "--results", str(study)).splitlines()][:1]
-    assert elsewhere == "demo/P007/1"
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(study.parents[2] / "other"))
-    listed = said("sessions", "--results", str(study)).splitlines()
-    assert "nothing to do" in said("rebuild", listed[0].split()[0])
-
-
-def test_the_workspace_is_shown_and_changed(study: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    assert said("workspace").strip() == str(study.parents[1])
-    monkeypatch.delenv("LIQUID_STUDY_WORKSPACE")
-    assert said("workspace", str(tmp_path / "new")).strip() == str(tmp_path / "new")
-    assert (tmp_path / "new" / "protocols").is_dir()
-    assert load_settings().workspace == str(tmp_path / "new")
-    assert said("workspace").strip() == str(tmp_path / "new")
 
 
 def test_verify_says_last_what_concerns_sharing(liquid_study: Run) -> None:

@@ -2,23 +2,17 @@
 
 import csv
 import json
-import os
-import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from study_app.errors import StoreError
 from study_app.protocol.load import load
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.protocol.source.files import shipped
 from study_app.session.replay import replay
-from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import open_or_draw_key, opened, read_key
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
@@ -101,63 +95,3 @@ def test_answers_follow_what_was_seen(rehearsal_of: Callable[[str], Path]) -> No
             if row["item"] == "different"
         }
         assert different[of["delay_200"]] > different[of["delay_0"]]
-
-
-def test_ids_are_checked_before_the_first_session_begins(tmp_path: Path) -> None:
-    rehearse("demo", participants=1, seed=1, results=tmp_path / "demo")
-    used = tmp_path / "demo" / "data" / "sub-P001"
-    used.rename(used.with_name("sub-P002"))
-    with pytest.raises(StoreError, match="P002 already has session 1"):
-        rehearse("demo", participants=2, seed=1, results=tmp_path / "demo")
-    assert not used.exists()
-
-
-KILLED = """
-import sys
-from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.sessions.open_session import SessionStore
-
-kept = SessionStore.append
-
-def append(self, event, **about):
-    kept(self, event, **about)
-    fields = event.fields()
-    print(event.event, fields.get("trial", 0), fields.get("item", "-"), fields.get("value", "-"), flush=True)
-
-SessionStore.append = append
-rehearse("rek2024", participants=1, seed=1, results=sys.argv[1])
-"""
-
-
-@pytest.mark.nightly
-def test_a_kill_during_part_2_leaves_every_earlier_answer_readable(tmp_path: Path) -> None:
-    """What was told as kept before the kill is in the journal, in the table where its page was confirmed."""
-    child = subprocess.Popen(
-        [sys.executable, "-c", KILLED, str(tmp_path / "rek2024")],
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=Path(__file__).parents[2],
-    )
-    told: list[list[str]] = []
-    confirmed = 0
-    assert child.stdout is not None
-    with child, child.stdout:
-        for line in child.stdout:
-            told.append(line.split())
-            confirmed += told[-1][0] == "responses"
-            if confirmed >= 6 and told[-1][0] == "choice":  # three liquids, three delays, and into the fourth
-                os.kill(child.pid, signal.SIGKILL)
-                break
-    assert child.returncode == -signal.SIGKILL
-    (session,) = StudyFolder(tmp_path / "rek2024").sessions()
-    lines = raw(journal.read(session.journal))
-    choices: list[list[Any]] = [
-        ["choice", str(line["trial"]), line["item"], str(line["value"])] for line in lines if line["event"] == "choice"
-    ]
-    expected = [entry for entry in told if entry[0] == "choice"]
-    assert choices[: len(expected)] == expected
-    rows = table(session, "rek2024", "responses")
-    assert len(rows) >= 3 * 9 + 2 * 5  # the table may be one page behind the journal, never the journal
-    answered = {(row["trial"], row["item"]): row["response"] for row in rows}
-    last = {(trial, item): value for _, trial, item, value in choices}
-    assert all(last[key] == value for key, value in answered.items())

@@ -92,25 +92,6 @@ def test_a_session_whose_last_line_meets_a_full_disk_is_finished_when_there_is_r
 
 
 @pytest.mark.slow
-def test_tables_that_cannot_be_written_stop_no_session(tmp_path: Path) -> None:
-    world = StoredWorld(tmp_path / "study")
-    world.start()
-    table = world.store.folder.table("small", "responses")
-    table.unlink()
-    table.mkdir()
-    (table / "open in another program").touch()
-    world.until(Phase.ANSWERING)
-    world.step()
-    assert world.store.behind is not None
-    assert world.runner.stalled is None
-    (table / "open in another program").unlink()
-    table.rmdir()
-    finish(world)
-    assert len(answers(world)) == small.RESPONSES
-    assert verify(tmp_path / "study").errors == ()
-
-
-@pytest.mark.slow
 def test_a_disk_that_is_full_at_the_start_refuses_the_session_and_keeps_its_id_free(tmp_path: Path) -> None:
     with no_file_longer_than(200), pytest.raises(StoreError, match="cannot be written"):
         StoredWorld(tmp_path / "study")

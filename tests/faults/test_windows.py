@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtTest import QTest
 
 from study_app import app
 from study_app.app.session import live_session
@@ -76,28 +74,6 @@ def test_the_participants_window_that_is_closed_is_a_pause(tmp_path: Path, machi
     code, lines = hold(tmp_path, watch)
     assert (code, done) == (0, ["closed", "paused"])
     assert lines[-1]["status"] == "completed"
-
-
-@pytest.mark.nightly
-def test_escape_again_and_again_loses_nothing(tmp_path: Path) -> None:
-    pressed: list[int] = []
-
-    def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
-        if len(pressed) < 12 and participant.page is not None:
-            pressed.append(1)
-            QTest.keyClick(participant, Qt.Key.Key_Escape)
-            if isinstance(participant.page, PausePage):
-                operator.ask("resume")
-            return True
-        if isinstance(participant.page, PausePage):
-            operator.ask("resume")
-            return True
-        return False
-
-    code, lines = hold(tmp_path, watch)
-    assert code == 0
-    assert sum(len(line["items"]) for line in lines if line["event"] == "responses") == short.ANSWERS
-    assert any(line["event"] == "paused" for line in lines)
 
 
 def test_the_operators_window_that_is_closed_twice_leaves_the_session_unfinished(

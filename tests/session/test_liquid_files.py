@@ -17,7 +17,6 @@ from study_app.protocol.load import load, load_scenes, parse
 from study_app.protocol.orders.block_orders import block_codes
 from study_app.protocol.orders.schedule import Trial, build_schedule, stream
 from study_app.protocol.source.files import protocol_hash, source_bytes, unbundled
-from study_app.protocol.source.json_schema import schema
 from study_app.session.pages import TaskPage
 from study_app.session.replay import replay
 from study_app.session.simulated import rehearsal
@@ -166,13 +165,6 @@ def test_a_ball_of_its_own_is_drawn_as_large_as_it_is_and_warned_of_where_it_tel
             assert isinstance(shown, TaskPage)
             drawn[codes[step.block][step.code]] = shown.body_radius_m
     assert drawn == pytest.approx({"thin": 0.0034, "thick": 0.002, "prompt": 0.0034, "late": 0.0034})
-
-
-def test_the_schema_knows_the_key_file() -> None:
-    liquid = schema()["$defs"]["StudyLiquid"]
-    assert "file" in liquid["properties"]
-    assert {"required": ["file"]} in liquid["if"]["not"]["anyOf"]
-    assert liquid["then"] == {"required": ["density_kg_m3"]}
 
 
 @pytest.mark.slow

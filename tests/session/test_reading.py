@@ -2,54 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
 
 from study_app.errors import DeviceLost
 from study_app.protocol.load import load
-from study_app.protocol.orders.durations import expected_duration_s
-from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.session.pages import Progress, TextPage
-from study_app.session.resume import resume_at
-from study_app.session.transitions.events import (
-    Begin,
-    Broke,
-    Chosen,
-    Command,
-    ItemShown,
-    Reconnected,
-    ResumeRequested,
-    ShowPage,
-    Submitted,
-    TaskDone,
-    Write,
-    broken,
-)
-from study_app.session.transitions.state import FINAL, Phase, SessionState
-from study_app.session.transitions.table import advance, open_session
+from study_app.session.transitions.events import Broke, Command, Reconnected, ResumeRequested, TaskDone, Write, broken
+from study_app.session.transitions.state import FINAL, Phase
+from study_app.session.transitions.table import advance
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
-from study_app.store.progress import progress_of
 from study_app.store.tables import session_tables
-from study_app.store.verification.verify_session import wrong_responses
 from tests.faults.support.worlds import StoredWorld
-from tests.journal_lines import event_from
-from tests.protocol.forms.mixed import mixed_file
 from tests.session import small
 from tests.session.transitions.states import shown, state_in
-from tests.session.transitions.transcribed import opened, with_break
-
-
-def test_a_break_counts_in_how_long_a_session_is_expected_to_take() -> None:
-    longer = expected_duration_s(with_break()) - expected_duration_s(with_break(min_s=None))
-    assert 50 < longer < 60  # the reading alone takes some seconds of the 60
-
-
-def test_only_a_break_can_last() -> None:
-    with pytest.raises(ValidationError, match="belongs to a page of kind break"):
-        with_break(kind="instructions")
+from tests.session.transitions.transcribed import opened
 
 
 def test_pages_between_the_trials_say_which_part_it_is_and_how_far() -> None:
@@ -73,69 +41,6 @@ def test_pages_between_the_trials_say_which_part_it_is_and_how_far() -> None:
         "delays_intro": Progress(2, 2, "", 1, 7),
         "debrief": None,
     }
-
-
-class Walked:
-    """A session of the mixed study, and the lines that it wrote."""
-
-    def __init__(self, study: Any) -> None:
-        self.study = study
-        self.schedule = build_schedule(study, "P001", 1)
-        key = draw_key(study, stream(1, "key").random)
-        self.state: SessionState = open_session(study, self.schedule, key, "en")
-        self.lines: list[dict[str, Any]] = [{"event": "session_started", "t_s": 0.0, "n": 1, "language": "en"}]
-        self.page: Any = None
-        self.clock = 0.0
-        self.do(Begin)
-
-    def do(self, kind: type[Any], *more: Any) -> list[str]:
-        self.clock += 1.0
-        self.state, commands = advance(self.state, kind(self.clock, *more))
-        for command in commands:
-            if isinstance(command, Write):
-                number = len(self.lines) + 1
-                self.lines.append(
-                    {"event": command.line.event, "t_s": self.clock, "n": number, **command.line.fields()}
-                )
-            if isinstance(command, ShowPage):
-                self.page = command.page
-        return [command.line.event for command in commands if isinstance(command, Write)]
-
-
-@pytest.fixture
-def walked(tmp_path: Path) -> Walked:
-    return Walked(load(mixed_file(tmp_path)))
-
-
-def test_form_is_written_with_kinds_and_without_hidden_questions(walked: Walked) -> None:
-    for item in ("age", "hand", "used"):
-        walked.do(ItemShown, item)
-    walked.do(Chosen, "age", 42)
-    walked.do(Chosen, "hand", "left")
-    walked.do(Chosen, "used", ("mouse", "falcon"))
-    assert walked.do(Submitted) == ["form_answered", "trial_started"]
-    rows = next(line for line in walked.lines if line["event"] == "form_answered")["items"]
-    assert [(row["item"], row["number"], row["kind"], row["value"]) for row in rows] == [
-        ("age", 1, "number", 42),
-        ("hand", 2, "choice", "left"),
-        ("used", 4, "choice", ("mouse", "falcon")),
-    ]
-    assert list(wrong_responses(list(map(event_from, walked.lines)))) == []
-
-
-def test_interrupted_form_is_shown_again_from_its_beginning(walked: Walked) -> None:
-    walked.do(Chosen, "age", 20)
-    start = resume_at(walked.study, walked.schedule, map(event_from, walked.lines))
-    assert start.step == 0
-    walked.lines.append({"event": "form_shown", "t_s": 99.0, "n": 99, "form": "start"})
-    assert progress_of(list(map(event_from, walked.lines))).answers == {}
-
-
-def test_session_goes_on_after_an_answered_form(walked: Walked) -> None:
-    walked.do(Chosen, "age", 20)
-    walked.do(Chosen, "hand", "left")
-    walked.do(Submitted)
-    assert resume_at(walked.study, walked.schedule, map(event_from, walked.lines)).step == 1
 
 
 FAULT = "the device 'memory' stopped responding"

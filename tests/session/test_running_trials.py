@@ -62,12 +62,6 @@ def test_a_hidden_ball_is_drawn_during_the_lead_and_not_after_it() -> None:
     assert newest_s == pytest.approx(1.51 - DELAY_S - SETTLED_S, abs=0.0021)  # hidden as late as it is drawn
 
 
-@pytest.mark.slow
-def test_a_ball_that_is_shown_stays() -> None:
-    trial, servo = painted(SWING, hides_ball=False)
-    assert not any(hidden for _, hidden in hidden_after(trial, servo, 4.5))
-
-
 def test_without_a_lead_a_hidden_ball_is_never_drawn() -> None:
     trial, servo = painted(TASK, hides_ball=True)
     assert all(hidden for _, hidden in hidden_after(trial, servo, 1.0))
@@ -121,20 +115,6 @@ class Recorded:
 
     def stop(self) -> None:
         """Do nothing."""
-
-
-@pytest.mark.parametrize(("blocks", "kept"), [(2, range(500)), (4, range(400, 1000)), (5, range(650, 1250))])
-def test_a_recording_begins_with_the_samples_of_its_lead_and_no_earlier_ones(blocks: int, kept: range) -> None:
-    class Appended(Recorded):
-        def append(self, samples: Any) -> None:
-            self.frames += samples
-
-    recorder = Appended()
-    recording = Recording(recorder, 1000.0)
-    for block in range(blocks):
-        recording.take(range(250 * block, 250 * block + 250))
-    recording.start(1, 1)
-    assert recorder.frames == [*kept]
 
 
 def test_the_video_is_as_late_as_the_ball_and_both_are_recorded() -> None:

@@ -1,4 +1,3 @@
-import itertools
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -6,22 +5,16 @@ from typing import Any
 
 import pytest
 
-from study_app.errors import StoreError
 from study_app.protocol.load import parse
-from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.protocol.streams import stream
-from study_app.session.start import resumed
 from study_app.store.blinded.blinding import open_or_draw_key, read_key, whole_protocol
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
-from study_app.store.journals.journal import read
 from study_app.store.journals.journal_events import Event
 from study_app.store.progress import Progress, progress_of
 from study_app.store.receipt import without_conditions
 from tests.journal_lines import event_from
 from tests.protocol.trials.level_studies import text_of
-from tests.store.conftest import Attend, Start
 
 
 def lines_of(*events: dict[str, Any]) -> list[Event]:
@@ -50,7 +43,6 @@ def chosen(item: str, value: int | None, at_s: float) -> dict[str, Any]:
     return {"event": "choice", "trial": 1, "item": item, "value": value, "t_s": at_s}
 
 
-ENDED = {"event": "session_ended", "status": "aborted"}
 ANSWERED = {"event": "responses", "trial": 1, "attempt": 1, "items": []}
 
 
@@ -121,43 +113,6 @@ def unconfirmed(lines: list[Event]) -> dict[tuple[int, int], dict[str, Any]]:
     return {which: {item: given.value for item, given in chosen.items()} for which, chosen in found.items()}
 
 
-def test_wherever_a_session_stops_it_stands_where_its_schedule_was(
-    protocol: Protocol, start: Start, attend: Attend
-) -> None:
-    """Cut after every line of a whole session: steps are left one by one, in the schedule's order."""
-    store = start()
-    store.append(journal_events.PageShown(page="consent"))
-    store.append(journal_events.PageLeft(page="consent"))
-    attend(store)
-    steps = build_schedule(protocol, "P007", 11).steps
-    stands = [progress_of(store.lines[:count]) for count in range(1, len(store.lines) + 1)]
-    store.close()
-    for told in stands:
-        step = steps[told.step] if told.step < len(steps) else None
-        if told.page is not None:
-            assert step == PageStep(told.page)
-        if told.trial is not None:
-            assert step is not None
-            assert not isinstance(step, PageStep)
-            assert step.number == told.trial
-    assert all(0 <= after.step - before.step <= 1 for before, after in itertools.pairwise(stands))
-    assert (stands[0].step, stands[-1].step) == (0, len(steps))
-
-
-def test_the_protocol_is_kept_without_its_conditions(protocol: Protocol) -> None:
-    shown, whole = without_conditions(protocol), protocol.model_dump(mode="json")
-    assert set(whole) - set(shown) == {"liquids", "conditions"}
-    kept = ("questionnaires", "scales", "pages", "tasks", "limits")
-    assert [shown[name] for name in kept] == [whole[name] for name in kept]
-    found = {name: (block["codes"], block["compares"]) for name, block in shown["blocks"].items()}
-    assert found == {
-        "practice": (["practice"], None),
-        "liquids": (["L1", "L2"], "liquids"),
-        "delays": (["D1", "D2"], "delays"),
-    }
-    assert not any("conditions" in block for block in shown["blocks"].values())
-
-
 @pytest.mark.parametrize(
     "steps",
     [
@@ -174,19 +129,6 @@ def test_the_protocol_is_whole_again_with_its_key_whoever_has_which_steps(tmp_pa
     open_or_draw_key(tmp_path, protocol, random=stream(1, "key").random)
     shown = json.loads(json.dumps(without_conditions(protocol)))
     assert whole_protocol(shown, read_key(tmp_path)) == protocol
-
-
-def test_of_a_folder_a_torn_line_does_not_count_and_what_is_no_session_is_named(tmp_path: Path, start: Start) -> None:
-    with start() as store:
-        store.append(journal_events.PageShown(page="consent"))
-    with store.folder.journal.open("ab") as file:
-        file.write(b'{"n":3,"event":"page_left"')
-    told = progress_of(read(store.folder.journal))
-    assert (told.step, told.page) == (0, "consent")
-    with pytest.raises(StoreError, match="is not a session folder: name one such as"):
-        resumed(tmp_path)
-    with pytest.raises(StoreError, match="does not begin with session_started"):
-        progress_of([])
 
 
 def test_sessions_are_listed_while_a_participant_is_withdrawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

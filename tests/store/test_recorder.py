@@ -82,20 +82,6 @@ def test_a_trial_is_on_the_disk_under_its_name_after_its_end(
     assert recorder.kept() == ()
 
 
-@pytest.mark.slow
-def test_the_same_samples_give_the_same_file_however_they_came(tmp_path: Path, samples_of: Make) -> None:
-    samples = samples_of(65_000)
-    sums = set()
-    for chunk in (16, 999, 65_000):
-        recorder = Recorder(tmp_path / str(chunk), FACTS, waits=True)
-        record(recorder, samples, chunk=chunk)
-        recorder.close()
-        (kept,) = recorder.kept()
-        assert isinstance(kept, Recorded)
-        sums.add((kept.sha256, kept.frames_sha256))
-    assert len(sums) == 1
-
-
 def test_beginning_the_next_trial_ends_the_one_before(recorder: Recorder, samples_of: Make) -> None:
     recorder.start(1, 1, 1000.0)
     recorder.append(samples_of(10))

@@ -7,13 +7,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from pyarrow import parquet
 
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import SAMPLE
-from study_app.store import recordings
 from study_app.store.recordings import (
     SamplesFile,
     Written,
@@ -115,23 +112,6 @@ def test_numbers_of_a_fault_come_back_as_they_are(tmp_path: Path, samples_of: Ma
 
 
 @pytest.mark.slow
-@given(
-    position=st.lists(st.floats(width=64), min_size=3, max_size=3),
-    time_ns=st.integers(-(2**62), 2**62),
-    force=st.lists(st.floats(-200, 200), min_size=3, max_size=3),
-)
-def test_any_place_and_time_is_kept(
-    tmp_path_factory: pytest.TempPathFactory, position: list[float], time_ns: int, force: list[float]
-) -> None:
-    samples = np.zeros(3, SAMPLE)
-    samples["position_m"][1], samples["time_ns"][1], samples["force_n"][1] = position, time_ns, force
-    read = read_samples(write(tmp_path_factory.mktemp("recording") / "trial-001.parquet", samples).path)
-    assert read["position_m"].tobytes() == samples["position_m"].tobytes()
-    assert read["time_ns"].tolist() == [0, time_ns, 0]
-    assert np.abs(read["force_n"][1] - force).max() <= 2.0**-15
-
-
-@pytest.mark.slow
 def test_the_checks_are_those_of_the_exact_forces_second_by_second(tmp_path: Path, samples_of: Make) -> None:
     samples = samples_of(32_500)
     checks = read_checks(write(tmp_path / "trial-003.parquet", samples).path)
@@ -182,13 +162,6 @@ def test_frames_come_back_with_their_age(tmp_path: Path) -> None:
     assert [tuple(one) for one in read[["video_frame", "video_ns", "video_age_ns"]].tolist()] == video
 
 
-def test_nothing_recorded_is_a_file_of_no_rows(tmp_path: Path) -> None:
-    samples = write(tmp_path / "trial-003.parquet", np.zeros(0, SAMPLE))
-    frames = write_frames(tmp_path / "frames.parquet", np.zeros((0, 5), np.int64), FACTS)
-    assert (len(read_samples(samples.path)), len(read_frames(frames.path))) == (0, 0)
-    assert read_checks(samples.path).device_force == ()
-
-
 def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None:
     samples = write(tmp_path / "trial-003.parquet", samples_of(100)).path
     frames = write_frames(tmp_path / "frames.parquet", np.array([[5, 3, -1, 0, -1]]), FACTS).path
@@ -217,16 +190,3 @@ def test_frames_that_do_not_fit_leave_nothing(tmp_path: Path, files_up_to: FullD
     with files_up_to(10_000), pytest.raises(StoreError, match="File too large"):
         write_frames(tmp_path / "frames.parquet", shown, FACTS)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow
-def test_half_an_hour_takes_at_most_sixty_megabytes(tmp_path: Path, samples_of: Make) -> None:
-    """Of places with every digit at random, as an analogue device has them; encoders take half of it."""
-    size = write(tmp_path / "trial-003.parquet", samples_of(90_000)).path.stat().st_size
-    assert size / 90_000 * 1_800_000 <= 60e6
-
-
-def test_a_recorded_column_is_named_by_its_declaration_and_the_kernel_that_fills_it_alone() -> None:
-    program = Path(recordings.__file__).parents[1]
-    naming = {file.name for file in program.rglob("*.py") if "device_time_ns" in file.read_text("utf-8")}
-    assert naming == {"layout.py", "loop.py"}

@@ -125,24 +125,6 @@ def test_a_pause_and_an_end_take_the_liquid_away(bench: Bench) -> None:
     assert (bench.run(500) == 0).all()
 
 
-def test_a_task_is_followed_on_the_device_and_drawn_from_its_history(bench: Bench) -> None:
-    bench.run(400)
-    task = bench.runner.task
-    assert task is not None
-    assert task.elapsed_s == pytest.approx(0.399, abs=0.002)
-    now_ns = bench.servo.now_ns()
-    view = bench.runner.view(now_ns)
-    assert view is not None
-    assert now_ns - view.sample_time_ns == round(SETTLED_S * 1e9)
-    bench.run(2800)
-    assert bench.runner.state.trial.number == 2
-    (row,) = bench.journal.of("trial_ended")
-    assert row["ticks"] == 3001
-    assert row["tick_rate_hz"] == pytest.approx(1000)
-    assert row["force_mean_n"] > 0.1
-    assert row["limiter_stop"] == 0
-
-
 def late(bench: Bench, clock: VirtualClock) -> None:
     clock.memory[0].now_ns += 5_000_000_000  # the process was stopped
 

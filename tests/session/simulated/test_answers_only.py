@@ -4,35 +4,20 @@ import csv
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 from study_app.analysis.data.study_tables import load_study
-from study_app.cli import commands
-from study_app.errors import StoreError
 from study_app.protocol.load import load
-from study_app.protocol.simulated import TrialFeatures
 from study_app.session.simulated import answers_only
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.session.simulated.rehearsal import ConditionFeatures, condition_features, rehearse
+from study_app.session.simulated.rehearsal import condition_features, rehearse
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.studies import made_up
 
 pytestmark = pytest.mark.slow
 
+FELT = made_up("rek2024")
 WALL_CLOCK = ("answered_at", "trial_started_at", "session_started_at", "session_ended_at")
-
-
-def made_up(name: str = "rek2024") -> ConditionFeatures:
-    """What every condition of a study feels like: conditions differ in force and delay alone."""
-    study = load(name)
-    return {
-        (block.id, condition): (
-            TrialFeatures(0.5 + 0.4 * number, 4.0, 0.1, 0.02, 0.03, study.delay_s(condition)),
-            TrialFeatures(0.6 + 0.4 * number, 4.2, 0.1, 0.02, 0.03, study.delay_s(condition)),
-        )
-        for block in study.blocks.values()
-        for number, condition in enumerate(block.conditions)
-    }
 
 
 def rows(path: Path) -> list[dict[str, str]]:
@@ -47,13 +32,13 @@ def tables(folder: Path) -> dict[str, list[dict[str, str]]]:
 @pytest.fixture(scope="module")
 def twelve(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("answers") / "rek2024"
-    return rehearse_answers("rek2024", participants=12, seed=1, results=folder, features=made_up())
+    return rehearse_answers("rek2024", participants=12, seed=1, results=folder, features=FELT)
 
 
 def test_by_default_it_keeps_apart_from_participants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for number in (1, 2):
-        folder = rehearse_answers("rek2024", participants=1, seed=1, features=made_up())
+        folder = rehearse_answers("rek2024", participants=1, seed=1, features=FELT)
         assert folder == Path("results") / f"rek2024-rehearsal-{number}"
 
 
@@ -67,7 +52,7 @@ def test_the_folder_is_sound_and_every_row_says_simulated(twelve: Path) -> None:
 
 def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Path, tmp_path: Path) -> None:
     again, other = (
-        rehearse_answers("rek2024", participants=12, seed=seed, results=tmp_path / str(seed), features=made_up())
+        rehearse_answers("rek2024", participants=12, seed=seed, results=tmp_path / str(seed), features=FELT)
         for seed in (1, 2)
     )
     assert tables(again) == tables(twelve)
@@ -75,7 +60,7 @@ def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Pa
 
 
 def test_fewer_participants_answer_as_the_first_of_many(twelve: Path, tmp_path: Path) -> None:
-    few = tables(rehearse_answers("rek2024", participants=3, seed=1, results=tmp_path / "few", features=made_up()))
+    few = tables(rehearse_answers("rek2024", participants=3, seed=1, results=tmp_path / "few", features=FELT))
     many = tables(twelve)
     assert all(many[name] == held for name, held in few.items() if "sub-" in name)
 
@@ -112,20 +97,6 @@ def test_what_is_felt_is_what_each_condition_gives(tmp_path: Path) -> None:
     assert not any(tmp_path.iterdir())
 
 
-def test_a_used_id_is_refused_and_nothing_is_touched(tmp_path: Path) -> None:
-    folder = rehearse_answers("rek2024", participants=2, seed=1, results=tmp_path / "rek2024", features=made_up())
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    with pytest.raises(StoreError, match="P001"):
-        rehearse_answers("rek2024", participants=5, seed=1, results=folder, features=made_up())
-    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
-
-
-def test_the_folder_of_another_study_is_refused(tmp_path: Path) -> None:
-    folder = rehearse_answers("rek2024", participants=1, seed=1, results=tmp_path / "a", features=made_up())
-    with pytest.raises(StoreError, match="holds the study"):
-        rehearse_answers("demo", participants=1, seed=1, results=folder, features=made_up("demo"))
-
-
 def test_ended_by_the_user_it_leaves_whole_sessions_and_their_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -136,13 +107,7 @@ def test_ended_by_the_user_it_leaves_whole_sessions_and_their_table(
     monkeypatch.setattr(answers_only, "SAY_EVERY_S", 0.0)
     folder = tmp_path / "rek2024"
     with pytest.raises(KeyboardInterrupt):
-        rehearse_answers("rek2024", participants=9, seed=1, results=folder, features=made_up(), progress=enough)
+        rehearse_answers("rek2024", participants=9, seed=1, results=folder, features=FELT, progress=enough)
     found = verify(folder)
     assert (found.errors, found.sessions) == ((), 3)
     assert load_study(folder).n == 3
-
-
-def test_a_device_makes_no_sense_without_one() -> None:
-    asked = ["rehearse", "demo", "--answers-only", "--device", "scripted"]
-    result = CliRunner().invoke(commands, asked)
-    assert (result.exit_code, "uses no device" in result.output) == (2, True)

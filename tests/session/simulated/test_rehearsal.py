@@ -1,6 +1,5 @@
 """Simulated participants: how they move, what they sense, and how they go through a session."""
 
-import re
 from collections.abc import Iterable
 from itertools import count
 from pathlib import Path
@@ -13,14 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import SessionError, StoreError
-from study_app.haptics.model import gate
-from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.runtime.servo import Servo
-from study_app.protocol import formats
-from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.simulated import OBSERVER, Comparison
-from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.observers import RATE_HZ, SensedTrial, exploration
 from study_app.session.simulated.rehearsal import RehearsedSession, condition_features
@@ -133,18 +127,6 @@ def test_a_rehearsals_worker_tells_how_much_is_compiled_and_nothing_of_what_comp
     assert tuple(said) == shares
 
 
-def test_a_disk_that_fails_ends_the_rehearsal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(self: SessionStore, event: Any, **about: Any) -> None:
-        if event.event == "choice":
-            raise StoreError("no space left")
-        kept(self, event, **about)
-
-    kept = SessionStore.append
-    monkeypatch.setattr(SessionStore, "append", full)
-    with pytest.raises(StoreError, match="no space left"):
-        rehearsal.rehearse("demo", participants=1, seed=1, results=tmp_path / "demo")
-
-
 @needs_servo
 def test_a_servo_that_is_ended_from_outside_ends_the_rehearsal(monkeypatch: Any) -> None:
     turns, advance = count(), Servo.advance
@@ -192,39 +174,3 @@ def test_a_rehearsal_that_was_interrupted_and_resumed_answers_like_one_that_was_
     rehearsal.resume(parted.session("P001", 1).path)
     answers, others = (confirmed(raw(journal.read(folder.session("P001", 1).journal))) for folder in (whole, parted))
     assert answers == others
-
-
-@pytest.mark.slow
-@needs_servo
-def test_a_resumed_session_goes_on_with_the_model_that_it_began_with(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A program that chooses other effects and another estimator resumes with those of the receipt."""
-    file = tmp_path / "study.toml"
-    text = source_bytes("demo").decode().replace("format = 1", "format = 2", 1)
-    file.write_text(re.sub(r"^effects = \[.*?\]", 'effects = "auto"', text, flags=re.MULTILINE), encoding="utf-8")
-    results, kept, used = StudyFolder(tmp_path / "results"), SessionStore.append, []
-
-    def interrupted(self: SessionStore, event: Any, **about: Any) -> None:
-        if isinstance(event, Responses):
-            raise KeyboardInterrupt
-        kept(self, event, **about)
-
-    def noting(self: Any) -> Any:
-        used.append(self._study)
-        return pages(self)
-
-    pages = rehearsal.RehearsedSession.pages
-    monkeypatch.setattr(rehearsal.RehearsedSession, "pages", noting)
-    with monkeypatch.context() as patched:
-        patched.setattr(SessionStore, "append", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            rehearsal.rehearse(str(file), participants=1, seed=1, results=results.path, recordings=False)
-    monkeypatch.setattr(gate, "_budget_n", lambda _scene, total_n: 0.9 * total_n)
-    monkeypatch.setattr(formats, "ESTIMATOR", "ewma")
-    assert load(str(file)).scene.velocity == Ewma()
-    rehearsal.resume(results.session("P001", 1).path, protocol=str(file))
-    first, *_, second = used
-    assert first.scene.velocity == second.scene.velocity == Kalman()
-    assert first.liquids == second.liquids
-    assert not {liquid.effects for liquid in first.liquids.values()} & {"auto", ("drag",)}

@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from study_app.errors import SessionError
-from study_app.protocol.orders.schedule import Trial
 from study_app.session.resume import resume_at
 from study_app.session.transitions.events import Begin, Finish, ResumeRequested, TaskDone, TimeUp, Write
 from study_app.session.transitions.state import FINAL, Phase, SessionState
@@ -18,15 +17,6 @@ from tests.session.transitions.states import written
 from tests.session.transitions.transcribed import to_trial
 
 DONE = TaskDone(10.0, "complete", {})
-
-
-def test_the_first_trial_of_a_block_begins_without_the_rest_between_trials() -> None:
-    state = pairs.opened()
-    commands: tuple[Any, ...] = ()
-    while not (isinstance(state.step, Trial) and state.trial.block == "viscosity"):
-        state, commands = advance(state, pairs.next_event(state, state.since_s))
-    assert (state.phase, state.trial.index) == (Phase.TASK, 1)
-    assert written(commands)[-2:] == ["trial_started", "interval_started"]
 
 
 def test_a_presented_level_is_in_no_printed_command_or_state() -> None:

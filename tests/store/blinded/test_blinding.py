@@ -4,7 +4,6 @@ import json
 import os
 import random
 import stat
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -107,17 +106,6 @@ def test_a_real_key_comes_from_the_systems_randomness(
     assert keys[0].hash != keys[1].hash
     assert len(drawn) == 2 * (32 + 2)  # the nonce, and one draw for each block of two
     assert keys[0].drawn == "system"
-
-
-@pytest.mark.slow
-def test_real_keys_give_each_condition_to_each_code_equally_often(tmp_path: Path, protocol: Protocol) -> None:
-    given: Counter[str] = Counter()
-    for number in range(200):
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        given[open_or_draw_key(folder, protocol).condition("liquids", "L1")] += 1
-    assert set(given) == {"feel_quagmire", "feel_mildew"}
-    assert min(given.values()) > 60  # 1 in 100 million by chance
 
 
 def test_a_rehearsals_key_follows_from_its_seed_and_does_not_mix_with_a_real_one(

@@ -1,11 +1,8 @@
 """A session goes on: times, receipt, tables, torn lines and recordings without a line."""
 
-import csv
-import io
 import itertools
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -24,12 +21,9 @@ from study_app.store.recorder import recording_files
 from study_app.store.recordings import read_samples, write_frames
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import check_can_go_on, reopen
-from study_app.store.verification.verify_study import verify
-from tests.faults.support.racers import race
+from study_app.store.sessions.recovery import check_can_go_on
 from tests.journal_lines import event_of
-from tests.platforms import needs_fork
-from tests.store.conftest import SOURCE, Attend, FullDisk, Make, Start, Tables, choose
+from tests.store.conftest import SOURCE, Attend, FullDisk, Make, Start, Tables
 from tests.store.sessions.conftest import Again, every_byte
 from tests.store.test_recorder import Disk
 
@@ -42,18 +36,6 @@ def begin_trial(store: SessionStore, trial: Trial) -> None:
 def present(store: SessionStore, trial: Trial, summary: dict[str, Any]) -> None:
     begin_trial(store, trial)
     store.append(event_of("trial_ended", trial=trial.number, attempt=1, outcome="complete", **summary))
-    store.write_tables()
-
-
-def answer(store: SessionStore, trial: Trial) -> None:
-    times = {"onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
-    items = [
-        {"item": item, "number": number, "value": 1 + (trial.number + number) % 7, **times}
-        for number, item in enumerate(trial.items, start=1)
-    ]
-    if items:
-        choose(store, trial.number, items)
-        store.append(event_of("responses", trial=trial.number, attempt=1, items=items))
     store.write_tables()
 
 
@@ -148,40 +130,6 @@ def test_the_receipt_tells_what_it_goes_on_with(start: Start, again: Again) -> N
     assert after["resumed"][0]["operator"] == "CD"
     assert after["resumed"][0]["versions"] == before["versions"]
     assert after["resumed"][1]["clock"] == {"origin_ns": resumed.clock.origin_ns, "origin_at": resumed.clock.at(0)}
-
-
-@pytest.mark.slow
-def test_a_resumed_session_gives_the_tables_of_one_that_was_never_interrupted(
-    tmp_path: Path, protocol: Protocol, start: Start, again: Again, summary: dict[str, Any]
-) -> None:
-    """Ended after each trial's answers, and taken up again; times aside."""
-    trials = build_schedule(protocol, "P007", 11).trials
-    whole = start(results=tmp_path / "whole")
-    for trial in trials:
-        present(whole, trial, summary)
-        answer(whole, trial)
-    whole.finish("completed")
-
-    store = start()
-    for trial in trials:
-        present(store, trial, summary)
-        answer(store, trial)
-        store.close()
-        store = again()
-    store.finish("completed")
-
-    def rows(of: SessionStore, table: str) -> list[dict[str, str]]:
-        text = of.folder.table("brackish", table).read_text(encoding="utf-8")
-        found = list(csv.DictReader(io.StringIO(text, newline="")))
-        timed = ("answered_at", "trial_started_at", "trial_started_s")
-        return [{name: cell for name, cell in row.items() if name not in timed} for row in found]
-
-    for table in ("responses", "trials"):
-        assert rows(store, table) == rows(whole, table)
-    (row,) = csv.DictReader(io.StringIO(store.place.study_folder.participants("brackish").read_text(encoding="utf-8")))
-    assert (row["status"], row["resumed"], row["responses"]) == ("completed", str(len(trials)), "12")
-    findings = verify(tmp_path / "study")
-    assert (findings.errors, findings.warnings) == ((), ())
 
 
 def test_a_torn_line_is_cut_off_counted_and_kept(start: Start, again: Again) -> None:
@@ -348,25 +296,3 @@ def test_what_cannot_go_on_is_refused_untouched_by_looking_and_by_opening(
                 look()
             assert every_byte(tmp_path) == before
     assert done is None or not is_open(store.folder.path)
-
-
-@pytest.mark.slow
-@needs_fork
-def test_of_two_programs_that_resume_at_once_never_both_do(start: Start, protocol: Protocol) -> None:
-    folders = []
-    for number in range(20):
-        with start(f"P{number:03d}") as store:
-            folders.append(store.folder)
-
-    @contextmanager
-    def resumed(_program: int, number: int) -> Iterator[str]:
-        try:
-            with reopen(folders[number].path, protocol, SOURCE, operator="", device={}, screens={}):
-                yield "open"
-        except StoreError as error:
-            yield str(error)
-
-    for folder, answers in zip(folders, race(resumed, 20), strict=True):
-        found = [line for line in journal.read(folder.journal) if line.event == "session_resumed"]
-        assert len(found) == answers.count("open") <= 1
-        assert all("is open in another program" in told for told in answers if told != "open")

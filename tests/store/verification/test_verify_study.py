@@ -288,15 +288,6 @@ def test_a_session_killed_between_its_last_line_and_its_checksums_is_finished_by
 
 
 ENOUGH = 1  # looks
-MOST = 100  # sessions of a program, which ends after as many looks as are enough
-
-
-def hold_sessions(study: Path, finished: Start, first: int, enough: Any) -> None:
-    """Begin, hold and end short sessions, one after the other, until it was looked at them often enough."""
-    for number in range(first, first + MOST):
-        if enough.is_set():
-            break
-        finished(f"P{number:03d}", results=study, simulated=True)
 
 
 def rehearse_short(study: Path, protocol: Path, _enough: Any) -> None:
@@ -322,18 +313,6 @@ def look_beside(study: Path, *programs: tuple[Callable[..., None], tuple[Any, ..
             errors += map(str, findings.errors)
     assert [program.exitcode for program in started] == [0] * len(started)
     return looks, running, errors
-
-
-@pytest.mark.nightly
-@needs_fork
-def test_sessions_that_are_begun_and_ended_beside_it_are_never_called_unsound(tmp_path: Path, finished: Start) -> None:
-    """Two programs write to one study, with all that begins and ends a session."""
-    study = tmp_path / "study"
-    _, running, errors = look_beside(study, *((hold_sessions, (finished, first)) for first in (101, 1)))
-    assert errors == []
-    assert running >= ENOUGH
-    findings = verify(study)
-    assert (findings.sound, findings.running) == (True, 0)
 
 
 @needs_fork
