@@ -5,6 +5,7 @@ A transcript is a name (``=== name``), the state it starts from, commands, and b
 """
 
 import ast
+import shutil
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -35,3 +36,62 @@ def value_of(line: str, names: Mapping[str, Any]) -> Any:
                 return ast.literal_eval(node)
 
     return value(ast.parse(line, mode="eval").body)
+
+
+class Files:
+    """Files below a folder, and a command for whatever may happen to them."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.before = self._contents() if root.is_dir() else {}
+
+    def _contents(self) -> dict[str, bytes]:
+        paths = (path for path in self.root.rglob("*") if path.is_file())
+        return {path.relative_to(self.root).as_posix(): path.read_bytes() for path in paths}
+
+    def files(self) -> Iterator[str]:
+        """Tell which files differ from what they were."""
+        now = self._contents()
+        yield from (f"gone: {name}" for name in sorted(self.before.keys() - now.keys()))
+        yield from (f"new: {name}" for name in sorted(now.keys() - self.before.keys()))
+        yield from (f"other: {one}" for one in sorted(now.keys() & self.before.keys()) if now[one] != self.before[one])
+
+    def same(self, folder: str, other: str) -> Iterator[str]:
+        """Tell which files of two folders differ."""
+        one, two = (Files(self.root / name)._contents() for name in (folder, other))
+        yield f"{len(one)} files, different: {sorted(name for name in one | two if one.get(name) != two.get(name))}"
+
+    def replace(self, name: str, old: str, new: str) -> None:
+        content = (self.root / name).read_bytes()
+        assert old.encode() in content
+        (self.root / name).write_bytes(content.replace(old.encode(), new.encode(), 1))
+
+    def write(self, name: str, content: bytes) -> None:
+        (self.root / name).write_bytes(content)
+
+    def append(self, name: str, content: bytes) -> None:
+        self.write(name, (self.root / name).read_bytes() + content)
+
+    def cut(self, name: str, size: int) -> None:
+        """Leave so many bytes; with a negative number, all but the last ones."""
+        self.write(name, (self.root / name).read_bytes()[:size])
+
+    def delete(self, *names: str) -> None:
+        for name in names:
+            for path in self.root.glob(name):
+                shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+
+    def rename(self, name: str, to: str) -> None:
+        (self.root / name).rename(self.root / to)
+
+    def link(self, name: str, to: str) -> None:
+        (self.root / name).symlink_to(self.root / to)
+
+    def folder(self, name: str) -> None:
+        """Put a folder in the place of a file."""
+        (self.root / name).unlink()
+        (self.root / name).mkdir()
+
+    def copy(self, name: str, to: str) -> None:
+        (self.root / to).parent.mkdir(parents=True, exist_ok=True)
+        (shutil.copytree if (self.root / name).is_dir() else shutil.copy)(self.root / name, self.root / to)

@@ -1,6 +1,6 @@
 """What each command prints, its exit code and its files, on a small study; and what is said of bad input.
 
-The commands are the lines of the golden files that begin with ``$``.
+The commands are the lines of the golden files that begin with ``$``; those with ``@`` change files in between.
 """
 
 import shlex
@@ -18,9 +18,17 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from tests.compiled import needs_servo
 from tests.golden import CHANGING, compare
 from tests.studies import made_up, once
+from tests.transcripts import Files, value_of
 
 GOLDEN = sorted((Path(__file__).parent / "golden").glob("*.txt"))
-LATER = {"outputs": [pytest.mark.slow], "refusals": [pytest.mark.slow, needs_servo]}
+LATER = {
+    "outputs": [pytest.mark.slow],
+    "refusals": [pytest.mark.slow, needs_servo],
+    "sites": [pytest.mark.slow],
+    "withdrawals": [pytest.mark.slow],
+}
+LABS = ("sites", "withdrawals")
+"""Golden files of commands on the studies of three labs."""
 LONG = {"x5000": "x" * 5000, "9999": "9" * 6000}
 """Words that stand for long ones."""
 FILES = {
@@ -34,8 +42,19 @@ FILES = {
 }
 
 
+def make_labs(folder: Path) -> None:
+    """Hold the same study in three labs, each with its own key."""
+    for seed, site in enumerate("ABC", start=1):
+        rehearse_answers("demo", participants=2, seed=seed, results=folder / site, features=made_up("demo"))
+
+
 @pytest.fixture
-def workspace(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+def workspace(
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Path:
     """A workspace with a study of two people, its copy, and files that are no protocols."""
 
     def make(folder: Path) -> None:
@@ -45,6 +64,8 @@ def workspace(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, monkeypa
         shutil.copytree(once(tmp_path_factory, "cli-demo", make) / "demo", tmp_path / "results" / name)
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
+    if request.node.callspec.id in LABS:
+        shutil.copytree(once(tmp_path_factory, "cli-labs", make_labs), tmp_path / "labs")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     monkeypatch.setenv("COLUMNS", "100")
@@ -65,8 +86,13 @@ def test_commands(golden: Path, workspace: Path, capsys: Any, monkeypatch: Any, 
 
     for module in ("data", "model"):
         monkeypatch.setattr(f"study_app.cli.{module}.progress", progress)
-    lines, before = list[str](), files()
-    for line in (line for line in golden.read_text("utf-8").splitlines() if line.startswith("$ ")):
+    changed, lines, before = Files(workspace), list[str](), files()
+    for line in (line for line in golden.read_text("utf-8").splitlines() if line.startswith(("$ ", "@ "))):
+        if line.startswith("@ "):
+            told = value_of(line[2:], {name: getattr(changed, name) for name in dir(changed)})
+            lines += [line, *(f"| {one}" for one in told or ())]
+            before = files()
+            continue
         words = shlex.split(line[2:])
         for short, long in LONG.items():
             words = [word.replace(short, long) for word in words]

@@ -111,30 +111,39 @@ def clock() -> SessionClock:
     return ticking_clock()
 
 
+def begun(
+    results: Path,
+    participant: str = "P007",
+    *,
+    protocol: Protocol | None = None,
+    source: bytes = SOURCE,
+    clock: SessionClock | None = None,
+    **given: Any,
+) -> SessionStore:
+    """Begin a session in a study's folder; any value of its ``SessionStart`` can be given."""
+    values: dict[str, Any] = {
+        "seed": 11,
+        "operator": "AB",
+        "language": "en",
+        "device": {"name": "scripted", "rate_hz": 1000},
+        "screens": {"participant": {"width": 1920, "height": 1080, "refresh_hz": 60.0}},
+        "simulated": False,
+    }
+    study = protocol or Protocol.model_validate(study_tables())
+    start = SessionStart(participant, **(values | given))
+    return begin(results, study, source, start, clock=clock or ticking_clock())
+
+
 @pytest.fixture
 def start(tmp_path: Path, protocol: Protocol, clock: SessionClock) -> Start:
-    """Begin a session of P007 in tmp_path/study; any value of its ``SessionStart`` can be given, and of ``begin``."""
+    """Begin a session of P007 in tmp_path/study; any argument of ``begun`` can be given."""
 
-    def begun(
-        participant: str = "P007",
-        *,
-        results: Path = tmp_path / "study",
-        protocol: Protocol = protocol,
-        source: bytes = SOURCE,
-        clock: SessionClock = clock,
-        **given: Any,
-    ) -> SessionStore:
-        values: dict[str, Any] = {
-            "seed": 11,
-            "operator": "AB",
-            "language": "en",
-            "device": {"name": "scripted", "rate_hz": 1000},
-            "screens": {"participant": {"width": 1920, "height": 1080, "refresh_hz": 60.0}},
-            "simulated": False,
-        }
-        return begin(results, protocol, source, SessionStart(participant, **(values | given)), clock=clock)
+    def begin_one(participant: str = "P007", **given: Any) -> SessionStore:
+        return begun(
+            participant=participant, **({"results": tmp_path / "study", "protocol": protocol, "clock": clock} | given)
+        )
 
-    return begun
+    return begin_one
 
 
 @pytest.fixture
@@ -191,35 +200,29 @@ def summary() -> dict[str, Any]:
     return summary_of_trial()
 
 
+def attended(store: SessionStore, protocol: Protocol | None = None) -> None:
+    """Walk a session through its schedule as the session's machine journals it, up to the end."""
+    for trial in build_schedule(protocol or Protocol.model_validate(study_tables()), "P007", 11).trials:
+        which = {"trial": trial.number, "attempt": 1}
+        told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+        store.append(journal_events.TrialStarted(**which, **told))
+        store.append(event_of("trial_ended", **which, outcome="complete", **summary_of_trial()))
+        store.write_tables()
+        if trial.items:
+            told = {"onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
+            items = [
+                {"item": item, "number": number, "value": 1 + (trial.number + number) % 7, **told}
+                for number, item in enumerate(trial.items, start=1)
+            ]
+            choose(store, trial.number, items)
+            store.append(event_of("responses", **which, items=items))
+            store.write_tables()
+
+
 @pytest.fixture
 def attend(protocol: Protocol) -> Attend:
-    """Walk a session through its schedule as the session's machine journals it, up to the end."""
-
-    def attended(store: SessionStore) -> None:
-        for trial in build_schedule(protocol, "P007", 11).trials:
-            which = {"trial": trial.number, "attempt": 1}
-            told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
-            store.append(journal_events.TrialStarted(**which, **told))
-            store.append(event_of("trial_ended", **which, outcome="complete", **summary_of_trial()))
-            store.write_tables()
-            if trial.items:
-                items = [
-                    {
-                        "item": item,
-                        "number": number,
-                        "value": 1 + (trial.number + number) % 7,
-                        "onset_s": 1.5,
-                        "first_s": 2.25,
-                        "last_s": 2.25,
-                        "changes": 0,
-                    }
-                    for number, item in enumerate(trial.items, start=1)
-                ]
-                choose(store, trial.number, items)
-                store.append(event_of("responses", **which, items=items))
-                store.write_tables()
-
-    return attended
+    """Walk a session through its schedule, up to the end."""
+    return lambda store: attended(store, protocol)
 
 
 @pytest.fixture

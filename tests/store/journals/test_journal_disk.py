@@ -4,7 +4,6 @@ import contextlib
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
-from study_app.protocol.model import Protocol
-from study_app.store import receipt
 from study_app.store.journals.journal import Journal, read, scan
-from study_app.store.sessions.recovery import check_can_go_on, rebuild
-from study_app.store.verification.verify_study import verify
 from tests.journal_lines import event_of
-from tests.store.conftest import AWKWARD, SOURCE, FullDisk, Start
-from tests.store.forging import Lines, forge
-from tests.store.sessions.conftest import every_byte
+from tests.store.conftest import AWKWARD, FullDisk
 
 
 @pytest.mark.parametrize("mended", [True, False], ids=["taken back at once", "taken back before the next line"])
@@ -222,126 +215,3 @@ def test_what_was_acknowledged_survives_a_kill_at_any_moment(tmp_path: Path) -> 
     values = [line.others["value"] for line in read(path)]
     assert values[: len(acknowledged)] == acknowledged
     assert len(values) <= len(acknowledged) + 1
-
-
-@pytest.fixture
-def folder(finished: Start) -> Path:
-    """Return the folder of a session with 12 answers that ended."""
-    store = finished()
-    return store.folder.path
-
-
-def cut(folder: Path, lines: int) -> None:
-    path = folder / "journal.jsonl"
-    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:lines]))
-
-
-def never_ended(folder: Path) -> None:
-    """Take away whatever tells that the session had ended."""
-    path = folder / "receipt.json"
-    receipt.write(path, receipt.read(path) | {"status": "unfinished", "reason": "", "ended_at": None})
-    (folder / "checksums.sha256").unlink()
-    (folder.parents[2] / "fingerprints.txt").unlink()
-
-
-def refused(folder: Path, protocol: Protocol, sentence: str) -> None:
-    before = every_byte(folder.parents[2])
-    for act in (lambda: rebuild(folder), lambda: check_can_go_on(folder, protocol, SOURCE)):
-        with pytest.raises(StoreError, match=f"{sentence}.*: restore the journal from a copy"):
-            act()
-    assert every_byte(folder.parents[2]) == before
-
-
-def test_a_finished_session_whose_journal_lost_its_end_is_left_alone(folder: Path, protocol: Protocol) -> None:
-    cut(folder, 20)
-    refused(folder, protocol, "its status is 'completed', the journal's 'unfinished'")
-    assert not [error for error in verify(folder.parents[2]).errors if "rebuild renews" in str(error)]
-
-
-def with_a_recording(folder: Path) -> None:
-    (folder / "recordings").mkdir()
-    (folder / "recordings" / "trial-004.parquet").write_bytes(b"x")
-
-
-def resumed(folder: Path) -> None:
-    receipt.write(folder / "receipt.json", receipt.read(folder / "receipt.json") | {"resumed": [{"at": "now"}]})
-
-
-@pytest.mark.parametrize(
-    ("left", "sentence"),
-    [
-        ("checksums.sha256", "was written after the session ended"),
-        ("fingerprints.txt", "lists data/sub-P007/ses-01 as ended"),
-        ("*responses_data.csv", "responses_data.csv has 12 rows, and the journal gives 0"),
-        ("*trials_data.csv", "trials_data.csv has 5 rows, and the journal gives 2"),
-        (with_a_recording, "trial-004.parquet is of a trial that the journal never started"),
-        (resumed, "was resumed more often than the journal"),
-    ],
-)
-def test_whatever_tells_more_than_the_journal_stops_both_and_is_an_error(
-    folder: Path, protocol: Protocol, left: str | Callable[[Path], None], sentence: str
-) -> None:
-    cut(folder, 5)
-    study = folder.parents[2]
-    kept = [] if callable(left) else [*folder.glob(left), *study.glob(left)]
-    held = {path: path.read_bytes() for path in kept}
-    never_ended(folder)
-    for path in folder.glob("*_data.csv"):
-        path.unlink()
-    for path, content in held.items():
-        path.write_bytes(content)
-    if callable(left):
-        left(folder)
-    refused(folder, protocol, sentence)
-    assert verify(study).errors
-
-
-def test_a_table_with_a_trial_more_or_that_is_no_table_stops_neither(folder: Path, protocol: Protocol) -> None:
-    """A power cut may take the line of a trial's start, which nobody waits for, and leave the table."""
-    whole = next(folder.glob("*trials_data.csv")).read_bytes()
-    never_ended(folder)
-    cut(folder, 3)
-    for path in folder.glob("*_data.csv"):
-        path.unlink()
-    table = folder / "subject-P007_session-01_task-brackish_description-trials_data.csv"
-    for content in (b"".join(whole.splitlines(keepends=True)[:3]), b"\xff\0\r", b"a\nb\nc\nd\n"):
-        table.write_bytes(content)
-        check_can_go_on(folder, protocol, SOURCE)
-        assert table in rebuild(folder).rewritten
-
-
-def renamed(folder: Path, **of_start: str) -> None:
-    """Rename the event of the last answers; the session's first line is another version's, where that is given."""
-
-    def change(lines: Lines) -> None:
-        last = max(index for index, line in enumerate(lines) if line["event"] == "responses")
-        lines[last]["event"] = "sesponses"
-        lines[0].update(of_start)
-        if lines[-1]["event"] == "session_ended":
-            del lines[-1]
-
-    forge(folder / "journal.jsonl", change)
-
-
-def test_an_event_that_the_writing_version_did_not_have_is_damage(folder: Path, protocol: Protocol) -> None:
-    renamed(folder)
-    assert "has an event 'sesponses', which version" in str(scan(folder / "journal.jsonl").damage)
-    assert not verify(folder.parents[2]).sound
-    for act in (lambda: rebuild(folder), lambda: check_can_go_on(folder, protocol, SOURCE)):
-        with pytest.raises(StoreError, match="was changed; restore it from a copy"):
-            act()
-
-
-def test_a_session_with_events_of_another_version_is_left_alone_by_this_one(folder: Path, protocol: Protocol) -> None:
-    renamed(folder, version="99.0")
-    path = folder / "receipt.json"
-    receipt.write(path, receipt.read(path) | {"version": "99.0"})
-    never_ended(folder)
-    assert scan(folder / "journal.jsonl").damage is None
-    before = every_byte(folder)
-    for act in (lambda: rebuild(folder), lambda: check_can_go_on(folder, protocol, SOURCE)):
-        with pytest.raises(
-            StoreError, match="has events 'sesponses', which this version does not know: use the version"
-        ):
-            act()
-    assert every_byte(folder) == before

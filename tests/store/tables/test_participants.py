@@ -72,23 +72,6 @@ def test_a_journal_that_gives_no_row_stops_no_other_session_and_is_marked(
         rebuild(store.folder.path)
 
 
-def test_of_two_programs_the_last_to_write_has_seen_both(
-    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """While P001's program is between reading the journals and writing the table, P002's session ends and writes."""
-    write, other = study_files.write_file, start("P002")
-    store = start("P001")
-
-    def late(path: Path, content: bytes, **given: Any) -> None:
-        monkeypatch.setattr(study_files, "write_file", write)
-        other.finish("withdrawn")
-        write(path, content, **given)
-
-    monkeypatch.setattr(study_files, "write_file", late)
-    store.finish("completed")
-    assert [row["status"] for row in table(tmp_path / "study")] == ["completed", "withdrawn"]
-
-
 def into_a_folder(path: Path) -> None:
     path.unlink()
     path.mkdir()
@@ -124,9 +107,11 @@ class Killed(BaseException):
     """The program ends here."""
 
 
-def test_a_program_killed_after_it_overwrote_a_newer_row_leaves_a_table_that_heals(
-    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("killed", [False, True])
+def test_of_two_programs_the_last_to_write_has_seen_both_or_the_table_heals(
+    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch, killed: bool
 ) -> None:
+    """While P001's program is between reading the journals and writing the table, P002's session ends and writes."""
     write, other = study_files.write_file, start("P002")
     store = start("P001")
     study = StudyFolder(tmp_path / "study")
@@ -135,13 +120,17 @@ def test_a_program_killed_after_it_overwrote_a_newer_row_leaves_a_table_that_hea
         monkeypatch.setattr(study_files, "write_file", write)
         other.finish("withdrawn")
         write(path, content, **given)
-        raise Killed
+        if killed:
+            raise Killed
 
     monkeypatch.setattr(study_files, "write_file", late)
-    with pytest.raises(Killed):
+    if killed:
+        with pytest.raises(Killed):
+            store.finish("completed")
+        assert [row["status"] for row in table(study.path)] == ["completed", "unfinished"]
+        study_files.write_participants(study, "brackish")
+    else:
         store.finish("completed")
-    assert [row["status"] for row in table(study.path)] == ["completed", "unfinished"]
-    study_files.write_participants(study, "brackish")
     assert [row["status"] for row in table(study.path)] == ["completed", "withdrawn"]
 
 

@@ -27,18 +27,6 @@ def replace(old: str, new: str, count: int = 1) -> Callable[[Path], None]:
     return act
 
 
-def append(content: bytes) -> Callable[[Path], None]:
-    return lambda path: path.write_bytes(path.read_bytes() + content)
-
-
-def without_line(number: int) -> Callable[[Path], None]:
-    def act(path: Path) -> None:
-        lines = path.read_bytes().splitlines(keepends=True)
-        path.write_bytes(b"".join(lines[: number - 1] + lines[number:]))
-
-    return act
-
-
 def of_receipt(**changes: Any) -> Callable[[Path], None]:
     def act(path: Path) -> None:
         held = receipt.read(path) | changes
@@ -47,17 +35,4 @@ def of_receipt(**changes: Any) -> Callable[[Path], None]:
     return act
 
 
-RESPONSES = f"{SESSION}/subject-P007_session-01_task-brackish_description-responses_data.csv"
-
-
-TRIALS = f"{SESSION}/subject-P007_session-01_task-brackish_description-trials_data.csv"
-
-
 PARTICIPANTS = "data/study-brackish_description-participants_data.csv"
-
-
-def only_the_journals_lines(count: int) -> Callable[[Path], None]:
-    def act(path: Path) -> None:
-        path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:count]))
-
-    return act

@@ -7,12 +7,11 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
-from study_app.store.journals import journal, journal_events
+from study_app.store.journals import journal_events
 from study_app.store.sessions import recovery
 from study_app.store.verification.verify_study import verify
 from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Start
-from tests.store.forging import forge
 from tests.store.verification.findings import PARTICIPANTS, SESSION, replace, told, warned
 
 
@@ -91,40 +90,6 @@ def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
         assert f"{path}: differs from the journal, from line 2 on; rebuild renews it" in warned(findings)
     replace("withdrawn", "completed")(study / PARTICIPANTS)
     assert f"{PARTICIPANTS}: differs from the journal" in told(verify(study))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "old", "new"),
-    [
-        (PARTICIPANTS, "P000,1,", "P999,1,"),
-        (PARTICIPANTS, "P000,1,false", "P000,1,true"),
-        (PARTICIPANTS, "unfinished", "unfinished\r"),
-        ("data/sub-P000/ses-01/*trials_data.csv", "complete", "com\rplete"),
-    ],
-)
-def test_a_changed_table_of_a_session_that_has_not_ended_is_a_warning(
-    study: Path, start: Start, summary: dict[str, Any], name: str, old: str, new: str
-) -> None:
-    """Even where it is no CSV; earlier versions could be killed while they wrote one in place."""
-    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
-    with start("P000") as store:
-        store.append(journal_events.TrialStarted(trial=1, attempt=1, **told_of))
-        store.append(event_of("trial_ended", trial=1, attempt=1, outcome="complete", **summary))
-        store.write_tables()
-    assert verify(study).errors == ()
-    (path,) = study.glob(name)
-    replace(old, new)(path)
-    findings = verify(study)
-    assert f"{path.relative_to(study).as_posix()}: differs from the journal" in warned(findings)
-    assert findings.errors == ()
-
-
-def test_samples_that_were_dropped_are_known(study: Path) -> None:
-    path = study / SESSION / "journal.jsonl"
-    (first,) = [n for n, line in enumerate(journal.read(path)) if line.event == "recorded" and line.trial == 1]
-    forge(path, lambda lines: lines[first].update(samples_unrecorded=7))
-    assert "recordings/trial-001.parquet: lacks 7 samples" in warned(verify(study))
 
 
 def test_every_change_to_the_receipt_of_a_session_that_has_not_ended_is_an_error(

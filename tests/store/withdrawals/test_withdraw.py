@@ -6,17 +6,15 @@ import os
 import re
 import shutil
 import signal
-import sys
 from datetime import UTC, datetime
 from pathlib import Path
-from unittest import mock
 
 import pytest
 from click.testing import CliRunner, Result
 
 from study_app.analysis.export.export import export
 from study_app.analysis.report.write_report import report
-from study_app.cli import commands, main
+from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.checksums import checked_line
@@ -145,26 +143,6 @@ def test_a_killed_withdrawal_is_reported_and_finished_by_the_same_command(
     assert (again.folders, again.outputs) == ((), ())
 
 
-def test_copies_are_reached_also_those_made_before_unblinding(study: Path, results: Path, tmp_path: Path) -> None:
-    shutil.copytree(study, tmp_path / "disk" / "sites" / "A" / study.name)
-    unblind(study, "AK", "closed")
-    shutil.copytree(study, tmp_path / "disk" / "later")
-    done = erase(study, also=[tmp_path / "disk"])
-    assert len(done.folders) == 3
-    for folder in done.folders:
-        assert not list(folder.rglob(f"*{PERSON}*"))
-        assert verify(folder).sound
-    assert results.is_dir()
-
-
-def test_another_persons_session_of_that_id_is_left(study: Path, tmp_path: Path) -> None:
-    other = rehearsed(tmp_path / "elsewhere")
-    done = erase(study, also=[tmp_path / "elsewhere"])
-    assert done.folders == (study,)
-    assert f"{other} was not changed" in done.left[0]
-    assert (other / "data" / f"sub-{PERSON}").is_dir()
-
-
 @pytest.mark.nightly
 def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, results: Path, tmp_path: Path) -> None:
     shared = tmp_path / "disk" / "shared"
@@ -189,44 +167,6 @@ def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, resul
     assert contents(shared) == before
 
 
-def test_what_cannot_be_reached_is_listed(study: Path, tmp_path: Path) -> None:
-    export(study, tmp_path / "usb")
-    export(study, tmp_path / "gone")
-    shutil.rmtree(tmp_path / "gone")
-    (study / "notes.txt").write_text("P002 was late; P0022 was not")
-    said = run("withdraw", study, "--participant", PERSON, "--by", "AK", "--reason", "asked")
-    assert said.exit_code == 0
-    assert f"erased     participant P002 from {study}" in said.stdout
-    assert f"results folder: {tmp_path / 'usb'} (delete it, and make it again)" in said.stderr
-    assert f"results folder: {tmp_path / 'gone'} (no longer there)" in said.stderr
-    assert f"{study / 'notes.txt'} still names P002" in said.stderr
-    assert [path for path in (tmp_path / "usb").iterdir() if PERSON in path.read_text(encoding="utf-8")]
-    again = run("withdraw", study, "--participant", PERSON, "--by", "AK", "--reason", "asked")
-    assert "nothing to erase: participant P002 withdrew at " in again.stdout
-
-
-@pytest.mark.parametrize(
-    ("given", "sentence"),
-    [
-        ({"participant": "P009"}, "has no participant 'P009'; participants: P001, P002, P003"),
-        ({"by": " "}, "--by is empty: a withdrawal needs initials and a reason"),
-        ({"reason": ""}, "--reason is empty: a withdrawal needs initials and a reason"),
-    ],
-)
-def test_bad_input_erases_nothing(
-    study: Path, capsys: pytest.CaptureFixture[str], given: dict[str, str], sentence: str
-) -> None:
-    before = contents(study)
-    options = {"participant": PERSON, "by": "AK", "reason": "asked"} | given
-    words = ["withdraw", str(study), *(word for name, value in options.items() for word in (f"--{name}", value))]
-    with mock.patch.object(sys, "argv", ["liquid-study", *words]), pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert sentence in line
-    assert contents(study) == before
-
-
 @needs_fork  # where folders can be linked, and pipes made
 def test_a_link_and_a_pipe_are_named_before_anything_is_written(study: Path, tmp_path: Path) -> None:
     person = study / "data" / f"sub-{PERSON}"
@@ -249,17 +189,6 @@ def test_a_link_and_a_pipe_are_named_before_anything_is_written(study: Path, tmp
     assert {path: path.read_bytes() for path in before} == before
     assert not (study / "withdrawals.jsonl").exists()
     assert not (tmp_path / "pooled").exists()
-
-
-def test_a_forged_tombstone_leads_out_of_no_folder(study: Path) -> None:
-    erase(study)
-    kept = study / "data" / "sub-P001" / "ses-01"
-    line = (study / "withdrawals.jsonl").read_text()
-    (study / "withdrawals.jsonl").write_text(line.replace(f'"{PERSON}"', '"P001/ses-01"'))
-    with pytest.raises(StoreError, match=r"withdrawals.jsonl, line 1 is not a withdrawal"):
-        withdraw(study, "P001/ses-01", by="AK", reason="forged")
-    assert (kept / "journal.jsonl").is_file()
-    assert not verify(study).sound
 
 
 def test_a_running_session_is_not_erased(study: Path) -> None:

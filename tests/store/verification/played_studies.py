@@ -1,0 +1,245 @@
+"""Studies that are changed in transcripts, and what `verify` and others say of them."""
+
+import hashlib
+import json
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.store import receipt
+from study_app.store.blinded import blinding
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import exclude, exclusions
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal_events
+from study_app.store.sessions.recovery import check_can_go_on, rebuild
+from study_app.store.tables.study_files import write_participants
+from study_app.store.verification.verify_study import verify
+from tests.golden import CHANGING
+from tests.journal_lines import event_of
+from tests.store.conftest import SOURCE, attended, begun, choose, made_samples, study_tables, summary_of_trial
+from tests.store.forging import Lines, cover_up, forge
+from tests.transcripts import Files, value_of
+
+MASK = re.compile(CHANGING.pattern + r"|\b(?:[a-z0-9]{4}-){2}[a-z0-9]{4}(?:-[a-z0-9]{2})?\b|line \d+ column .*?\)")
+"""Dates, versions, hashes, fingerprints, and places in receipts, which are as long as versions are."""
+P007 = "data/sub-P007/ses-01"
+NAMES = {
+    "SESSION": P007,
+    "JOURNAL": f"{P007}/journal.jsonl",
+    "RECEIPT": f"{P007}/receipt.json",
+    "SUMS": f"{P007}/checksums.sha256",
+    "RESPONSES": f"{P007}/subject-P007_session-01_task-brackish_description-responses_data.csv",
+    "TRIALS": f"{P007}/subject-P007_session-01_task-brackish_description-trials_data.csv",
+    "PARTICIPANTS": "data/study-brackish_description-participants_data.csv",
+    "RECORDING": f"{P007}/recordings/trial-001.parquet",
+    "FRAMES": f"{P007}/recordings/trial-002_attempt-2_frames.parquet",
+    "KEY": "blinding/key.sealed",
+    "REVEALS": "blinding/reveals.jsonl",
+}
+
+
+def recorded(folder: Path) -> Path:
+    """Hold two sessions: P007 with recordings, one trial of it presented twice; P008 withdrawn."""
+    store = begun(folder, recordings=True)
+    recorder = store.recorder
+    assert recorder is not None
+    for trial in build_schedule(Protocol.model_validate(study_tables()), "P007", 11).trials:
+        told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+        for attempt in (1, 2) if trial.number == 2 else (1,):
+            store.append(journal_events.TrialStarted(trial=trial.number, attempt=attempt, **told))
+            recorder.start(trial.number, attempt, 1000.0)
+            recorder.append(made_samples(500 + trial.number))
+            recorder.frame(9, 4)
+            recorder.stop()
+            measured = summary_of_trial()
+            store.append(event_of("trial_ended", trial=trial.number, attempt=attempt, outcome="complete", **measured))
+        items = [
+            {"item": item, "number": n, "value": 4, "onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
+            for n, item in enumerate(trial.items, start=1)
+        ]
+        if items:
+            choose(store, trial.number, items)
+            store.append(event_of("responses", trial=trial.number, attempt=attempt, items=items))
+        store.write_tables()
+    store.append(journal_events.Note(kind="mark", text='comma, "quote"\nnew line'))
+    store.finish("completed")
+    begun(folder, "P008").finish("withdrawn", "tired")
+    return folder
+
+
+def answered(folder: Path) -> Path:
+    """Hold two sessions without recordings, P007's with all answers."""
+    for participant in ("P007", "P008"):
+        store = begun(folder, participant, simulated=True)
+        attended(store)
+        store.finish("completed")
+    return folder
+
+
+def left(folder: Path) -> Path:
+    """Hold a session of P007 with all answers that has no end, after one of P008 that has."""
+    begun(folder, "P008").finish("completed")
+    with begun(folder) as store:
+        attended(store)
+    return folder
+
+
+STARTS: dict[str, Callable[[Path], Path]] = {one.__name__: one for one in (recorded, answered, left)}
+
+
+class Changed(Files):
+    """A copy of a study, and a command for whatever may happen to its files."""
+
+    def __init__(self, made: Path, folder: Path) -> None:
+        self.study = Path(shutil.copytree(made, folder / "study"))
+        self.kept = Path(shutil.copy(made / "fingerprints.txt", folder / "kept.txt"))
+        super().__init__(self.study)
+
+    def verify(self, *, kept: bool = False) -> Iterator[str]:
+        """Tell what is found, with fingerprints that were kept elsewhere if that is asked for."""
+        found = verify(self.study, self.kept if kept else None)
+        yield f"{found.sessions} sessions, {found.running} running: {'sound' if found.sound else 'not sound'}"
+        yield from (f"error: {one}" for one in found.errors)
+        yield from (f"warning: {one}" for one in found.warnings)
+
+    def rebuild(self, session: str = P007) -> Iterator[str]:
+        done = rebuild(self.study / session)
+        yield f"rebuilt {[path.name for path in done.rewritten]}, torn {done.torn_bytes}"
+
+    def go_on(self) -> None:
+        check_can_go_on(self.study / P007, Protocol.model_validate(study_tables()), SOURCE)
+
+    def unblind(self) -> Iterator[str]:
+        yield from (f"left: {one}" for one in unblind(self.study, "AB", "done").left)
+
+    def exclude(self, participant: str, trial: int | None = None, reason: str = "the phone rang") -> None:
+        exclude(self.study, participant, 1, trial=trial, by="AB", reason=reason)
+
+    def exclusions(self) -> Iterator[str]:
+        yield from map(str, exclusions(self.study))
+
+    def participants(self) -> Iterator[str]:
+        """Tell rows of the table of participants, written anew."""
+        write_participants(StudyFolder(self.study), "brackish")
+        rows = (self.study / NAMES["PARTICIPANTS"]).read_text("utf-8").splitlines()
+        yield from (row[:40] for row in rows)
+
+    def reveal(self) -> None:
+        blinding.reveal(self.study, "AB", "done")
+
+    def key_is_open(self) -> Iterator[str]:
+        yield str(blinding.revealed_key(self.study) is not None)
+
+    def lines(self, first: int = 0, last: int | None = None, name: str = NAMES["JOURNAL"]) -> None:
+        """Leave lines of a file."""
+        self.write(name, b"".join((self.study / name).read_bytes().splitlines(keepends=True)[first:last]))
+
+    def without_line(self, number: int) -> None:
+        lines = (self.study / NAMES["JOURNAL"]).read_bytes().splitlines(keepends=True)
+        self.write(NAMES["JOURNAL"], b"".join(lines[: number - 1] + lines[number:]))
+
+    def only(self, *names: str) -> None:
+        """Leave the journal, the receipt and these files of the session."""
+        kept = {self.study / name for name in (NAMES["JOURNAL"], NAMES["RECEIPT"])}
+        kept |= {path for name in names for path in (self.study / P007).glob(name)}
+        for path in (self.study / P007).rglob("*"):
+            if path.is_file() and path not in kept:
+                path.unlink()
+
+    def receipt(self, *gone: str, **changes: Any) -> None:
+        """Change fields of the receipt, or take some away."""
+        path = self.study / NAMES["RECEIPT"]
+        held = receipt.read(path) | changes
+        receipt.write(path, {name: value for name, value in held.items() if name not in gone})
+
+    def never_ended(self) -> None:
+        """Take away whatever tells that the session had ended, but for its tables."""
+        self.receipt(status="unfinished", reason="", ended_at=None)
+        self.delete(NAMES["SUMS"], "fingerprints.txt")
+
+    def edit(self, event: str, at: int = 0, /, **fields: Any) -> None:
+        """Change a line of the journal as one who makes all that follows right."""
+
+        def change(lines: Lines) -> None:
+            [line for line in lines if line["event"] == event][at].update(fields)
+
+        forge(self.study / NAMES["JOURNAL"], change)
+
+    def drop(self, event: str, at: int = 0) -> None:
+        def change(lines: Lines) -> None:
+            lines.remove([line for line in lines if line["event"] == event][at])
+
+        forge(self.study / NAMES["JOURNAL"], change)
+
+    def add(self, **fields: Any) -> None:
+        """Add a line to the journal like the last one, but for some fields."""
+        forge(self.study / NAMES["JOURNAL"], lambda lines: lines.append(lines[-1] | fields))
+
+    def half(self) -> None:
+        def change(lines: Lines) -> None:
+            del lines[len(lines) // 2 :]
+
+        forge(self.study / NAMES["JOURNAL"], change)
+
+    def invert(self, *events: str) -> None:
+        """Change every answer in lines of these events."""
+
+        def change(lines: Lines) -> None:
+            for line in (line for line in lines if line["event"] in events):
+                for answer in line.get("items", [line]):
+                    answer["value"] = 8 - answer["value"]
+
+        forge(self.study / NAMES["JOURNAL"], change)
+
+    def unchained(self) -> None:
+        """Make of the journal one of format 1, whose lines do not follow from one another."""
+        forge(self.study / NAMES["JOURNAL"], lambda lines: lines[0].pop("format"), chained=False)
+
+    def late_chain(self) -> None:
+        """Let the chain begin with the second line."""
+        first, second, *rest = (self.study / NAMES["JOURNAL"]).read_bytes().splitlines(keepends=True)
+        line = json.loads(first)
+        for name in ("format", "previous", "measures_sealed"):
+            del line[name]
+        first = json.dumps(line, separators=(",", ":")).encode() + b"\n"
+        told_after = json.loads(second)["previous"].encode()
+        second = second.replace(told_after, hashlib.sha256(first).hexdigest().encode())
+        self.write(NAMES["JOURNAL"], first + second + b"".join(rest))
+
+    def receipt_hash(self) -> None:
+        """Let the journal name the receipt as it is."""
+        self.edit("session_started", receipt_hash=receipt.digest(receipt.read(self.study / NAMES["RECEIPT"])))
+
+    def cover_up(self) -> None:
+        """Compute tables, checksums and fingerprints anew."""
+        cover_up(self.study)
+
+    def elsewhere(self) -> None:
+        """Leave the marker of a program of another machine."""
+        marker = {"host": "elsewhere", "pid": 1, "began": "x"}
+        (self.study / P007 / ".open-0123abcd.json").write_text(json.dumps(marker))
+
+
+def player(made: dict[str, Path], folder: Path) -> Callable[[str, list[str]], Iterator[str]]:
+    """Return what plays transcripts of copies of studies in a folder."""
+
+    def play(start: str, lines: list[str]) -> Iterator[str]:
+        changed: Any = Changed(made[start], folder)
+        for line in lines:
+            yield line
+            name = line.partition("(")[0]
+            try:
+                told = value_of(line, {**NAMES, name: getattr(changed, name)})
+                yield from (f"> {MASK.sub('*', one.replace(str(folder), 'FOLDER'))}" for one in told or ())
+            except StoreError as error:
+                yield f"> refused: {MASK.sub('*', str(error).replace(str(folder), 'FOLDER'))}"
+        for path in folder.iterdir():
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+    return play

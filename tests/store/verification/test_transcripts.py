@@ -1,0 +1,22 @@
+"""What is found of studies that were changed or cut: commands and all that they say, as files that people review."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.golden import compare
+from tests.store.verification.played_studies import STARTS, player
+from tests.transcripts import played
+
+FILES = sorted((Path(__file__).parent / "transcripts").glob("*.txt"))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    return {name: make(tmp_path_factory.mktemp(name) / "study") for name, make in STARTS.items()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_what_is_found(file: Path, made: dict[str, Path], tmp_path: Path, pytestconfig: pytest.Config) -> None:
+    compare(file, played(file, player(made, tmp_path)), pytestconfig)
