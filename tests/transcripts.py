@@ -19,7 +19,7 @@ def played(file: Path, play: Play) -> Iterator[str]:
     for number, part in enumerate(file.read_text(encoding="utf-8").removeprefix("=== ").split("\n=== ")):
         name, start, *lines = part.strip("\n").split("\n")
         yield from ("", f"=== {name}", start) if number else (f"=== {name}", start)
-        yield from play(start.removeprefix("start: "), [line for line in lines if not line.startswith(">")])
+        yield from play(start.removeprefix("start:").strip(), [line for line in lines if not line.startswith(">")])
 
 
 def value_of(line: str, names: Mapping[str, Any]) -> Any:

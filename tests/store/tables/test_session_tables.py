@@ -7,12 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.errors import StoreError
 from study_app.store.journals.journal_events import Event
-from study_app.store.progress import progress_of
-from study_app.store.tables.columns import TABLES, TRIALS
+from study_app.store.tables.columns import TRIALS
 from study_app.store.tables.csv_files import MISSING, Column, csv_bytes, guarded, header, in_columns_of, read_table
-from study_app.store.tables.session_tables import SessionRows, participant
+from study_app.store.tables.session_tables import SessionRows
 from tests.journal_lines import event_of
 
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
@@ -92,100 +90,3 @@ def test_numbers_in_the_columns_of_an_earlier_version_stand_as_they_were_written
     early, kept = in_columns_of(b"time_s\n", now, columns)
     assert (early, kept) == (b"time_s\n16\n16.0\n", columns[:1])
     assert csv_bytes(kept, read_table(early, kept)) == early
-
-
-def test_a_running_trial_has_no_outcome_and_a_left_one_is_interrupted() -> None:
-    script = Script()
-    script.trial(1)
-    assert [row["outcome"] for row in SessionRows(script.lines).trials] == [None]
-    script.trial(1, attempt=2)
-    script.end(1, attempt=2, outcome="timeout")
-    script.trial(2)
-    assert [row["outcome"] for row in SessionRows(script.lines).trials] == ["interrupted", "timeout", None]
-    script.add("session_ended", status="withdrawn", reason="")
-    assert [row["outcome"] for row in SessionRows(script.lines).trials] == ["interrupted", "timeout", "interrupted"]
-
-
-def test_notes_and_marks_stay_with_the_trial_they_were_made_in() -> None:
-    script = Script()
-    script.add("note", kind="note", text="before any trial")
-    script.trial(1)
-    script.add("note", kind="note", text="sneezed, twice")
-    script.end(1)
-    script.add("note", kind="mark", text="")
-    script.add("repeat", trial=1, reason="door")
-    script.trial(1, attempt=2)
-    assert [(row["marked"], row["notes"]) for row in SessionRows(script.lines).trials] == [
-        (True, "sneezed, twice\nrepeated: door"),
-        (False, None),
-    ]
-
-
-@pytest.mark.parametrize(
-    ("measured", "valid"),
-    [
-        ({"lateness_p99_ms": 2.0, "worst_gap_ms": 20.0, "delay_error_p95_ms": 25.0}, True),
-        ({"lateness_p99_ms": 2.1, "worst_gap_ms": 1.0, "delay_error_p95_ms": 1.0}, False),
-        ({"lateness_p99_ms": 0.1, "worst_gap_ms": 20.5, "delay_error_p95_ms": 1.0}, False),
-        ({"lateness_p99_ms": 0.1, "worst_gap_ms": 1.0, "delay_error_p95_ms": -30.0}, False),
-        ({"lateness_p99_ms": 0.1, "worst_gap_ms": 1.0, "delay_error_p95_ms": None}, True),
-        ({"lateness_p99_ms": 0.1, "withheld_share": 0.05}, True),
-        ({"lateness_p99_ms": 0.1, "withheld_share": 0.0501}, False),
-        ({"lateness_p99_ms": 0.1, "withheld_share": None}, True),
-        ({"lateness_p99_ms": 0.1, "targets_reached": 3, "targets": 6}, True),
-        ({"lateness_p99_ms": 0.1, "targets_reached": 2, "targets": 6}, False),
-        ({"targets_reached": 0, "targets": 6}, False),
-        ({"lateness_p99_ms": 0.1, "targets_reached": 9, "targets": None}, True),
-        ({}, None),
-    ],
-)
-def test_a_trial_is_valid_within_the_protocols_limits(measured: dict[str, float], *, valid: bool | None) -> None:
-    limits = {"lateness_ms": 2, "worst_gap_ms": 20, "delay_error_ms": 25, "withheld_percent": 5, "targets_percent": 50}
-    script = Script(limits=limits)
-    script.trial(1)
-    script.end(1, **measured)
-    assert SessionRows(script.lines).trials[0]["valid"] is valid
-    assert participant(script.lines)["validity"] == (None if valid is None else "valid" if valid else "invalid")
-
-
-def test_a_participants_row_counts_main_trials_and_their_last_attempt() -> None:
-    script = Script()
-    script.trial(1, phase="practice")
-    script.end(1)
-    script.answer(1, 1)
-    script.trial(2)
-    script.end(2, outcome="interrupted")
-    script.trial(2, attempt=2)
-    script.end(2, attempt=2)
-    script.answer(2, 7, None, 3, attempt=2)
-    script.trial(3)
-    unfinished = participant(script.lines)
-    assert (unfinished["status"], unfinished["session_ended_at"]) == ("unfinished", None)
-    assert (unfinished["trials"], unfinished["responses"]) == (1, 3)
-    script.add("session_ended", status="withdrawn", reason="tired")
-    ended = participant(script.lines)
-    assert tuple(ended) == header(TABLES["participants"])
-    assert (ended["status"], ended["session_ended_at"]) == ("withdrawn", script.lines[-1].at)
-
-
-def test_the_language_is_the_one_that_was_read_in_last() -> None:
-    script = Script()
-    assert participant(script.lines)["language"] == "en"
-    script.add("language_chosen", language="nl")
-    assert participant(script.lines)["language"] == "nl"
-    script.add("language_chosen", language="de")
-    assert (participant(script.lines)["language"], progress_of(script.lines).language) == ("de", "de")
-
-
-def test_lines_that_make_no_session_are_refused() -> None:
-    script = Script()
-    script.trial(4)
-    head, interval = script.lines, event_of("interval_started", n=3, trial=4, attempt=1, interval=1)
-    for lines, sentence in (
-        ([], "does not begin with session_started"),
-        ([event_of("page_shown", n=1)], "does not begin with session_started"),
-        ([*head, event_of("trial_ended", n=3, trial=9, attempt=1)], "is about trial 9, which never started"),
-        ([*head, interval], "line 3 is an interval of trial 4, which has none"),
-    ):
-        with pytest.raises(StoreError, match=sentence):
-            SessionRows(lines)
