@@ -6,15 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.devices.simulated import ScriptedDevice
 from study_app.haptics.model.layout import STATUS_OK
-from study_app.haptics.runtime.clocks.clock import VirtualClock
-from study_app.haptics.runtime.servo import Servo
 from study_app.session.pages import TroublePage
 from study_app.session.transitions.state import Phase
 from tests.compiled import needs_servo
 from tests.session import small
-from tests.session.runner.test_runner_with_servo import Bench
+from tests.session.runner.bench import Bench, small_bench
 
 pytestmark = needs_servo
 
@@ -23,15 +20,9 @@ SEEN_WITHIN_S = 0.1
 
 
 @pytest.fixture
-def clock() -> VirtualClock:
-    return VirtualClock()
-
-
-@pytest.fixture
-def bench(clock: VirtualClock) -> Iterator[Bench]:
-    device = ScriptedDevice()
-    with device, Servo(device, clock=clock, elements=100) as servo:
-        yield Bench(servo, device)
+def bench() -> Iterator[Bench]:
+    with small_bench() as made:
+        yield made
 
 
 def frames(bench: Bench, ticks: int) -> Any:
@@ -43,15 +34,15 @@ def frames(bench: Bench, ticks: int) -> Any:
     return reader.read()
 
 
-def fail_by_silence(bench: Bench, _clock: VirtualClock) -> None:
+def fail_by_silence(bench: Bench) -> None:
     bench.device.state.last_ns = 1 << 62  # nothing newer than this ever comes
 
 
-def fail_by_loss(bench: Bench, _clock: VirtualClock) -> None:
+def fail_by_loss(bench: Bench) -> None:
     bench.device.unplug()
 
 
-def fail_by_a_force_that_is_no_number(bench: Bench, _clock: VirtualClock) -> None:
+def fail_by_a_force_that_is_no_number(bench: Bench) -> None:
     for model in bench.servo.loop.slots:
         model.liquids.drag.factor_kg_m = np.nan
 
@@ -64,13 +55,12 @@ def fail_by_a_force_that_is_no_number(bench: Bench, _clock: VirtualClock) -> Non
         (fail_by_a_force_that_is_no_number, "non-finite force"),
     ],
 )
-def test_a_servo_that_faults_is_seen_within_100_ms_and_its_trial_is_marked(
-    bench: Bench, clock: VirtualClock, fail: Any, said: str
-) -> None:
+def test_a_servo_that_faults_is_seen_within_100_ms_and_its_trial_is_marked(bench: Bench, fail: Any, said: str) -> None:
+    clock: Any = bench.servo.loop.clock
     frames(bench, 800)
     assert bench.runner.state.phase is Phase.TASK
     trial = bench.runner.state.trial.number
-    fail(bench, clock)
+    fail(bench)
     reader = bench.servo.telemetry.reader()
     noticed_s = None
     for _ in range(10):
@@ -84,7 +74,7 @@ def test_a_servo_that_faults_is_seen_within_100_ms_and_its_trial_is_marked(
     faulted_s = samples.time_ns[samples.status != STATUS_OK][0] * 1e-9
     assert noticed_s is not None
     assert noticed_s - faulted_s <= SEEN_WITHIN_S
-    assert not samples.device_force_n[-1].any()
+    assert not bench.device.state.handle.force_n.any()
     assert isinstance(bench.pages[-1], TroublePage)
     (broke,) = bench.journal.of("broke")
     assert said in broke["what"]
@@ -94,10 +84,8 @@ def test_a_servo_that_faults_is_seen_within_100_ms_and_its_trial_is_marked(
 
 def forces_of_six_seconds(*, frozen: bool) -> Any:
     """Return the forces (n, 3) [N] of one hand, looked at every frame, or not at all for 5 s in the middle."""
-    device = ScriptedDevice()
-    with device, Servo(device, clock=VirtualClock(), elements=100) as servo:
-        bench = Bench(servo, device)
-        reader = servo.telemetry.reader()
+    with small_bench() as bench:
+        servo, reader = bench.servo, bench.servo.telemetry.reader()
         frames(bench, 800)
         if frozen:
             servo.advance(5008)
