@@ -4,12 +4,13 @@ A page is plain Markdown. A comment in it, ``<!-- generated: MODULE:FUNCTION -->
 returns. The pages of a section are those that the section's own page links to in its lists; all others are in ``ELSE``.
 """
 
+import math
 import re
 from functools import cache
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 INDEX: Final = "index"
 ELSE: Final = "do"
@@ -21,6 +22,19 @@ FOLDERS: Final = {"decisions": "look-up"}
 _GENERATED: Final = re.compile(r"<!-- generated: ([\w.]+):(\w+) -->")
 _LISTED: Final = re.compile(r"^- \[[^]]+\]\(([\w/-]+)\.md\)", re.MULTILINE)
 _TITLE: Final = re.compile(r"^# (.+)$", re.MULTILINE)
+
+SYNONYMS: Final = ("glossary", "Words of other programs")
+"""The page and heading of a table: words that no page has to contain, and links to the sections about them."""
+
+_ROW: Final = re.compile(r"^\| (.+?) \|.*\]\(([\w/-]+)\.md(?:#([\w-]+))?\)", re.MULTILINE)
+_MARKS: Final = re.compile(r"[`*\\]|\[([^]]*)\]\([^)]*\)")
+_FENCED_OR_HEADING: Final = re.compile(r"^```.*?^```|^#+ ([^\n]+)$", re.MULTILINE | re.DOTALL)
+_WORD: Final = re.compile(r"\w[\w-]*")
+_ENDING: Final = re.compile(r"(?<=\w{3})(?:ies|ings?|ed|es|s|e|y)$")
+_NO_MATTER: Final = (
+    "a about after an and are at be before by can do does for from have how i if in is it many me my need of on one or "
+    "our should that the their there they this to two was we what when where which who why will with you"
+)
 
 
 def folder() -> Path:
@@ -72,3 +86,72 @@ def sections() -> dict[str, tuple[str, ...]]:
         if name not in placed:
             listed[FOLDERS.get(name.split("/")[0], ELSE)].append(name)
     return {section: tuple(pages) for section, pages in listed.items()}
+
+
+class Section(NamedTuple):
+    """A heading of a page with the text below it; `names` are the title, the heading and its synonyms."""
+
+    page: str
+    heading: str
+    names: str
+    text: str
+
+
+def search(words: str) -> tuple[Section, ...]:
+    """Return the best section of each page that has some of the words, or words that begin alike, the best page first.
+
+    A word counts more the fewer pages have it, and most in a heading. Pages far below the best are left out.
+    """
+    typed = _WORD.findall(words.casefold())
+    stems = [_ENDING.sub("", word) for word in typed if word not in _NO_MATTER.split()] or typed
+    score = dict.fromkeys(_sections(), 0.0)
+    for stem in dict.fromkeys(stems):
+        begins = re.compile(rf"(?<![^\W_]){re.escape(stem)}")
+        weights = {one: 3 * _has(one.names, stem, begins) or _has(one.text, stem, begins) for one in score}
+        pages = {one.page for one, weight in weights.items() if weight}
+        rarity = math.log(1 + len(names()) / max(1, len(pages)))
+        for one, weight in weights.items():
+            score[one] += rarity * (weight or 0.25 * (one.page in pages))
+    best: dict[str, Section] = {}
+    for one in sorted(score, key=lambda one: -score[one]):
+        if score[one] > 0.3 * max(score.values()):
+            best.setdefault(one.page, one)
+    return tuple(best.values())
+
+
+def _has(text: str, stem: str, begins: re.Pattern[str]) -> bool:
+    return stem in text and begins.search(text) is not None  # the first alone takes a tenth of the time
+
+
+def anchor_of(heading: str) -> str:
+    """Return the anchor of a heading as it is shown, as GitHub makes it."""
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
+def plain(text: str) -> str:
+    """Return Markdown without its inline marks and the addresses of links."""
+    return _MARKS.sub(lambda mark: mark[1] or "", text)
+
+
+@cache
+def synonyms() -> tuple[tuple[str, str, str], ...]:
+    """Return page, anchor and words of each row of the glossary's last table."""
+    page_of_table, heading = SYNONYMS
+    _, _, table = source(page_of_table).partition(f"## {heading}\n")
+    return tuple((page, anchor, said) for said, page, anchor in _ROW.findall(table))
+
+
+@cache
+def _sections() -> tuple[Section, ...]:
+    """Return every section of every page, in the order of the book, with the synonyms of the glossary."""
+    made: list[Section] = []
+    for name in (*(page for pages in sections().values() for page in pages), *sections(), INDEX):
+        text, title_of_page = page(name), plain(title(name))
+        headings = [found for found in _FENCED_OR_HEADING.finditer(text) if found[1]]
+        for found, ends in zip(headings, [*(one.start() for one in headings[1:]), len(text)], strict=True):
+            heading = plain(found[1])
+            anchor = "" if heading == title_of_page else anchor_of(heading)
+            also = [said for page_, anchor_, said in synonyms() if (page_, anchor_) == (name, anchor)]
+            shown = " ".join([title_of_page, heading, *also]).casefold()
+            made.append(Section(name, heading, shown, plain(text[found.end() : ends]).casefold()))
+    return tuple(made)

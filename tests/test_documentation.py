@@ -1,5 +1,6 @@
 """The pages: commands exist or run, links lead somewhere, sections hold every page, the website has no warnings."""
 
+import ast
 import importlib.util
 import os
 import re
@@ -147,6 +148,21 @@ def test_the_page_on_installation_has_every_extra_and_none_for_sessions_alone() 
     assert {extra for row in rows for extra in re.findall(r"\w+", row)} == set(extras)
     alone = text.partition("## A computer that only runs sessions")[2]
     assert re.findall(r"pip install (\S+)", alone)[0] == "."
+
+
+def test_packages_and_the_page_on_architecture_name_modules_that_exist() -> None:
+    program = ROOT / "study_app"
+    for package in program.glob("*/__init__.py"):
+        says = ast.get_docstring(ast.parse(package.read_text("utf-8"))) or ""
+        named = re.findall(r"``([a-z]\w*(?:\.\w+)*)``", says)
+        there = [one for one in named if [*package.parent.glob(f"{one.replace('.', '/')}*")]]
+        assert len(there) >= 3, f"{package.parent.name}: which three modules are to be read first?"
+        assert not [one for one in named if "." in one and one not in there], package.parent.name
+    page = documentation.source("architecture")
+    paths = re.findall(r"`((?:\w+/)*\w+\.py)`", page)
+    assert not [one for one in paths if not [*program.rglob(one), *(ROOT / "tests").rglob(one)]]
+    packages = re.findall(r"^\| `(\w+)` \|", page.partition("## Data flow")[0], re.MULTILINE)
+    assert not [one for one in packages if not [*program.glob(f"{one}*")]]
 
 
 def test_generated_parts_are_made_when_a_page_is_read() -> None:

@@ -6,15 +6,20 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
-from study_app.documentation import INDEX, sections, with_generated_parts
+from study_app.documentation import INDEX, sections, synonyms, with_generated_parts
 
 API = "<!-- sphinx: api -->"
 MODULES = ("study_app.api", "study_app.haptics.model.scene", "study_app.devices.base", "study_app.devices.descriptor")
 
 
 def complete(_app: Sphinx, name: str, text: list[str]) -> None:
-    """Put generated parts into a page, and below a page that lists others their table of contents."""
+    """Put generated parts into a page, its synonyms into the index, below a page that lists others their contents."""
     text[0] = with_generated_parts(text[0]).replace(API, _api())
+    words = [word for page, _anchor, said in synonyms() if page == name for word in said.split(", ")]
+    if words:
+        heading, _, rest = text[0].partition("\n")
+        entries = "".join(f"   single: {word}\n" for word in words)
+        text[0] = f"{heading}\n\n```{{eval-rst}}\n.. index::\n{entries}```\n{rest}"
     contents = sections()
     below = tuple(contents) if name == INDEX else contents.get(name, ())
     if below:

@@ -1,4 +1,4 @@
-"""Numbers of the documentation that are older than the code that they measure are found by the dates of both."""
+"""Measured numbers of the documentation have a day; those older than the code are found by the dates of both."""
 
 import os
 import subprocess
@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.benchmarks.project.old_numbers import old_numbers
+from tests.benchmarks.project.old_numbers import last_change, measured, version
+from tests.documented import ROOT
 
 pytestmark = pytest.mark.slow
 
@@ -31,8 +32,12 @@ PAGE = """# Page
 """
 
 
-def test_sections_older_than_their_code_and_without_a_date_are_listed(tmp_path: Path) -> None:
+CHANGELOG = "## [Unreleased]\n\n## [0.3.0] - 2026-11-23\n\n## [0.2.0] - 2026-11-21\n"
+
+
+def test_sections_older_than_their_code_and_without_a_date_are_told_apart(tmp_path: Path) -> None:
     files = {
+        "CHANGELOG.md": CHANGELOG,
         "docs/page.md": PAGE,
         "study_app/haptics/tick.py": "",
         "study_app/store/folders.py": "",
@@ -45,8 +50,13 @@ def test_sections_older_than_their_code_and_without_a_date_are_listed(tmp_path: 
     me = ("-c", "user.name=x", "-c", "user.email=x@example.org")
     for words in (("init", "-q"), ("add", "."), (*me, "commit", "-qm", "x")):
         subprocess.run(["git", *words], cwd=tmp_path, env=os.environ | when, check=True)
-    day = date(2026, 11, 24)
-    assert list(old_numbers(tmp_path)) == [
-        ("docs/page.md", "Old", "stability", date(2026, 11, 22), day),
-        ("docs/page.md", "Without a date", "tests/benchmarks/x.py", None, day),
-    ]
+    old, new, without = measured(tmp_path)
+    assert (old.section, old.command, old.day) == ("Old", "stability", date(2026, 11, 22))
+    assert (new.section, new.day) == ("New", date(2026, 11, 25))
+    assert (without.section, without.command, without.day) == ("Without a date", "tests/benchmarks/x.py", None)
+    assert old.day < last_change(tmp_path, old.code) == last_change(tmp_path, without.code) == date(2026, 11, 24)
+    assert [version(tmp_path, date(2026, 11, day)) for day in (22, 23)] == ["0.2.0", "0.3.0"]
+
+
+def test_every_measured_number_of_the_pages_has_a_day() -> None:
+    assert not [row[:3] for row in measured(ROOT) if row.day is None]

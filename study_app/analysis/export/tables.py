@@ -16,26 +16,12 @@ from study_app.analysis.data.blocks import Block, Item, PlacedQuestion, PlacedSc
 from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.data.questions import scored
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.levels.columns import OF_TRACKS, RESULTS
+from study_app.analysis.levels.columns import ACHIEVED, JUDGED, OF_TRACKS, OPENED, RESULTS
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS, tracks
-from study_app.store.tables.columns import INTERVALS, PARTICIPANTS, RESPONSES, TRIALS_2, tables_of
+from study_app.store.tables.columns import INTERVALS, RESPONSES, TRIALS_2, tables_of
 from study_app.store.tables.csv_files import Column, Kind, header, optional, unsealed
-
-_STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
-
-JUDGED: Final = (
-    Column("session_status", "text", "How the row's session ended.", levels=_STATUS.levels),
-    Column("excluded", "flag", "true where exclusions.csv leaves out the row's session or trial."),
-    optional("exclusion_reason", "text", "Why it is left out."),
-    Column(
-        "counted",
-        "flag",
-        "true where the row is in the aggregate and the figures: main trial, completed session, last attempt, not "
-        "excluded.",
-    ),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,14 +104,6 @@ OF_A_FORM: Final = Setting("")
 
 _BY_NAME: Final = {column.name: column for column in (*TRIALS_2, *RESPONSES)}
 
-OPENED: Final = (
-    Column("condition", "text", "Id of the condition that the code stands for."),
-    Column("liquid", "text", "Id of the liquid that was presented."),
-    Column("delay_ms", "number", "Requested visual delay.", "ms", minimum=0),
-)
-ACHIEVED: Final = optional(
-    "delay_achieved_ms", "number", "Visual delay that was achieved: asked for, plus the trial's mean error.", "ms"
-)
 _QUARTILE: Final = f"quartiles {QUARTILES}"
 MEASURED: Final = (
     Column("item", "text", "Id of the statement; its words are in the codebook."),

@@ -1,4 +1,4 @@
-"""The exported tables of blocks of levels: what a row is, and the columns of each.
+"""What an export adds to the recorded tables, and its tables of blocks of levels: what a row is, and the columns.
 
 Statistics name their table; rows, formats, codebook and data dictionary follow from the columns. Help reads them
 without the libraries of the analysis, which may not be installed.
@@ -8,8 +8,31 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 from study_app.store.tables.column_dictionary import table_markdown
-from study_app.store.tables.columns import INTERVALS
+from study_app.store.tables.columns import INTERVALS, PARTICIPANTS
 from study_app.store.tables.csv_files import Column, optional
+
+_STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
+
+JUDGED: Final = (
+    Column("session_status", "text", "How the row's session ended.", levels=_STATUS.levels),
+    Column("excluded", "flag", "true where exclusions.csv leaves out the row's session or trial."),
+    optional("exclusion_reason", "text", "Why it is left out."),
+    Column(
+        "counted",
+        "flag",
+        "true where the row is in the aggregate and the figures: main trial, completed session, last attempt, not "
+        "excluded; valid or not.",
+    ),
+)
+
+OPENED: Final = (
+    Column("condition", "text", "Id of the condition that the code stands for."),
+    Column("liquid", "text", "Id of the liquid that was presented."),
+    Column("delay_ms", "number", "Requested visual delay.", "ms", minimum=0),
+)
+ACHIEVED: Final = optional(
+    "delay_achieved_ms", "number", "Visual delay that was achieved: asked for, plus the trial's mean error.", "ms"
+)
 
 _INTERVALS: Final = {column.name: column for column in INTERVALS}
 _BLOCK: Final = Column("block", "text", "Id of the block.")
@@ -188,8 +211,15 @@ RESULTS: Final = {
 
 def dictionary_markdown() -> str:
     """Return the columns of these tables as Markdown: a heading and a table for each."""
+    added = "what `export` adds to responses, trials and intervals; the last four after unblinding"
     of_tracks = "one row per trial with a design, after unblinding; what it has in addition to the columns of trials"
+    tables = {"tracks": Results(of_tracks, OF_TRACKS), **RESULTS}
     return "\n".join(
-        table_markdown(name.capitalize(), f"study-…_description-{name}_data.csv", row, columns)
-        for name, (row, columns) in {"tracks": Results(of_tracks, OF_TRACKS), **RESULTS}.items()
+        (
+            table_markdown("Added by an export", "*_data.csv", added, (*JUDGED, *OPENED, ACHIEVED)),
+            *(
+                table_markdown(name.capitalize(), f"study-…_description-{name}_data.csv", row, columns)
+                for name, (row, columns) in tables.items()
+            ),
+        )
     )

@@ -31,6 +31,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, QTextBrowser
 
 from study_app import documentation
+from study_app.documentation import anchor_of, plain
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Coloured
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
@@ -53,17 +54,16 @@ PAGES_OF_PLACES: Final = {
 _COMMENT: Final = re.compile(r"<!--.*?-->\n*", re.DOTALL)
 _HTML_IMAGE: Final = re.compile(r'<img src="([^"]+)"[^>]*alt="([^"]*)"[^>]*>')
 _EMPTY_CELL: Final = re.compile(r"(?<=\|) *(?=\|)")
-_HEADING: Final = re.compile(r"^#+ (.+)$", re.MULTILINE)
-_INLINE_MARKS: Final = re.compile(r"[`*\\]|\[([^]]*)\]\([^)]*\)")
 
 
 @dataclass(frozen=True, slots=True)
 class HelpEntry:
-    """One row of the list of pages: its page, its title, and whether it heads a section."""
+    """One row of the list of pages: its page, its title, whether it heads a section, and where it is opened."""
 
     page: str
     title: str
     heads: bool = False
+    anchor: str = ""
 
 
 @cache
@@ -71,31 +71,20 @@ def entries() -> tuple[HelpEntry, ...]:
     """Return the pages in the order of the sections, each section after its own page."""
     rows = [HelpEntry(FIRST_PAGE, "Start page", heads=True)]
     for section, pages in documentation.sections().items():
-        rows.append(HelpEntry(section, _plain(documentation.title(section)), heads=True))
-        rows += [HelpEntry(page, _plain(documentation.title(page))) for page in pages]
+        rows.append(HelpEntry(section, plain(documentation.title(section)), heads=True))
+        rows += [HelpEntry(page, plain(documentation.title(page))) for page in pages]
     return tuple(rows)
 
 
 def found(words: str) -> tuple[HelpEntry, ...]:
-    """Return the pages that contain all words, those with them in title and headings first; all pages for no words."""
-    wanted = words.casefold().split()
-    if not wanted:
+    """Return the pages that have the words, the best first, each at its best heading; all pages for no words."""
+    if not words.strip():
         return entries()
-    pages = [entry for entry in entries() if all(word in _searched(entry.page) for word in wanted)]
-    pages.sort(key=lambda entry: (*_missing(wanted, entry), entry.heads))
-    return tuple(HelpEntry(entry.page, entry.title) for entry in pages)
-
-
-def _missing(wanted: list[str], entry: HelpEntry) -> tuple[int, int]:
-    """Return how many words a page's title lacks, and how many the best of its headings."""
-    headings = [entry.title, *_HEADING.findall(documentation.source(entry.page))]
-    lacking = [sum(word not in heading.casefold() for word in wanted) for heading in headings]
-    return lacking[0], min(lacking)
-
-
-@cache
-def _searched(page: str) -> str:
-    return documentation.page(page).casefold()
+    titles = {entry.page: entry.title for entry in entries()}
+    return tuple(
+        HelpEntry(one.page, titles[one.page], anchor="" if one.heading == titles[one.page] else anchor_of(one.heading))
+        for one in documentation.search(words)
+    )
 
 
 @cache
@@ -105,15 +94,6 @@ def text_of(page: str) -> str:
     return "\n".join(
         _EMPTY_CELL.sub("\N{NO-BREAK SPACE}", line) if line.startswith("|") else line for line in text.split("\n")
     )
-
-
-def anchor_of(heading: str) -> str:
-    """Return the anchor of a heading as it is shown, as GitHub makes it."""
-    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
-
-
-def _plain(title: str) -> str:
-    return _INLINE_MARKS.sub(lambda mark: mark[1] or "", title)
 
 
 ENDING = ".md"
@@ -287,7 +267,7 @@ class PageReader(Coloured, QTextBrowser):
 
 
 LIST_WIDTH, ROW_PX, HEAD_PX = 280, 30, 40
-PAGE = Qt.ItemDataRole.UserRole
+PAGE, ANCHOR = Qt.ItemDataRole.UserRole, Qt.ItemDataRole.UserRole + 1
 MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 ENTERS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
@@ -307,7 +287,7 @@ class HelpPlace(Place):
         self.list.setProperty("role", "links")
         self.list.setFrameShape(QFrame.Shape.NoFrame)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.nothing = label("No page contains all of these words.", "label", "text2", wraps=True)
+        self.nothing = label("No page has these words.", "label", "text2", wraps=True)
         self.reader = PageReader(documentation.folder() if folder is None else folder)
         self.back = ActionButton("chevron_left", "Back", height=38)
         self.back.setEnabled(False)
@@ -377,6 +357,7 @@ class HelpPlace(Place):
         for row in rows:
             item = QListWidgetItem(row.title)
             item.setData(PAGE, row.page)
+            item.setData(ANCHOR, row.anchor)
             item.setToolTip(row.title)
             item.setFont(font("label", weight=600 if row.heads else 400))
             item.setSizeHint(QSize(LIST_WIDTH - 60, HEAD_PX if row.heads else ROW_PX))
@@ -395,7 +376,7 @@ class HelpPlace(Place):
 
     def _chosen(self, item: QListWidgetItem | None) -> None:
         if item is not None:
-            self.open_page(item.data(PAGE))
+            self.open_page(item.data(PAGE), item.data(ANCHOR))
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Let arrows in the search field act on the list; the first one, and Enter, open its first page."""

@@ -1,8 +1,9 @@
-"""Print measured numbers of the documentation that are older than the code they measure.
+"""Print measured numbers of the documentation that have no date, or are older than the code they measure.
 
 A section of a page measures if it names a command of `MEASURES`, or a benchmark, which measures what it imports. Its
 numbers are as old as the latest date in the section; without one, as the date that docs/validation.md gives for the
-command. Code is as old as its last commit. Run in a clone: ``python tests/benchmarks/project/old_numbers.py``.
+command. Code is as old as its last commit; the version of a number is the last one in CHANGELOG.md on its day. Run in a
+clone: ``python tests/benchmarks/project/old_numbers.py``; exit code 3: there is a number without a date.
 """
 
 import re
@@ -15,6 +16,7 @@ from typing import Final, NamedTuple
 
 MODEL: Final = ("study_app/haptics",)
 ANSWERS: Final = ("study_app/psychophysics", "study_app/protocol/simulated.py")
+STABILITY: Final = (*MODEL, "study_app/evidence/stability")
 MEASURES: Final = {
     "accuracy": (*MODEL, "study_app/evidence/accuracy"),
     "cfd": ("study_app/evidence/cfd", "study_app/haptics/kernels/effects"),
@@ -23,7 +25,8 @@ MEASURES: Final = {
     "power": (*ANSWERS, "study_app/analysis/planning"),
     "scene": MODEL,
     "soak": (*MODEL, "study_app/evidence/soak"),
-    "stability": (*MODEL, "study_app/evidence/stability"),
+    "stability": STABILITY,
+    **{f"stability --{part}": STABILITY for part in ("delayed", "delivered", "estimation", "velocity", "withheld")},
     "timing --lsl": ("study_app/outlets", "study_app/evidence/outlets"),
     "timing --triggers": ("study_app/outlets", "study_app/evidence/outlets"),
     "timing": ("study_app/haptics/runtime", "study_app/gui/participant", "study_app/evidence/timing"),
@@ -33,24 +36,25 @@ MEASURES: Final = {
 """What a command measures; of two that fit, the longer one counts."""
 
 _COMMAND: Final = re.compile(r"\bliquid-study ([a-z][\w -]*)|\b(tests[/.]benchmarks[\w/.]+)")
+_RELEASE: Final = re.compile(r"^## \[([\d.]+)\] - (\S+)$", re.MULTILINE)
 _DATE: Final = re.compile(r"\b(\d{1,2} [A-Z][a-z]+ \d{4}|\d{4}-\d\d-\d\d)\b")
 _CODE: Final = re.compile(r"```.*?^```|`[^`\n]*`|\]\([^)]*\)", re.MULTILINE | re.DOTALL)
 _SECTION: Final = re.compile(r"^(?=#{1,4} )", re.MULTILINE)
 
 
-class OldNumber(NamedTuple):
-    """A section whose numbers are older than the code of its command, or have no date."""
+class Measured(NamedTuple):
+    """A section with measured numbers: the command that it names, the code of that, and the day of the measurement."""
 
     page: str
     section: str
     command: str
-    measured: date | None
-    changed: date
+    code: tuple[str, ...]
+    day: date | None
 
 
 def dates(text: str) -> Iterator[date]:
     """Yield the dates in a text: 22 November 2026, 2026-11-22."""
-    for words in _DATE.findall(text):
+    for words in _DATE.findall(" ".join(text.split())):
         try:
             yield datetime.strptime(words, "%Y-%m-%d" if words[4] == "-" else "%d %B %Y").date()
         except ValueError:
@@ -76,14 +80,8 @@ def _imported(top: Path, script: Path) -> Iterator[str]:
         yield f"{path}.py" if (top / f"{path}.py").is_file() else path
 
 
-def last_change(top: Path, paths: tuple[str, ...]) -> date:
-    """Return the day of the last commit to any of the paths."""
-    words = ["git", "-C", str(top), "log", "-1", "--format=%cs", "--", *paths]
-    return date.fromisoformat(subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip())
-
-
-def old_numbers(top: Path) -> Iterator[OldNumber]:
-    """Yield the sections of the pages in a clone whose numbers are older than what they measure, or have no date."""
+def measured(top: Path) -> Iterator[Measured]:
+    """Yield the sections of the pages in a clone that name a measuring command and have numbers."""
     pages = {path: path.read_text(encoding="utf-8") for path in sorted((top / "docs").rglob("*.md"))}
     runs: dict[str, date] = {}
     for line in pages.get(top / "docs" / "validation.md", "").splitlines():
@@ -93,15 +91,32 @@ def old_numbers(top: Path) -> Iterator[OldNumber]:
             heading, _, body = section.partition("\n")
             if not re.search(r"\d", _CODE.sub("", body)) or "decisions" in path.parts or path.stem == "validation":
                 continue
-            for name, measured in commands(body, top).items():
-                run = max(dates(body), default=runs.get(name))
-                changed = last_change(top, measured)
-                if run is None or run < changed:
-                    yield OldNumber(path.relative_to(top).as_posix(), heading.strip("# "), name, run, changed)
+            for name, code in commands(body, top).items():
+                day = max(dates(body), default=runs.get(name))
+                yield Measured(path.relative_to(top).as_posix(), heading.strip("# "), name, code, day)
+
+
+def last_change(top: Path, paths: tuple[str, ...]) -> date:
+    """Return the day of the last commit to any of the paths."""
+    words = ["git", "-C", str(top), "log", "-1", "--format=%cs", "--", *paths]
+    return date.fromisoformat(subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip())
+
+
+def version(top: Path, day: date) -> str:
+    """Return the last version of a clone's changelog that is not younger than a day."""
+    released = _RELEASE.findall((top / "CHANGELOG.md").read_text(encoding="utf-8"))
+    return next((name for name, when in released if date.fromisoformat(when) <= day), "?")
 
 
 if __name__ == "__main__":
-    rows = list(old_numbers(Path.cwd()))
-    for row in rows:
-        print(f"{row.page} | {row.section} | {row.command} | measured {row.measured or '?'} | changed {row.changed}")
-    print(f"{len(rows)} sections have numbers that are older than their code, or without a date", file=sys.stderr)
+    here, undated, older = Path.cwd(), 0, 0
+    for row in measured(here):
+        place = " | ".join(row[:3])
+        if row.day is None:
+            undated += 1
+            print(f"{place} | no date")
+        elif row.day < (changed := last_change(here, row.code)):
+            older += 1
+            print(f"{place} | measured {row.day} ({version(here, row.day)}) | changed {changed}")
+    print(f"{older} sections state a day before the last change of what they measure; {undated} state none")
+    sys.exit(3 if undated else 0)

@@ -2,6 +2,8 @@
 
 import re
 
+import pytest
+
 from study_app import documentation
 from study_app.gui.help.view import anchor_of, entries, found, text_of
 
@@ -14,14 +16,58 @@ def test_every_page_is_listed_once_below_the_heading_of_its_section() -> None:
     assert names.index("begin") < names.index("first-session") < names.index("do")
 
 
-def test_a_search_finds_pages_with_all_words_and_titles_first() -> None:
+ASKED = [
+    # A researcher, before the first participant
+    ("How many people do I need?", "sample size", "power", "`power` simulates whole studies"),
+    ("A staircase, or always the same levels?", "staircase or constant", "methods", "**`updown`**: one step down"),
+    ("Can a person come on two days?", "second visit another day", "groups", "`sequences` those of session 1, 2"),
+    ("Which of three is different: how?", "3AFC odd one out", "trials", "the odd or repeated interval"),
+    ("How right is the force?", "how accurate is the force", "accuracy", "is within 3 %"),
+    # A researcher, after five participants
+    ("A word in a question is wrong.", "typo after five participants", "designer", "proposes the next version"),
+    ("There is a new version: take it?", "update in the middle of a study", "year", "Do not update if you can stay."),
+    # An assistant, with a participant in the room
+    (
+        "The tank is on my screen, not on theirs.",
+        "window on the wrong monitor",
+        "this-machine",
+        "the participant's screen",
+    ),
+    ("I typed P12 instead of P21.", "wrong participant number", "run-a-session", "A wrong participant ID"),
+    ("She has to go to the toilet.", "participant needs a break", "run-a-session", "P pauses"),
+    ("The power failed.", "power cut during a trial", "run-a-session", "No answer is lost."),
+    # An analyst, with a folder of results
+    ("Where are reaction times?", "reaction time", "level-results", "time to answer"),
+    ("How do I read recordings?", "open recordings in matlab", "export", "`parquetread` in MATLAB"),
+    ("Are p-values corrected?", "multiple comparisons", "statistics", "Holm over the statements"),
+    (
+        "Do trials with valid = false count?",
+        "invalid trials counted",
+        "valid-trials",
+        "count whether it is valid or not",
+    ),
+    ("How late was everything together?", "total latency", "photodiode", "From a motion of the hand to the screen"),
+]
+"""What new readers asked, the words that they typed into the search, the page, and what answers them there."""
+
+
+@pytest.mark.parametrize(("words", "page", "answer"), [asked[1:] for asked in ASKED], ids=[asked[0] for asked in ASKED])
+def test_the_words_of_a_reader_find_the_page_with_the_answer_first(words: str, page: str, answer: str) -> None:
+    assert found(words)[0].page == page
+    assert answer in " ".join(documentation.page(page).split())
+
+
+def test_a_search_finds_words_that_begin_alike_the_best_page_first_at_its_heading() -> None:
     assert found("") == entries()
-    pages = [row.page for row in found("photodiode")]
+    pages = [row.page for row in found("photodiodes zebra")]
     assert pages[0] == "photodiode"
     assert "timing" in pages
-    assert found("photodiode zebra") == ()
+    assert found("zebra") == ()
     assert not any(row.heads for row in found("photodiode"))
-    assert next(row.page for row in found("new version")) == "year"  # its heading has both words
+    assert (found("new versions")[0].page, found("new versions")[0].anchor) == (
+        "year",
+        "a-new-version-in-the-middle-of-a-study",
+    )
     assert next(row.page for row in found("spss")) == "export"  # a list of pages comes after them
 
 
