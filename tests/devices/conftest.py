@@ -20,7 +20,7 @@ def falcon_socket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[N
     """Install the Falcon behind a socket as another package's device, for this and for other processes."""
     site = tmp_path / "packages"
     site.mkdir()
-    points = {"falcon-socket": "tests.devices.falcon.served.device:FALCON_SOCKET"}
+    points = {"falcon-socket": "tests.devices.falcon.served_device:FALCON_SOCKET"}
     install(site, "liquid_study_socket", "device", points)
     monkeypatch.syspath_prepend(site)
     paths = (str(site), str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH"))

@@ -409,12 +409,13 @@ def _served_falcon(
     tmp_path: Path, request: pytest.FixtureRequest
 ) -> Iterator[tuple[str, dict[str, str], Callable[[], Any]]]:
     from study_app.devices.emulators.falcon_emulator import Emulator
-    from tests.devices.falcon.served.server import EmulatorServer
+    from tests.devices.falcon.served import Server
 
     request.getfixturevalue("falcon_socket")
-    with EmulatorServer(Emulator(running=True), tmp_path / "falcon") as server:
-        yield f"falcon-socket:{server.path}", {}, lambda: server.emulator.force_n
-        assert server.emulator.homed == 0b111
+    emulator = Emulator(running=True)
+    with Server(tmp_path / "falcon", emulator) as server:
+        yield f"falcon-socket:{server.path}", {}, lambda: emulator.force_n
+        assert emulator.homed == 0b111
 
 
 @contextmanager

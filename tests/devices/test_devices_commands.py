@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from contextlib import nullcontext
 
 import click
 import numba
@@ -101,25 +100,6 @@ class TestDoctor:
         assert words in str(refused.exception)
 
 
-@pytest.mark.usefixtures("falcon_socket")
-@pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")
-@pytest.mark.parametrize(
-    ("fault", "words"),
-    [("busy", "cause: another program uses it"), ("gone", "cause: none is connected"), (None, "seen: opened")],
-)
-def test_a_falcon_behind_a_socket_is_examined(tmp_path, fault, words):
-    from tests.devices.falcon.served.server import EmulatorServer
-
-    emulator, path = Emulator(running=True), tmp_path / "falcon"
-    if fault == "busy":
-        emulator.take(fault)
-    with EmulatorServer(emulator, path) if fault != "gone" else nullcontext():
-        told = liquid_study("doctor", "--device", f"falcon-socket:{path}")
-    assert words in told.output
-    assert fault is None or told.exit_code == 3
-    assert fault is not None or emulator.homed == 0b111  # how fast replies come is this machine's affair
-
-
 class TestTheTerminal:
     @pytest.fixture
     def pipe(self):
@@ -163,10 +143,10 @@ class TestCalibrate:
     @pytest.mark.usefixtures("falcon_socket")
     @pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")
     def test_an_operator_who_goes_away_ends_it_without_torque(self, tmp_path):
-        from tests.devices.falcon.served.server import EmulatorServer
+        from tests.devices.falcon.served import Server
 
         emulator = Emulator(running=True)
-        with EmulatorServer(emulator, tmp_path / "falcon"):
+        with Server(tmp_path / "falcon", emulator):
             words = ["devices", "calibrate", "--device", f"falcon-socket:{tmp_path / 'falcon'}", "--grams", "400"]
             command = [sys.executable, "-m", "study_app", *words]
             ended = subprocess.run(command, input="", capture_output=True, text=True, check=False)

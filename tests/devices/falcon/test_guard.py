@@ -14,20 +14,19 @@ from study_app.devices.falcon.constants import FLAG_HOMING, quiet_packet
 from study_app.devices.falcon.transport import PACKETS, quiet
 from study_app.devices.guard import PATIENCE_S, watch
 from study_app.errors import DeviceError
-from tests.devices.falcon.served.bridge import DESCRIPTOR, SocketTransport
-from tests.devices.falcon.support.bridges import Server
+from tests.devices.falcon.served import ServedTransport, Server
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("falcon_socket")]
 
-ENDS_TORQUE = "tests.devices.falcon.served.bridge:end_torque"
+ENDS_TORQUE = "tests.devices.falcon.served:end_torque"
 QUIET = [quiet_packet(FLAG_HOMING)] * PACKETS
 PUSHING = b"<PPPAPPPAPPPABA>"  # 4095 on every motor, homing on
 
 PROGRAM = """
 import os, signal, sys
-from tests.devices.falcon.served.bridge import SocketTransport
+from tests.devices.falcon.served import ServedTransport
 from study_app.devices.guard import Guard
-transport = SocketTransport(sys.argv[1])
+transport = ServedTransport(sys.argv[1])
 guard = Guard("falcon", {ends_torque!r}, sys.argv[1])
 {guarded}
 transport.write({packet!r}, 1.0)
@@ -39,7 +38,6 @@ print("pushing", flush=True)
 @pytest.fixture
 def server(tmp_path):
     with Server(tmp_path / "falcon") as server:
-        server.bridge = str(tmp_path / "falcon")
         yield server
 
 
@@ -67,18 +65,18 @@ def guard_for(bridge):
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGABRT])
 def test_a_program_that_is_killed_leaves_no_torque(server, how):
-    running = program(server.bridge)
-    assert server.sent() == [PUSHING]
+    running = program(server.path)
+    assert server.bridge.sent == [PUSHING]
     running.send_signal(how)
     assert ended(running) == -how
     server.wait_for(1 + PACKETS)
-    assert server.sent() == [PUSHING, *QUIET]
-    assert server.controls() == []  # the bridge stays as it was
+    assert server.bridge.sent == [PUSHING, *QUIET]
+    assert server.bridge.controls == []  # the bridge stays as it was
 
 
 @pytest.mark.parametrize("how", [signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU])
 def test_a_program_that_is_guarded_is_not_suspended_while_it_pushes(server, how):
-    running = program(server.bridge, "sys.stdin.readline(); os.kill(os.getpid(), signal.SIGKILL)")
+    running = program(server.path, "sys.stdin.readline(); os.kill(os.getpid(), signal.SIGKILL)")
     running.send_signal(how)
     running.stdin.write(b"\n")
     running.stdin.flush()
@@ -86,46 +84,34 @@ def test_a_program_that_is_guarded_is_not_suspended_while_it_pushes(server, how)
     running.kill()
     ended(running)
     server.wait_for(1 + PACKETS)
-    assert server.sent() == [PUSHING, *QUIET]
+    assert server.bridge.sent == [PUSHING, *QUIET]
 
 
 @pytest.mark.parametrize(
     ("then", "code"), [("sys.exit(3)", 3), ("import os; os._exit(7)", 7), ("raise SystemError", 1)]
 )
 def test_a_program_that_ends_without_a_word_leaves_no_torque(server, then, code, capfd):
-    running = program(server.bridge, then)
+    running = program(server.path, then)
     assert ended(running) == code
     server.wait_for(1 + PACKETS)
-    assert server.sent() == [PUSHING, *QUIET]
+    assert server.bridge.sent == [PUSHING, *QUIET]
     capfd.readouterr()
 
 
 def test_a_program_that_says_the_word_has_done_it_itself(server):
-    running = program(server.bridge, "transport.close(); guard.stand_down()")
+    running = program(server.path, "transport.close(); guard.stand_down()")
     assert ended(running) == 0
-    assert server.sent() == [PUSHING]
-    assert len(server.requests) == 2  # nobody else opened it
+    assert server.bridge.sent == [PUSHING]
+    assert server.programs == 1  # nobody else opened it
 
 
 def test_the_guard_waits_until_the_falcon_is_let_go(server):
-    answer, busy = server.answer, 5
-
-    def answer_busy(kind):
-        nonlocal busy
-        if kind == DESCRIPTOR and busy > 0:
-            busy -= 1
-            server.answers[DESCRIPTOR], kept = (-6, b""), server.answers[DESCRIPTOR]
-            said = answer(kind)
-            server.answers[DESCRIPTOR] = kept
-            return said
-        return answer(kind)
-
-    guard = guard_for(server.bridge)
+    guard = guard_for(server.path)
     guard.start()
-    server.answer = answer_busy
+    server.refusals = 5
     guard.release()
-    assert server.sent() == QUIET
-    assert [request[0] for request in server.requests].count(DESCRIPTOR) == 6
+    assert server.bridge.sent == QUIET
+    assert (server.refusals, server.programs) == (0, 1)
 
 
 def test_a_guard_that_is_left_behind_waits_for_the_falcon_to_come_back(tmp_path):
@@ -136,7 +122,7 @@ def test_a_guard_that_is_left_behind_waits_for_the_falcon_to_come_back(tmp_path)
     guard.leave()
     with Server(tmp_path / "falcon") as server:
         server.wait_for(PACKETS)
-        assert server.sent() == QUIET
+        assert server.bridge.sent == QUIET
 
 
 def test_a_guard_that_was_left_behind_is_recalled_when_the_falcon_is_opened_again(tmp_path, capfd):
@@ -151,7 +137,7 @@ def test_a_guard_that_was_left_behind_is_recalled_when_the_falcon_is_opened_agai
 
 
 def test_what_ends_a_program_does_not_end_its_guard(server):
-    guard = guard_for(server.bridge)
+    guard = guard_for(server.path)
     guard.start()
     child = guard.child
     assert os.getsid(child.pid) != os.getsid(0)
@@ -159,11 +145,11 @@ def test_what_ends_a_program_does_not_end_its_guard(server):
         child.send_signal(number)
     guard.release()
     assert child.returncode == 0
-    assert server.sent() == QUIET
+    assert server.bridge.sent == QUIET
 
 
 def test_a_guard_stands_down_at_a_good_end(server):
-    with guard_for(server.bridge) as guard:
+    with guard_for(server.path) as guard:
         assert guard.watching
         child = guard.child
         guard.start()
@@ -172,31 +158,31 @@ def test_a_guard_stands_down_at_a_good_end(server):
     assert child.returncode == 0
     guard.stand_down()
     guard.release()
-    assert server.requests == []
+    assert server.programs == 0
 
 
 def test_a_guard_acts_at_a_bad_end(server):
-    transport = SocketTransport(server.bridge)
+    transport = ServedTransport(server.path)
 
     def fail():
-        with guard_for(server.bridge):
+        with guard_for(server.path):
             transport.close()
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         fail()
-    assert server.sent() == QUIET
+    assert server.bridge.sent == QUIET
 
 
 def test_a_guard_that_died_is_not_watching_and_ends_all_the_same(server):
-    guard = guard_for(server.bridge)
+    guard = guard_for(server.path)
     guard.start()
     child = guard.child
     child.kill()
     child.wait()
     assert not guard.watching
     guard.stand_down()
-    assert server.requests == []
+    assert server.programs == 0
 
 
 def test_without_a_guard_there_is_no_force(monkeypatch):

@@ -1,9 +1,6 @@
-"""Bridges made up for tests: a pyusb backend, a server of the socket's framing, and FTDI's library, each scripted."""
+"""Bridges made up for tests: a pyusb backend and FTDI's library, each scripted."""
 
 import ctypes
-import socket
-import threading
-from contextlib import suppress
 from types import SimpleNamespace
 
 import numba
@@ -14,7 +11,6 @@ import usb.core
 from study_app.devices.emulators.falcon import EmulatedBackend
 from study_app.devices.falcon import constants
 from study_app.devices.falcon.failures import usb_failure
-from tests.devices.falcon.served.bridge import ANSWER, BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR, IDENTITY, REQUEST
 
 
 class Backend(EmulatedBackend):
@@ -93,81 +89,6 @@ class Backend(EmulatedBackend):
         data = self.incoming.pop(0)[: len(buff)]
         buff[: len(data)] = type(buff)("B", data)
         return len(data)
-
-
-class Server(threading.Thread):
-    """A server of the socket's framing, for one client after another.
-
-    ``answers`` maps a kind of request to its answer, (code, bytes); bulk in takes from ``incoming``. Every request is
-    kept in ``requests`` as (kind, at, value, length, timeout_ms, data), and its bytes in ``heard``.
-    """
-
-    def __init__(self, path, *, serial="FALC0001", product=constants.PRODUCT_ID):
-        super().__init__(daemon=True)
-        self.requests, self.heard = [], []
-        self.news = threading.Condition()
-        self.answers = {DESCRIPTOR: (0, IDENTITY.pack(constants.VENDOR_ID, product) + serial.encode())}
-        self.incoming = []
-        self.hang_up_at = None  # a kind of request upon which the server goes, in the middle of its answer
-        self._client = None
-        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._listener.bind(str(path))
-        self._listener.listen()
-
-    def __enter__(self):
-        self.start()
-        return self
-
-    def __exit__(self, *_):
-        self._listener.shutdown(socket.SHUT_RDWR)
-        self._listener.close()
-        if self._client is not None:
-            with suppress(OSError):  # it has gone
-                self._client.shutdown(socket.SHUT_RDWR)
-        self.join()
-
-    def run(self):
-        while True:
-            try:
-                client, _ = self._listener.accept()
-            except OSError:
-                return
-            self._client = client
-            with client, client.makefile("rb") as stream, suppress(BrokenPipeError):
-                self._serve(client, stream)
-
-    def _serve(self, client, stream):
-        while head := stream.read(REQUEST.size):
-            kind, at, value, length, timeout_ms = REQUEST.unpack(head)
-            data = stream.read(length) if kind == BULK_OUT else b""
-            with self.news:
-                self.requests.append((kind, at, value, length, timeout_ms, data))
-                self.heard.append(head + data)
-                self.news.notify_all()
-            answer = self.answer(kind)
-            if kind == self.hang_up_at:
-                client.sendall(answer[:5])
-                return
-            client.sendall(answer)
-
-    def answer(self, kind):
-        code, data = self.answers.get(kind, (0, b""))
-        if kind == BULK_IN and kind not in self.answers:
-            code, data = (0, self.incoming.pop(0)) if self.incoming else (constants.ERROR_TIMEOUT, b"")
-        return ANSWER.pack(code, len(data)) + data
-
-    def sent(self):
-        """Return the data of every bulk out."""
-        return [request[5] for request in self.requests if request[0] == BULK_OUT]
-
-    def controls(self):
-        """Return (request, value) of every control request."""
-        return [request[1:3] for request in self.requests if request[0] == CONTROL]
-
-    def wait_for(self, count, timeout_s=30.0):
-        """Wait until ``count`` packets were sent."""
-        with self.news:
-            assert self.news.wait_for(lambda: len(self.sent()) >= count, timeout_s), self.sent()
 
 
 DWORD, POINTER = ctypes.c_uint32, ctypes.c_void_p
@@ -284,12 +205,3 @@ class Compiled:
 
 
 both = pytest.mark.parametrize("kind", [Python, pytest.param(Compiled, marks=compiled)])
-
-
-def warm(emulator):
-    """Return ``emulator`` with all compiled that a server of it calls, so that nobody waits for that."""
-    emulator.control(constants.REQUEST_LATENCY, constants.LATENCY_RUN_MS)
-    emulator.write(b"\0", 1)
-    emulator.read(constants.USB_PACKET, 1)
-    emulator.pause(1e-3)
-    return emulator
