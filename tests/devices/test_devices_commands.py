@@ -38,14 +38,6 @@ def test_the_list_names_every_device_with_what_it_can_do(words):
 
 
 class TestDoctor:
-    def test_a_falcon_in_order_is_told_so(self):
-        told = liquid_study("doctor", "--device", "falcon-emulated")
-        assert told.exit_code == 0, told.output
-        assert told.output.startswith("Preparing …\n")
-        assert "No problem was found." in told.output
-        assert told.output.count(" ok ") >= 15
-        assert "FOUND" not in told.output
-
     def test_modes_stand_in_their_order_with_cause_and_cure(self):
         told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "never-homes")
         assert told.exit_code == 3
@@ -66,19 +58,6 @@ class TestDoctor:
         told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "access-denied")
         assert told.exit_code == 3
         assert f"\necho '{UDEV_RULE}' | sudo tee /etc/udev/rules.d/60-falcon.rules && " in told.output
-
-    def test_a_firmware_that_is_none_is_told_with_what_it_is(self, tmp_path):
-        (tmp_path / "page.bin").write_text("<!DOCTYPE html><html>")
-        told = liquid_study("doctor", "--device", "falcon-emulated", "--firmware", str(tmp_path / "page.bin"))
-        assert told.exit_code == 3
-        assert "FOUND          the file is not a Falcon's firmware" in told.output
-        assert "it is a web page" in told.output
-        assert "give --firmware" not in told.output
-
-    def test_two_faults_at_once_are_both_found(self):
-        told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "drop=0.02", "--fault", "corrupt=0.02")
-        assert told.exit_code == 3
-        assert "FOUND          it trembles" in told.output
 
     def test_a_device_without_wires_is_not_looked_at(self):
         refused = liquid_study("doctor", "--device", "scripted")

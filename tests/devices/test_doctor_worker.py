@@ -53,14 +53,6 @@ def test_what_is_no_falcon_is_told_in_a_sentence(begin):
     assert "'mouse' is none" in refused.sentence
 
 
-def test_it_can_be_cancelled_before_it_says_anything(begin):
-    examination = begin("falcon-emulated")
-    examination.close()
-    assert examination.answers() == []
-    examination.wait_until_ended()
-    assert examination.ended
-
-
 def test_a_process_that_dies_is_told(begin):
     examination = begin("falcon-emulated")
     examination.process.kill()

@@ -1,20 +1,15 @@
 """A device of another package: found at its entry point, and used everywhere, without a change of this package."""
 
-import json
-
 import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.devices.registry import backends, list_devices, open_device
+from study_app.devices.registry import backends, list_devices
 from study_app.errors import DeviceError
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.home.dialogs import NewSessionDialog
 from study_app.gui.home.study_facts import study_facts
 from study_app.gui.kit.devices import devices_shown
-from study_app.protocol.load import load
-from study_app.protocol.orders.schedule import build_schedule
-from tests.compiled import needs_servo
 from tests.plug_in_packages import install
 
 pytestmark = pytest.mark.slow
@@ -113,27 +108,6 @@ class TestDeviceOfAnotherPackage:
         refused = liquid_study("run", "demo", "--participant", "P001", "--device", "mouse", "--toy-mass", "250")
         assert isinstance(refused.exception, DeviceError)
         assert str(refused.exception).startswith("device 'mouse' takes no toy-mass; only these do: Toy hand:")
-
-    @needs_servo
-    def test_is_opened_with_its_option(self):
-        with open_device("toy-hand", options={"toy-mass": "250"}) as device:
-            assert device.describe()["mass_kg"] == 0.25
-
-    @pytest.mark.nightly
-    @needs_servo
-    def test_runs_a_session_whose_results_and_report_are_written(self, tmp_path):
-        study = tmp_path / "demo-toy-hand"
-        rehearsed = liquid_study("rehearse", "demo", "--device", "toy-hand", "--results", str(study))
-        assert rehearsed.exit_code == 0, rehearsed.output
-        (receipt,) = study.glob("data/*/*/receipt.json")
-        device = json.loads(receipt.read_text())["device"]
-        assert (device["name"], device["mass_kg"]) == ("toy-hand", 0.3)
-        reported = liquid_study("report", str(study), "--to", str(tmp_path / "report"))
-        assert reported.exit_code == 0, reported.output
-        assert "SIMULATED participants" in (tmp_path / "report" / "report.html").read_text()
-        trials = (tmp_path / "report" / "study-demo_description-trials_data.csv").read_text().splitlines()
-        assert len(trials) == 1 + len(build_schedule(load("demo"), "P001", 1).trials)
-        assert liquid_study("verify", str(study)).exit_code == 0
 
     def test_is_examined_by_its_doctor(self):
         found = liquid_study("devices", "doctor", "--device", "toy-hand", "--fault", "loose")

@@ -58,11 +58,6 @@ def test_in_free_space_the_handle_follows_20_to_30_ms_behind():
     assert 20 <= behind_ms(moved(None, pull, 1.0, frame_ms=1)) <= 30
 
 
-def test_the_steps_of_a_pointer_become_one_motion():
-    speeds = np.diff(moved(None, pull, 0.25).position_m[100:, 0]) * 1e3
-    assert speeds.std() < 0.05 * speeds.mean()
-
-
 @pytest.mark.parametrize("liquid", LIQUIDS)
 def test_in_a_liquid_it_lags_visibly(liquid):
     samples = moved(liquid, pull, 0.27)

@@ -53,14 +53,6 @@ def test_a_motion_is_followed_along_straight_lines_on_the_devices_clock():
     assert hand.aims(3)[-1].tolist() == [0.01, 0.02, 0.03]
 
 
-def test_the_handle_follows_where_the_hand_goes():
-    hand = Hand()
-    t = np.arange(0, 2, 1e-3)
-    places = np.column_stack((0.03 * np.sin(2 * math.pi * t), np.zeros_like(t), 0.02 * np.sin(3 * math.pi * t)))
-    hand.device.follow(t, places)
-    assert hand.places(1501)[-1] == pytest.approx(places[1500], abs=1e-3)
-
-
 def test_a_new_motion_replaces_the_one_before():
     hand = Hand()
     line = [[0, 0, 0], [0.01, 0, 0], [0.02, 0, 0], [0.03, 0, 0], [0.05, 0, 0]]
@@ -115,14 +107,6 @@ def test_a_reach_is_of_minimum_jerk():
     assert not hand.device.moving
     with pytest.raises(DeviceError, match="longer than 0 s, got 0"):
         hand.device.reach_to(0, 0, 0, duration_s=0)
-
-
-@pytest.mark.parametrize(("distance_m", "duration_s"), [(0.02, 0.38), (0.04, 0.46)])
-def test_a_reach_takes_longer_the_further_it_goes(distance_m, duration_s):
-    hand = Hand()
-    hand.device.reach_to(distance_m, 0, 0)
-    reached = np.argmax(hand.aims(1000)[:, 0] >= distance_m * (1 - 1e-12)) * 1e-3
-    assert reached == pytest.approx(duration_s, abs=2e-3)
 
 
 def test_a_reach_begins_where_the_hand_is_then_and_ends_within_the_workspace_or_at_rest():

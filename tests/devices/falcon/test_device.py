@@ -12,19 +12,18 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices.doctor import DeviceFailure
 from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
 from study_app.devices.falcon import boot, calibration, constants
 from study_app.devices.falcon import device as driver
 from study_app.devices.falcon.calibration import Calibration, Grip
 from study_app.devices.falcon.device import PULL_OUT, READY, STROKES, FalconDevice
-from study_app.devices.falcon.failures import FalconLost, UsbFailure
+from study_app.devices.falcon.failures import FalconLost
 from study_app.devices.falcon.mechanics import GEOMETRIES, REACHED, SAFE_BOX_M, inverse, new_mechanism
 from study_app.devices.registry import open_device
 from study_app.devices.simulated import STIFFNESS_NPM
 from study_app.errors import DeviceError, DeviceLost
-from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
+from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
 from study_app.haptics.model.layout import BUTTON_STOP
 from tests.devices.falcon.support.firmware_stream import stream
 from tests.devices.subjects import Ticks
@@ -91,64 +90,9 @@ class TestOpening:
         assert f"SHA-256 {digest[:16]}…, which is none of those that are known to work" in loading[0]
         assert loading[1] == "Loading the Falcon's firmware, nvent_firmware.bin."
 
-    def test_without_its_program_it_says_what_to_give(self, tmp_path, told):
-        emulator = still(running=False)
-        device = EmulatedFalcon(emulator=emulator)
-        with pytest.raises(DeviceError, match=r"--firmware PATH.*nvent_firmware\.bin"):
-            device.open()
-        emulator.take("power_off")
-        with pytest.raises(DeviceError, match="power adapter"):
-            device.open()
-        (tmp_path / "page.bin").write_text("<!DOCTYPE html><html>")
-        for name, words in (("nowhere.bin", r"nowhere\.bin cannot be read"), ("page.bin", "web page")):
-            with pytest.raises(DeviceError, match=words):
-                open_device("falcon-emulated", options={"firmware": tmp_path / name}, progress=told.append)
-        assert told == []
-
-    @pytest.mark.parametrize("fault", ["access_denied", "not_supported", "busy", "unplugged"])
-    def test_a_bridge_that_cannot_be_had_is_told_and_can_be_tried_again(self, fault):
-        emulator = still()
-        emulator.faults.on(fault)
-        device = EmulatedFalcon(emulator=emulator)
-        with pytest.raises(UsbFailure):
-            device.open()
-        emulator.faults.off(fault)
-        with device:
-            assert emulator.homed == 0b111
-
     def test_a_workspace_beyond_its_reach_is_refused(self):
         with pytest.raises(DeviceError, match=r"200 x 60 x 60 mm is more than a Falcon reaches; 100 x 60 x 60 mm"):
             EmulatedFalcon(workspace_m=(0.1, 0.03, 0.03))
-
-    @pytest.mark.parametrize(("fault", "mode"), [("never_homes", "stroke-in"), ("frozen", "frozen")])
-    def test_homing_does_not_wait_for_ever(self, fault, mode, told):
-        emulator = still()
-        emulator.faults.on(fault)
-        device = EmulatedFalcon(emulator=emulator, progress=told.append, patience_s=3.0)
-        with pytest.raises(DeviceFailure) as caught:
-            device.open()
-        assert caught.value.mode == mode
-        assert sum(line.startswith("Still homing") for line in told) >= 4
-        emulator.faults.off(fault)
-        with device:  # it was let go of, and can be homed
-            assert emulator.homed == 0b111
-
-    @pytest.mark.parametrize(
-        ("at", "happens", "error", "words"),
-        [
-            (PULL_OUT, lambda emulator: emulator.hold(0.0, 0.0, 0.0), DeviceFailure, "pull it fully out"),
-            (STROKES, lambda emulator: emulator.power(False), DeviceFailure, "power adapter"),
-            (PULL_OUT, lambda emulator: emulator.faults.on("unplugged"), UsbFailure, "no longer there"),
-        ],
-    )
-    def test_what_happens_while_it_is_homed_is_told_and_gives_no_force(self, at, happens, error, words):
-        emulator = still()
-        device = EmulatedFalcon(
-            emulator=emulator, progress=lambda line: happens(emulator) if line == at else None, patience_s=3.0
-        )
-        with pytest.raises(error, match=words):
-            device.open()
-        assert emulator.highest_torque == 0
 
     def test_it_can_be_given_up(self, told):
         device = EmulatedFalcon(emulator=still(), progress=told.append, cancelled=lambda: PULL_OUT in told)
@@ -264,19 +208,6 @@ class TestInUse:
             opened.open()
             opened.close()
         assert guard.orders == ([order, "recall"] if push_n else [order])
-
-    def test_a_mains_adapter_that_fails_gives_no_more_positions(self, opened):
-        ticks = Ticks(opened)
-        assert ticks.after(3) == READ_NEW
-        for powered in (False, True):
-            opened.hand.power(powered)
-            assert ticks.after(60, (1.0, 0.0, 0.0)) == READ_NOTHING_NEW
-
-    def test_ticks_without_faults_are_all_fresh(self, opened):
-        Ticks(opened).after(1000)
-        counters = opened.counters
-        assert (counters["ticks"], counters["fresh"]) == (1000, 999)
-        assert counters["cut_short"] == counters["read_errors"] == counters["write_errors"] == 0
 
 
 class TestGuard:

@@ -12,7 +12,6 @@ from study_app.devices.doctor import DeviceFailure
 from study_app.devices.driver import examine
 from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
-from study_app.devices.emulators.falcon_processor import CHANCES, SWITCHES
 from study_app.devices.falcon.device import PULL_OUT
 from study_app.devices.falcon.failures import FAILURES
 from study_app.haptics.runtime.clocks.clock import VirtualClock
@@ -54,12 +53,6 @@ OPENING = {
     "never_homes": "stroke-in",
 }
 HARMLESS = ("kernel_driver", "leading_zero", "status_noise", "forgets")
-IN_USE = ("drop", "truncate", "corrupt", "duplicate", "delay", "stall")
-
-
-def test_every_fault_there_is_has_its_test_here():
-    assert sorted((*OPENING, *HARMLESS)) == sorted(SWITCHES)
-    assert sorted((*IN_USE, "echo", "glued", "echo_prefix")) == sorted(CHANCES)
 
 
 class TestFaultsOfTheEmulator:
@@ -68,7 +61,12 @@ class TestFaultsOfTheEmulator:
     def test_one_that_cannot_be_opened_or_homed(self, fault, mode):
         emulator = Emulator(running=True)
         emulator.faults.on(fault)
-        has_words_of(refused(emulator), mode)
+        told = []
+        has_words_of(refused(emulator, progress=told.append), mode)
+        assert sum(line.startswith("Still homing") for line in told) >= 4 * (mode in {"frozen", "stroke-in"})
+        emulator.faults.off(fault)
+        with EmulatedFalcon(emulator=emulator):  # it was let go of, and can be tried again
+            assert emulator.homed == 0b111
 
     @pytest.mark.parametrize(
         ("at", "happens", "mode"),

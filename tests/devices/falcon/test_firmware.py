@@ -30,13 +30,6 @@ def test_a_whole_stream_is_told():
     assert found.name is None
 
 
-def test_a_known_one_is_named(monkeypatch):
-    digest = hashlib.sha256(stream()).hexdigest()
-    monkeypatch.setattr(boot, "KNOWN", {(digest[:16], digest[-8:]): "novint.bin"})
-    assert check(stream()).name == "novint.bin"
-    assert check(stream(entry=0x3F8004)).name is None
-
-
 def test_the_hash_of_the_usual_one_is_that_which_was_published():
     published = "1119e39c39fab1f37678ea62dfc715b23dd86ee7f13d78f88f707d9f09b896a1"
     assert boot.KNOWN[published[:16], published[-8:]] == "nvent_firmware.bin"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from study_app.devices.emulators import inverse3_service
-from study_app.devices.emulators.inverse3 import EmulatedInverse3, EmulatedLink
+from study_app.devices.emulators.inverse3 import EmulatedInverse3
 from study_app.devices.emulators.inverse3_service import Service
 from study_app.devices.inverse3 import opening
 from study_app.devices.inverse3.device import Inverse3Device, address
@@ -112,15 +112,6 @@ class TestOpening:
         with pytest.raises(DeviceNotFound, match="listed: none"):
             find_device({"inverse3": [7, {}]})
 
-    def test_once_it_is_cured_the_same_device_opens(self, service: Service) -> None:
-        service.take("uncalibrated")
-        device = EmulatedInverse3(service=service)
-        with pytest.raises(DeviceError):
-            device.open()
-        service.status["calibrated"] = True
-        with device:
-            assert Ticks(device).take()[0] == READ_NOTHING_NEW
-
     def test_no_service_is_one_line_with_its_address_and_the_cure(self) -> None:
         with pytest.raises(DeviceNotFound, match=r"Inverse Service does not answer.*start Haply Hub") as refused:
             open_device("inverse3:127.0.0.1:9")
@@ -200,14 +191,6 @@ class TestTicks:
         assert device.counters["late"] == 1
         assert ticks.take()[0] == READ_NEW
 
-    def test_a_handle_that_the_hand_lets_go_follows_the_force(self, service: Service, device: EmulatedInverse3) -> None:
-        ticks = Ticks(device)
-        service.held = False
-        ticks.after(100, (0.5, 0.0, 0.0))
-        assert not service.held
-        assert ticks.position_m[0] > 0.005
-        ticks.take()
-
     def test_close_sends_zero_force_and_a_close_frame_and_then_nothing(
         self, service: Service, device: EmulatedInverse3
     ) -> None:
@@ -220,13 +203,6 @@ class TestTicks:
         assert service.state.close_frames == 1
         assert ticks.take((2.0, 0.0, 0.0))[0] == READ_LOST
         assert service.state.commands == commands + 1
-
-    def test_a_connection_that_ends_lets_its_device_idle(self, service: Service, device: EmulatedInverse3) -> None:
-        Ticks(device).take((2.0, 0.0, 0.0))
-        link = EmulatedLink(service)  # whoever comes next
-        assert service.force_n[0] == 2.0
-        link.close()
-        assert service.force_n == (0.0, 0.0, 0.0)
 
 
 def stroke(device: EmulatedInverse3, service: Service) -> Servo:

@@ -92,33 +92,6 @@ def test_a_reply_is_read():
     assert (stream.parser.packets, stream.parser.skipped, stream.parser.held) == (1, 0, 0)
 
 
-def test_the_newest_of_several_replies_is_kept_and_all_are_counted():
-    stream = Stream()
-    assert stream.feed(reply((1, 2, 3)) + reply((4, 5, 6)) + reply((7, 8, 9))[:9]) == 2
-    assert stream.encoders == [4, 5, 6]
-    assert stream.status.count == stream.parser.packets == 2
-
-
-@pytest.mark.parametrize("kept", range(PACKET))
-def test_a_reply_cut_short_is_never_completed_by_the_next(kept):
-    stream = Stream()
-    # status 13, unknown '<': what a parser without checks took for buttons and homed
-    assert stream.feed(reply((5, 5, 5), buttons=13, homed=7, unknown=0x3C)[:kept] + reply((1, 2, 3))) == 1
-    assert stream.encoders == [1, 2, 3]
-    assert (stream.status.buttons, stream.status.homed) == (0, 0)
-    assert stream.parser.skipped == kept
-
-
-@pytest.mark.parametrize(("at", "byte"), [(0, 0x3D), (1, 0x40), (12, 0x51), (13, 0x40), (13, 0xC1), (15, 0x3D)])
-def test_a_byte_that_may_not_stand_there_spoils_its_packet_alone(at, byte):
-    stream = Stream()
-    spoilt = bytearray(reply())
-    spoilt[at] = byte
-    assert stream.feed(reply((1, 1, 1)) + bytes(spoilt) + reply((2, 2, 2))) == 2
-    assert stream.encoders == [2, 2, 2]
-    assert stream.parser.skipped == PACKET
-
-
 @pytest.mark.slow
 @given(
     st.lists(
