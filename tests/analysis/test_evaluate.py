@@ -13,7 +13,7 @@ from study_app.analysis import results
 from study_app.analysis.data.blocks import Block, Decided, Item, Setting
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.delays import ContrastsWithControl, equivalent_up_to
+from study_app.analysis.findings.delays import ContrastsWithControl
 from study_app.analysis.findings.finding import MANY, judged, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of
@@ -21,7 +21,6 @@ from study_app.analysis.report.write_report import plain
 from study_app.analysis.results import BlockResult, Results
 from study_app.analysis.statistics.outcome import DRAWS, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import friedman, paired
-from study_app.errors import AnalysisError
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from tests.analysis.conftest import Answer, make_results, twelve
@@ -92,19 +91,6 @@ def test_what_could_not_have_been_shown_is_out_of_reach() -> None:
     assert (none.verdict, none.p_adjusted) == ("not tested", None)
 
 
-def test_results_hold_no_number_that_is_none() -> None:
-    with pytest.raises(AnalysisError, match="a fault of the program"):
-        plain({"a": (1.0, float("nan"))})
-
-
-def test_equivalence_goes_up_from_the_shortest_delay_and_stops_at_the_first_that_is_not(rek: Folder) -> None:
-    _, delays = blocks(opened(rek, 12))
-    for item, up_to in equivalent_up_to(ContrastsWithControl.of(delays)).items():
-        verdicts = [one.verdict == "equivalent" for one in ContrastsWithControl.of(delays) if one.item == item]
-        run = verdicts.index(False) if False in verdicts else len(verdicts)
-        assert up_to == ([None, *delays.delays_ms[1:]][run])
-
-
 def test_of_five_no_pair_is_there_and_it_says_why(rek: Folder) -> None:
     liquids, delays = blocks(opened(rek, 5))
     assert Pairs.of(liquids) == ()
@@ -166,20 +152,6 @@ def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder)
 
 def _omnibus(folder: Folder) -> tuple:  # type: ignore[type-arg]
     return SettingsDiffer.of(found(folder).blocks[0])
-
-
-def test_two_settings_are_compared_as_a_pair(small: Folder) -> None:
-    for number in range(1, 9):
-        low = 1 + number % 4
-
-        def answer(condition: str, _item: str, low: int = low) -> int:
-            return 6 if condition == "heavyzembla" else low
-
-        small.add(f"P{number:03d}", answer)
-    small.open()
-    (block,) = found(small).blocks
-    assert {one.outcome.test for one in SettingsDiffer.of(block)} == {"Wilcoxon signed ranks"}
-    assert SettingsDiffer.of(block)[0].outcome.p == pytest.approx(2 / 2**8)
 
 
 @pytest.mark.parametrize("n", [12, 24])

@@ -10,10 +10,10 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import codebook_bytes
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold
-from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel, SessionsDiffer, SettingsDiffer
+from study_app.analysis.findings.statement_tests import DelayTrend, MixedModel, SessionsDiffer
 from study_app.analysis.report.sections import block, conduct, limits, methods
-from study_app.analysis.results import BlockResult, Results, all_of, said_of_presentations
-from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
+from study_app.analysis.results import BlockResult, Results, said_of_presentations
+from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, study
 
 pytestmark = pytest.mark.slow
 
@@ -73,12 +73,6 @@ def test_the_verdict_of_unanimity_holds_after_the_correction() -> None:
     (found,) = evaluate(made).blocks
     assert {one.verdict for one in DelayTrend.of(found)} == {"shown", "not shown"}  # rising, stated to fall
     assert all(one.found.interval is None for one in ContrastsWithControl.of(found))
-
-
-def test_all_statements_are_told_as_a_reader_would() -> None:
-    assert [all_of(count, "statement") for count in (1, 2, 3)] == [
-        *("the one statement", "both statements", "all three statements")
-    ]
 
 
 FOUR_LEVELS = (0.0, 50.0, 100.0, 150.0)
@@ -141,12 +135,3 @@ def test_conditions_of_one_delay_are_replicates_of_it() -> None:
     assert "Several conditions present 50 ms: they are taken as repeated presentations" in " ".join(
         block(found, results, ())
     )
-
-
-def test_of_two_settings_the_higher_one_is_named() -> None:
-    two = liquids(2)
-    made = study(two, list(everybody(two, 10, lambda person, _s, code, _i: 6 if code == "L2" else 1 + person % 3)))
-    results, found = evaluated(made)
-    page = " ".join(block(found, results, ()))
-    assert "above 0 where Liquid1 was rated higher than Liquid2" in page
-    assert ITEMS[0] == SettingsDiffer.of(found)[0].item

@@ -7,48 +7,11 @@ import pytest
 
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
-from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.streams import stream
 from study_app.store.blinded.blinding import open_or_draw_key, read_key, whole_protocol
 from study_app.store.receipt import without_conditions
-from tests.protocol.sound import ORDER, SOUND
+from tests.protocol.sound import SOUND
 from tests.protocol.trials.level_studies import study
-
-REST = """
-[pages.rest]
-kind = "break"
-title = { en = "Rest", nl = "Rust" }
-body = { en = "Let go.", nl = "Laat los." }
-"""
-
-
-def edited(*edits: tuple[str, str]):
-    text = SOUND
-    for old, new in edits:
-        assert text.count(old) == 1
-        text = text.replace(old, new)
-    return parse(text.encode(), "small.toml")
-
-
-def test_breaks_take_their_time():
-    rest = ("[blocks.warm_up]", REST + "[blocks.warm_up]")
-    with_breaks = edited((ORDER, f'{ORDER}\nbreak_every = 1\nbreak_page = "rest"'), rest)
-    assert expected_duration_s(with_breaks) - expected_duration_s(edited()) == pytest.approx(3 * (5 + 2 / 3))
-
-
-def test_the_expected_duration_counts_every_trial():
-    """A third repetition adds two trials of exploring and answering."""
-    before = expected_duration_s(edited(("repetitions = 2", "repetitions = 1")))
-    assert expected_duration_s(edited(("repetitions = 2", "repetitions = 3"))) - before == pytest.approx(
-        4 * (6 + 5 + 2 * 6)
-    )
-
-
-def test_a_task_never_lasts_longer_than_its_timeout():
-    long = edited(("count = 4", "count = 100"))
-    short = edited(("count = 4", "count = 4"))
-    assert expected_duration_s(long) - expected_duration_s(short) == pytest.approx(2 * (60 - 4 * 2))
-
 
 PLANNED = """
 [analysis]

@@ -17,7 +17,7 @@ from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.scene_file import scene_text
-from study_app.protocol.source.files import bundled, protocol_hash, source_bytes, unbundled
+from study_app.protocol.source.files import bundled, source_bytes, unbundled
 from tests.protocol.sound import EVERY_ORDER, SOUND
 
 
@@ -60,11 +60,6 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(Path, "read_bytes", refuse)
     with pytest.raises(ProtocolError, match="Permission denied"):
         load(path)
-
-
-def test_the_hash_is_of_the_bytes():
-    assert protocol_hash(b"") == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
-    assert protocol_hash(SOUND.encode()) != protocol_hash(SOUND.encode() + b"\n")
 
 
 def test_a_scene_is_one_liquid_of_a_protocol():
@@ -185,12 +180,6 @@ def test_an_estimator_that_left_is_refused_with_its_place_and_what_to_write(tmp_
     assert (problem.place, problem.line, problem.hint) == ("scene.velocity.kind", 3, 'write "ewma", "kalman" or "raw"')
 
 
-def test_a_damper_in_format_1_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ProtocolError, match='"linear" belongs to format 2') as refused:
-        load_scene(written(tmp_path / "damper.toml", f"format = 1\n{DAMPER}density_kg_m3 = 1000\n"), "damper")
-    assert "damping_nspm: belongs to format 2" in str(refused.value)
-
-
 def test_the_density_counts_where_effects_are_chosen(tmp_path: Path) -> None:
     text = f'format = 2\n{DAMPER}effects = "auto"\n'
     with pytest.raises(ProtocolError, match="density_kg_m3: is missing"):
@@ -211,29 +200,6 @@ def test_only_a_scene_that_needs_it_is_written_in_format_2(tmp_path: Path) -> No
 
 
 UNSTEADY = '[liquids.honey]\ndensity_kg_m3 = 1420\nviscosity_pa_s = 10\neffects = ["unsteady_drag"]\n'
-
-
-def test_unsteady_drag_belongs_to_format_2(tmp_path: Path) -> None:
-    with pytest.raises(ProtocolError, match='"unsteady_drag" belongs to format 2'):
-        load_scene(written(tmp_path / "honey.toml", UNSTEADY), "honey")
-    honey = load_scene(written(tmp_path / "honey.toml", f"format = 2\n{UNSTEADY}"), "honey")
-    assert honey.liquids[0].effects == ("unsteady_drag",)
-    assert load_scene(written(tmp_path / "again.toml", scene_text(honey)), "honey") == honey
-
-
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
-        (UNSTEADY.replace("viscosity_pa_s = 10\n", ""), "needs the liquid's viscosity_pa_s"),
-        (UNSTEADY.replace('["uns', '["drag", "uns'), '"drag" and "unsteady_drag" are two models of the same thing'),
-        (UNSTEADY.replace('["uns', '["history", "uns'), '"history" and "unsteady_drag" are two models'),
-        (UNSTEADY.replace('["uns', '["added_mass", "uns'), '"added_mass" and "unsteady_drag" are two models'),
-    ],
-)
-def test_what_unsteady_drag_cannot_do_is_said_in_a_line(wrong: str, said: str, tmp_path: Path) -> None:
-    with pytest.raises(ProtocolError, match=said) as refused:
-        load_scene(written(tmp_path / "honey.toml", f"format = 2\n{wrong}"), "honey")
-    assert len(refused.value.problems) == 1
 
 
 def test_the_format_decides_what_auto_chooses_among(tmp_path: Path) -> None:

@@ -7,9 +7,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from study_app.protocol.load import SceneFile
 from study_app.protocol.source.files import shipped
-from study_app.protocol.source.json_schema import editor_schema, format_markdown, schema
+from study_app.protocol.source.json_schema import editor_schema, format_markdown
 from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from tests.protocol.edited_studies import CASES, STUDIES, cases_of, text_of
 from tests.protocol.forms.mixed import MIXED
@@ -76,12 +75,6 @@ def test_the_schema_refuses_what_check_refuses(study: str, old: str, new: str) -
     assert complaints(text_of(study).replace(old, new)) != []
 
 
-def test_names_of_tables_are_not_asked_for_again():
-    assert "id" not in SCHEMA["$defs"]["Block"]["properties"]
-    assert "id" not in SCHEMA["$defs"]["StudyLiquid"]["then"]["required"]
-    assert "id" in SCHEMA["$defs"]["Statement"]["required"]
-
-
 def test_every_key_is_described():
     """An editor shows what a key means (the models of the force model describe theirs in the table)."""
     ours = {"StudyHead", "DeviceNeeds", "SceneDefaults", "Condition", "Scale", "Statement", "Questionnaire", "PageText",
@@ -90,10 +83,6 @@ def test_every_key_is_described():
     for name in ours:
         for key, node in SCHEMA["$defs"][name]["properties"].items():
             assert "description" in node or key == "kind", f"{name}.{key}"
-
-
-def test_scene_files_have_a_schema_of_their_own():
-    assert "rate_hz" in schema(SceneFile)["$defs"]["SceneTable"]["properties"]
 
 
 def tables() -> dict[str, str]:

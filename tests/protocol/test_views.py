@@ -9,7 +9,6 @@ from study_app.errors import ProtocolError
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import bundled, hashes_in, protocol_hash, source_bytes, unbundled
-from study_app.protocol.source.json_schema import schema
 
 FOOTAGE = b"not decoded here"
 SEEN = '[conditions.{name}]\nliquid = "thin"\ndelay_ms = {delay}\n{keys}\n\n'
@@ -121,9 +120,3 @@ def test_views_that_cannot_be_told_from_something_else_are_named(
     with pytest.raises(ProtocolError) as refused:
         load(in_block(study, conditions, compares))
     assert problem in str(refused.value)
-
-
-def test_the_schema_has_the_keys_and_not_the_hash() -> None:
-    condition = schema()["$defs"]["Condition"]["properties"]
-    assert {"view", "overlay"} <= condition.keys()
-    assert "footage_sha256" not in condition

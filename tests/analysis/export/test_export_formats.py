@@ -6,20 +6,18 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from study_app.analysis.export.export import export
 from study_app.analysis.export.psychds_dataset import FOLDER
-from study_app.analysis.export.spss import CANNOT_JUDGE, NOT_ANSWERED, names_of
+from study_app.analysis.export.spss import names_of
 from study_app.analysis.export.table_files import Extra
 from study_app.errors import AnalysisError, MissingExtra, naming_the_extra
-from study_app.protocol.load import parse
 from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
-from tests.analysis.conftest import HIDDEN, SMALL, Results, make_results
+from tests.analysis.conftest import HIDDEN, SMALL, Results
 from tests.analysis.export.described import undescribed
 
 pytestmark = pytest.mark.slow
@@ -54,34 +52,6 @@ def half_answered(small: Results) -> Results:
     small.add("B", lambda condition, item: {"smooth": "cannot judge", "warm": 4}[item], changes={"notes": None})
     small.add("C", lambda condition, item: 3 if condition == "heavyzembla" else 6)
     return small
-
-
-def test_wide_gives_the_median_of_repetitions_and_leaves_out_what_does_not_count(small: Results, to: Path) -> None:
-    answers = iter([1, 1, 2, 2, 4, 4, 5, 5] + [7] * 99)
-    small.add("A", lambda *_: next(answers))
-    small.add("B", lambda *_: 7, status="withdrawn")
-    export(small.folder, to, extras=["wide"])
-    (row,) = cells(table(to, "small", "wide", "csv"))
-    long = cells(table(to, "small", "responses", "csv"))
-    for code in ("L1", "L2"):
-        own = [
-            int(one["response"]) for one in long if (one["code"], one["item"], one["counted"]) == (code, "warm", "true")
-        ]
-        assert float(row[f"warm__{code}"]) == np.median(own)
-
-
-def test_blocks_that_ask_the_same_keep_their_columns_apart(tmp_path: Path, to: Path) -> None:
-    twice = SMALL.replace('sequence = ["try", "feel"]', 'sequence = ["try", "feel", "again"]') + SMALL[
-        SMALL.index("[blocks.feel]") :
-    ].replace("[blocks.feel]", "[blocks.again]").replace("part = 1", "part = 2").replace('"L"', '"M"')
-    results = make_results(tmp_path / "small", parse(twice.encode(), "small.toml"))
-    results.add("A", lambda *_: 5)
-    results.open()
-    export(results.folder, to, extras=["wide"])
-    names = list(cells(table(to, "small", "wide", "csv"))[0])[2:]
-    assert "feel__smooth__heavyzembla" in names
-    assert "again__smooth__heavyzembla" in names
-    assert len(set(names)) == 8
 
 
 def test_a_statement_and_a_form_that_give_one_name_have_a_column_each(tmp_path: Path, to: Path) -> None:
@@ -127,17 +97,6 @@ def test_a_text_that_sav_cannot_hold_is_cut_at_a_letter(small: Results, to: Path
     found, _ = sav(table(to, "small", "responses", "sav"))
     (reason,) = set(found["exclusion_reason"])
     assert reason == "é" * 16_382 + "…"
-
-
-def test_wide_sav_labels_every_answer_by_its_own_scale_and_tells_why_one_is_missing(small: Results, to: Path) -> None:
-    half_answered(small).open()
-    export(small.folder, to, extras=["sav"])
-    assert not table(to, "small", "wide", "csv").exists()
-    found, about = sav(table(to, "small", "wide", "sav"), missing=True)
-    assert found.set_index("participant").loc["B"].tolist()[1:] == [CANNOT_JUDGE, 4, CANNOT_JUDGE, 4]
-    assert found.set_index("participant").loc["A"].tolist()[1:] == [7, NOT_ANSWERED, 7, NOT_ANSWERED]
-    assert about.variable_value_labels["smooth__heavyzembla"][7] == "g"
-    assert "It feels warm. About Zembla" in about.column_names_to_labels["warm__heavyzembla"]
 
 
 def test_names_are_ones_that_spss_takes_and_stay_apart() -> None:

@@ -8,23 +8,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.planning.power_curves import (
-    Curve,
-    Powers,
-    interval,
-    power_csv,
-    power_markdown,
-    powers,
-    write_power,
-)
+from study_app.analysis.planning.power_curves import Curve, Powers, interval, power_markdown, powers
 from study_app.analysis.planning.simulated_studies import BATCH, FULL, Counts, Plan, count, people, plan, sweep
 from study_app.analysis.statistics.trend import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError
-from study_app.protocol.load import load, parse
+from study_app.protocol.load import load
 from study_app.protocol.simulated import NO_FEATURES, TrialFeatures
 from study_app.workers.executors import Workers
-from tests.analysis.conftest import SMALL
 from tests.protocol.groups.grouped import grouped
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
@@ -167,37 +158,11 @@ def test_the_lowest_delay_is_the_step_downs_of_the_report() -> None:
     assert np.abs(counts["delays", "lowest"][0, place, 1:] - expected[1:]).max() <= 2  # p at the edge is drawn
 
 
-def test_participants_needed_are_where_the_power_stays_above() -> None:
-    one = Curve("b", "trend", "i", "", None, (0.85, 0.7, 0.81, 0.9), None, None, None)
-    assert one.needed((5, 8, 12, 16)) == 12
-    assert Curve("b", "trend", "i", "", None, (0.1, 0.2), None, None, None).needed((5, 8)) is None
-
-
 def test_the_interval_is_wilsons() -> None:
     # Brown, Cai & DasGupta 2001: never outside 0 to 1, and not empty at the ends
     low, high = interval(0.5, 100)
     assert (low, high) == (pytest.approx(0.4038, abs=1e-4), pytest.approx(0.5962, abs=1e-4))
     assert interval(0.0, 20) == (0.0, pytest.approx(0.1611, abs=1e-4))
-
-
-def test_what_was_ended_early_says_so(counted: tuple[int, Counts]) -> None:
-    studies, counts = counted
-    found = powers(planned(), SIZES, studies, 1000, 1, counts)
-    assert "Ended early: 30 of 1000 studies" in power_markdown(found)
-    assert "**SIMULATED.**" in power_markdown(found)
-    assert power_csv(found).count(b",30,") >= len(found.curves)
-
-
-def test_a_study_of_two_liquids_without_decisions_can_be_study_plantoo(tmp_path: Path) -> None:
-    """Two settings, repeated, with statements that the model does not know."""
-    protocol = parse(SMALL.encode(), "small.toml")
-    study_plan = plan(protocol, felt_in(protocol))
-    assert study_plan.unknown == ("smooth", "warm")
-    studies, counts = swept(study_plan)
-    found = powers(study_plan, SIZES, studies, studies, 1, counts)
-    assert [one.question for one in found.curves if one.over == "all statements at once"] == ["settings differ"]
-    assert "knows nothing of smooth, warm" in power_markdown(found)
-    assert write_power(found, tmp_path / "power")
 
 
 def test_a_block_of_some_groups_counts_their_participants() -> None:

@@ -119,13 +119,6 @@ def test_ratings_have_the_spread_that_check_expects() -> None:
     assert "| trials per level | participants |" in said
 
 
-def test_two_participants_have_no_interval() -> None:
-    found = swept(study(), (10,), (2,), 2)
-    assert math.isnan(found.found["thicker", 10].half(0))
-    assert "| 10 | 2 | " in threshold_markdown(found)
-    assert threshold_markdown(found).rstrip().endswith("| – | – |")
-
-
 def test_trials_are_rounded_to_what_the_method_divides_them_into() -> None:
     constant = study(('kind = "questplus", trials = 20', 'kind = "constant", levels = 7'))
     assert list(plans(constant, (30,))["thicker"]) == [28]

@@ -3,7 +3,6 @@
 import shutil
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -11,8 +10,6 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.tables import wide
 from study_app.analysis.report.write_report import report
-from study_app.analysis.study_worker import carry_out
-from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
 from study_app.protocol.load import load
 from study_app.protocol.simulated import TrialFeatures
 from study_app.session.simulated.answers_only import rehearse_answers
@@ -64,23 +61,6 @@ def test_excluded_session_counts_in_no_form(folder: Path, tmp_path: Path) -> Non
     left = load_study(copied)
     asked = next(one for one in left.others.questions if one.id == "age")
     assert len(left.answers_to(asked)) == PEOPLE - 1
-
-
-@pytest.mark.nightly
-def test_sealed_report_has_every_figure_and_no_condition(folder: Path, tmp_path: Path) -> None:
-    names = {path.name for path in report(folder, tmp_path / "report", failed=pytest.fail)}
-    for item in ("start-age", "start-hand", "start-used", "stir-thickness", "stir-pleasant", "load-effort"):
-        assert {f"question-{item}.{form}" for form in ("png", "svg", "pdf", "txt")} <= names
-    assert "Thin" not in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
-
-
-def test_results_window_is_told_of_every_figure(folder: Path) -> None:
-    told: list[Any] = []
-    carry_out(ReadStudy(folder), told.append, lambda: False)
-    drawn = {one.name: one.title for one in told if isinstance(one, FigureDrawn)}
-    assert drawn["question-start-hand"] == "Start: Hand"
-    assert "liquids" in drawn
-    assert not any("comment" in name for name in drawn)  # texts are not drawn
 
 
 @pytest.mark.parametrize("order", ["fixed", "balanced", "random", "groups"])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.data.study_tables import Study, load_study, pooled
+from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.export.export import export
 from study_app.analysis.planning.preregistration import FILE, Commitment, deviations, written
 from study_app.analysis.report.write_report import report
@@ -17,7 +17,7 @@ from study_app.store.exclusions import exclude
 from study_app.store.sites.merge import merge
 from study_app.store.withdrawals import withdraw
 from tests.analysis.levels.level_studies import ADAPTIVE
-from tests.analysis.report.read_report import numbers, read, run_in_r
+from tests.analysis.report.read_report import read
 from tests.protocol.trials.level_studies import text_of_damper
 from tests.studies import made_up
 
@@ -127,18 +127,6 @@ def test_answers_are_pooled_by_condition(opened: Path) -> None:
     assert not recorded & set(found.responses["code"])
 
 
-@pytest.mark.nightly
-def test_the_report_describes_sites_and_r_agrees(opened: Path, tmp_path: Path) -> None:
-    report(opened, tmp_path, failed=pytest.fail)
-    page = read(tmp_path)
-    for words in ("Differences between sites are described, not tested.", "Merged sites: A with"):
-        assert words in page
-    held = numbers(tmp_path)
-    assert {name.split("/")[0] for name in held["files"]} == {"sites.json", "sites"}
-    done = run_in_r(tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
 def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(opened: Path, tmp_path: Path) -> None:
     merge(_copied(opened, tmp_path), tmp_path / "pooled")
     exclude(tmp_path / "pooled/sites/B", "P001", 1, by="AK", reason="coughed")
@@ -150,10 +138,6 @@ def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(open
     for person in ("P001", "P003"):
         withdraw(tmp_path / "pooled/sites/A", person, by="AK", reason="asked")
     assert load_study(tmp_path / "pooled").people == ("B-P002", "B-P003")
-
-
-def pooled_of(first: Study, second: Study) -> Study:
-    return pooled(Path("nowhere"), {"A": first, "B": second}, 0)
 
 
 @pytest.mark.nightly

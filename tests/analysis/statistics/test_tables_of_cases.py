@@ -9,9 +9,6 @@ import pytest
 
 from study_app.analysis.statistics import equivalence, outcome, rank_tests, recognition, thresholds, trend
 from study_app.errors import AnalysisError
-from study_app.protocol.trials.designs import default_design
-from study_app.protocol.trials.stimuli import analysis_grid, assumed_for
-from tests.analysis.levels.level_studies import STIMULUS
 from tests.analysis.outputs import GOLDEN
 from tests.golden import compare
 from tests.golden_values import one_line as told
@@ -42,9 +39,6 @@ DIFFERENCES = {
     "outlier": [0, 0, 0, 0, 0, 0, 6], "halves": [0.5, 0, -0.5, 0, 0.5, 0, 0, 0, 1, -1, 0.5, 0],
 }  # fmt: skip
 PS = ((), (0.04,), (0.01, 0.04, None), (0.5, 0.02, 0.02, 1.0), (None, None), (0.03, 0.01, 0.2, 0.04, 0.001))
-GRID = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")))
-U = np.log10([0.03, 0.1, 0.2, 0.4])
-COUNTS = (([0, 0, 0, 0], [0, 0, 0, 0]), ([5, 6, 9, 10], [5, 4, 1, 0]), ([10] * 4, [0] * 4), ([0] * 4, [9] * 4))
 
 
 def over(function: Callable[..., Any], cases: dict[str, Any], *more: Any, **named: Any) -> Iterator[tuple[str, Any]]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from study_app.analysis.data import blocks
 from study_app.analysis.data.blocks import OwnDynamics
-from study_app.analysis.data.motion import Targets, path_length_m, performance, reaches, submovements
+from study_app.analysis.data.motion import Targets, performance, reaches, submovements
 from study_app.analysis.data.study_tables import load_study, pooled
 from study_app.errors import AnalysisError
 from study_app.session.simulated.rehearsal import rehearse
@@ -62,16 +62,6 @@ def test_a_bench_that_lacks_a_value_is_refused_with_the_receipt(sample: StudyFol
     record(sample, 0, {"measured": "2026-11-21"})
     with pytest.raises(AnalysisError, match="does not describe the session"):
         load_study(sample.path)
-
-
-@pytest.mark.slow
-def test_the_estimator_is_the_device_where_it_measured_its_velocity(sample: StudyFolder) -> None:
-    assert load_study(sample.path).estimator == "ewma"
-    change(sample, 0, estimator="device")
-    assert load_study(sample.path).estimator == "ewma or device"
-    for session in range(len(sample.sessions())):
-        change(sample, session, estimator="device")
-    assert load_study(sample.path).estimator == "device"
 
 
 TABLE: dict[str, Any] = {
@@ -163,11 +153,6 @@ def test_peaks_of_speed_are_counted_where_enough_samples_are_fast_enough(
 def test_a_dwell_that_is_too_short_is_no_reach() -> None:
     assert reaches(*line((0, -30), (0.4, -30), (0.6, 30), (1.0, 30)), TWO) == ()
     assert reaches(np.zeros(0, np.int64), np.zeros((0, 3)), TWO) == ()
-
-
-def test_a_circle_has_the_length_of_its_circumference() -> None:
-    angle = np.linspace(0, 2 * np.pi, 2001)
-    assert path_length_m(np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)) == pytest.approx(2 * np.pi, 1e-5)
 
 
 @pytest.mark.nightly

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis.data.study_tables import Study, load_study
-from study_app.errors import AnalysisError, StoreError
+from study_app.errors import StoreError
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
-from study_app.store.tables.columns import RESPONSES, TRIALS
-from study_app.store.tables.csv_files import csv_bytes, header, read_table
-from tests.analysis.conftest import CANNOT_JUDGE, Results, make_results
+from study_app.store.tables.columns import TRIALS
+from study_app.store.tables.csv_files import csv_bytes, read_table
+from tests.analysis.conftest import Results, make_results
 from tests.analysis.tables.differing_answers import by_condition, refusal
 from tests.store.earlier import TRIALS_HEADER
 
@@ -24,32 +24,6 @@ def cell(study: Study, code: str, item: str) -> dict:
             table = study.aggregate(block)
             return table[(table["code"] == code) & (table["item"] == item)].iloc[0].to_dict()
     raise LookupError(code)
-
-
-def test_answers_come_back_by_code_with_all_statements_and_settings(rek: Results) -> None:
-    rek.add("P001", by_condition)
-    rek.add("P002", by_condition)
-    study = load_study(rek.folder)
-    assert (study.name, study.n, study.simulated, study.revealed) == ("rek2024", 2, True, False)
-    assert [(block.id, block.kind) for block in study.blocks] == [("liquids", "liquids"), ("delays", "delays")]
-    assert [block.codes for block in study.blocks] == [("L1", "L2", "L3"), tuple(f"D{n}" for n in range(1, 8))]
-    assert [item.short for item in study.blocks[0].items][:2] == ["Feels like a liquid", "Immersive"]
-    assert len(study.responses) == 2 * 62
-    for condition, level in (("water", 2), ("honey", 5), ("light_oil", 7)):
-        row = cell(study, rek.code(condition, "liquids"), "like_tar")
-        assert (row["n"], row["median"], row[f"count_{level}"]) == (2, level, 2)
-
-
-def test_opened_settings_have_names_delays_ascending_and_liquids_as_in_the_protocol(rek: Results) -> None:
-    rek.add("P001", by_condition)
-    rek.open()
-    liquids, delays = load_study(rek.folder).blocks
-    assert [liquids.name(setting) for setting in liquids.settings] == ["Water", "Honey", "Light oil"]
-    assert [setting.delay_ms for setting in delays.settings] == [0, 50, 75, 100, 125, 150, 200]
-    assert {setting.liquid for setting in delays.settings} == {"water"}
-    assert [setting.code for setting in liquids.settings] == [
-        rek.code(condition, "liquids") for condition in ("water", "honey", "light_oil")
-    ]
 
 
 SWAPPED = {'"L"': '"X"', '"D"': '"L"', '"X"': '"D"'}
@@ -80,15 +54,6 @@ def test_receipts_of_earlier_versions_do_not_say_what_a_block_compares(rek: Resu
     assert [block.kind for block in load_study(rek.folder).blocks] == ["liquids", "delays"]
 
 
-def test_of_a_repeated_trial_the_last_attempt_counts_and_the_first_is_kept(rek: Results) -> None:
-    rek.add("P001", lambda *_: 6, repeated={"L2": lambda *_: 1})
-    study = load_study(rek.folder)
-    row = cell(study, "L2", "immersive")
-    assert (row["n"], row["count_1"], row["count_6"], row["presented"]) == (1, 0, 1, 1)
-    kept = study.responses[(study.responses["code"] == "L2") & (study.responses["item"] == "immersive")]
-    assert list(zip(kept["attempt"], kept["response"], kept["counted"], strict=True)) == [(1, 1, False), (2, 6, True)]
-
-
 def test_a_repeat_that_was_never_answered_leaves_the_answer_missing(rek: Results) -> None:
     """The operator discarded the first attempt; its answers must not come back because the second has none."""
     rek.add("P001", lambda *_: 6, repeated={"L2": lambda *_: 1})
@@ -97,31 +62,6 @@ def test_a_repeat_that_was_never_answered_leaves_the_answer_missing(rek: Results
     path.write_text("".join(line for line in lines if not (",2,liquids," in line and ",L2," in line)))
     row = cell(load_study(rek.folder), "L2", "immersive")
     assert (row["n"], row["missing"]) == (0, 1)
-
-
-def test_practice_stays_apart_even_where_it_is_asked_about(small: Results) -> None:
-    small.add("A", lambda *_: 3)
-    study = load_study(small.folder)
-    assert [block.id for block in study.blocks] == ["feel"]
-    practice = study.responses[study.responses["phase"] == "practice"]
-    assert len(practice) == 2
-    assert not practice["counted"].any()
-    assert cell(study, "L1", "smooth")["n"] == 2
-
-
-def test_repetitions_cannot_judge_and_unanswered_items_are_counted(small: Results) -> None:
-    small.add("A", lambda condition, item: {"smooth": 7, "warm": None}[item])
-    small.add("B", lambda condition, item: {"smooth": CANNOT_JUDGE, "warm": 1}[item])
-    study = load_study(small.folder)
-    smooth, warm = cell(study, "L1", "smooth"), cell(study, "L1", "warm")
-    assert (smooth["presented"], smooth["n"], smooth["participants"], smooth["cannot_judge"], smooth["missing"]) == (
-        4,
-        2,
-        1,
-        2,
-        0,
-    )
-    assert (warm["n"], warm["cannot_judge"], warm["missing"], warm["count_1"]) == (2, 0, 2, 2)
 
 
 @pytest.mark.parametrize("status", ["unfinished", "withdrawn", "aborted", "broken"])
@@ -134,14 +74,6 @@ def test_sessions_that_were_not_completed_are_kept_and_do_not_count(rek: Results
     assert cell(study, "L1", "immersive")["n"] == 1
 
 
-def test_two_sessions_of_one_participant_are_one_participant(rek: Results) -> None:
-    rek.add("P001", lambda *_: 6)
-    rek.add("P001", lambda *_: 2, session=2)
-    study = load_study(rek.folder)
-    row = cell(study, "L1", "immersive")
-    assert (study.n, row["n"], row["participants"], row["presented"]) == (1, 2, 1, 2)
-
-
 def test_an_excluded_trial_takes_all_its_attempts_and_is_one_presentation(rek: Results) -> None:
     rek.add("P001", lambda *_: 6, repeated={"L2": lambda *_: 1})
     (trial,) = {int(one) for one in load_study(rek.folder).trials.query("code == 'L2'")["trial"]}
@@ -150,13 +82,6 @@ def test_an_excluded_trial_takes_all_its_attempts_and_is_one_presentation(rek: R
     row = cell(study, "L2", "immersive")
     assert (row["n"], row["presented"], row["presented_excluded"], row["missing"]) == (0, 0, 1, 0)
     assert list(study.trials.query("code == 'L2'")["excluded"]) == [True, True]
-
-
-def test_of_repetitions_only_the_excluded_one_is_left_out(small: Results) -> None:
-    small.add("A", lambda *_: 3)
-    small.exclude("A", trial=small.trial("A", "heavyzembla"))
-    row = cell(load_study(small.folder), small.code("heavyzembla", "feel"), "smooth")
-    assert (row["n"], row["presented"], row["presented_excluded"]) == (1, 1, 1)
 
 
 def test_an_unfinished_session_that_is_excluded_is_told_once(rek: Results) -> None:
@@ -289,19 +214,4 @@ def test_an_opened_key_that_was_changed_is_refused(rek: Results) -> None:
     make_results(rek.folder.parent / "other", rek.protocol)
     (rek.folder / "blinding" / "key.sealed").write_bytes(b"e30=")
     with pytest.raises(StoreError, match=r"key\.sealed"):
-        load_study(rek.folder)
-
-
-def test_a_bad_cell_is_found_in_whichever_file_and_row_it_stands(rek: Results) -> None:
-    """The row is counted in its own file, the header as row 1."""
-    for number in range(1, 6):
-        rek.add(f"P{number:03d}", lambda *_: 4)
-    path = rek.responses("P004")
-    lines = path.read_text(encoding="utf-8").split("\n")
-    cells = lines[7].split(",")
-    cells[header(RESPONSES).index("changes")] = "99999999999999999999"
-    path.write_text("\n".join([*lines[:7], ",".join(cells), *lines[8:]]), encoding="utf-8")
-    with pytest.raises(
-        AnalysisError, match=r"subject-P004.*row 8, column changes: '99999999999999999999' is not a whole"
-    ):
         load_study(rek.folder)

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis.data import measures
 from study_app.analysis.data.session_files import tables
 from study_app.errors import AnalysisError
 from study_app.store.tables.csv_files import MISSING, Column, problems
@@ -118,40 +117,3 @@ def test_report_and_verify_refuse_the_same_cells_in_the_same_row(
     sentence = f"{column}: {cell!r} is not {permitted}"
     assert f"row 3, column {sentence}; " in str(refused.value)
     assert list(problems(path.read_bytes(), COLUMNS)) == [f"row 3, {sentence}"]
-
-
-def table(rows: list[tuple[str, str, str, float | None]], *, cannot_judge: tuple[int, ...] = ()) -> pd.DataFrame:
-    frame = pd.DataFrame(rows, columns=["participant", "code", "item", "response"])
-    frame["response"] = frame["response"].astype("Int64")
-    frame["cannot_judge"] = [row in cannot_judge for row in range(len(rows))]
-    return frame
-
-
-def of_one(values: list[int]) -> pd.Series:
-    rows = [(f"P{number}", "L1", "a", value) for number, value in enumerate(values)]
-    return measures.aggregate(table(rows), {"L1": len(values)}, ["L1"], ["a"]).iloc[0]
-
-
-def test_quartiles_are_linear_type_7() -> None:
-    row = of_one([1, 2, 4, 7])
-    assert (row["q1"], row["median"], row["q3"]) == (1.75, 3.0, 4.75)
-
-
-def test_a_statement_without_any_answer_has_no_median() -> None:
-    found = measures.aggregate(table([("P1", "L1", "a", 4)]), {"L1": 1}, ["L1", "L2"], ["a", "b"])
-    assert list(zip(found["code"], found["item"], strict=True)) == [("L1", "a"), ("L1", "b"), ("L2", "a"), ("L2", "b")]
-    assert found.iloc[1:][["median", "q1", "q3", "agree_percent"]].isna().all(axis=None)
-    assert found.iloc[1]["missing"] == 1
-    assert found.iloc[2]["missing"] == 0
-
-
-def test_by_participant_takes_the_median_of_repeats_and_leaves_gaps() -> None:
-    rows = [
-        ("P1", "D1", "a", 2),
-        ("P1", "D1", "a", 5),
-        ("P2", "D2", "a", 7),
-        ("P2", "D1", "a", None),
-        ("P1", "D2", "b", 1),
-    ]
-    found = measures.by_participant(table(rows), ["P1", "P2"], {"D1": 0, "D2": 1}, "a")
-    np.testing.assert_array_equal(found, [[3.5, np.nan], [np.nan, 7.0]])

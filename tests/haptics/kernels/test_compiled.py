@@ -158,36 +158,6 @@ def test_a_cache_that_came_with_the_program_is_begun_with_unless_it_is_for_anoth
     assert started(package, generic | fresh)[1] == 1
 
 
-def test_a_shipped_cache_is_copied_once_and_a_torn_copy_is_swept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    own = tmp_path / "cache" / ("a" * 16)
-    shipped = tmp_path / "shipped"
-    (shipped / own.name / "haptics").mkdir(parents=True)
-    (shipped / own.name / "haptics" / "tick.nbi").write_bytes(b"x")
-    monkeypatch.setattr(compiled, "SHIPPED_CACHE", shipped)
-    own.parent.mkdir()
-    with monkeypatch.context() as disk_full:
-        disk_full.setattr(shutil, "copytree", lambda *_a, **_n: (_ for _ in ()).throw(OSError("full")))
-        compiled.copy_shipped(own)
-    assert list(own.parent.iterdir()) == []
-    compiled.copy_shipped(own)
-    assert [path.name for path in own.parent.iterdir()] == [own.name]
-    (own / "haptics" / "tick.nbi").write_bytes(b"mine")
-    compiled.copy_shipped(own)
-    assert (own / "haptics" / "tick.nbi").read_bytes() == b"mine"
-
-
-def test_a_cache_is_removed_unless_a_program_started_with_it_meanwhile(tmp_path: Path) -> None:
-    cache = tmp_path / ("a" * 16)
-    cache.mkdir()
-    seen_at = cache.stat().st_mtime
-    compiled.remove_cache(cache, seen_at - 1.0)
-    assert list(tmp_path.iterdir()) == [cache]
-    compiled.remove_cache(cache, seen_at)
-    assert list(tmp_path.iterdir()) == []
-
-
 def digest_with(package: Path, file: str, old: str, new: str) -> str:
     """Return the digest of the sources after a change of one file, which is then undone."""
     path = package / file

@@ -12,7 +12,6 @@ if numba.config.DISABLE_JIT:
     pytest.skip("too many sub-steps for plain Python", allow_module_level=True)
 
 from study_app.haptics.kernels.plant import move, new_handle, new_schedule, next_tick, push
-from study_app.haptics.model.device_dynamics import MOST_DELAY
 
 STILL = np.zeros(3)
 
@@ -49,16 +48,6 @@ def test_the_step_response_is_that_of_mass_spring_and_damper(damping_ratio):
     assert x == pytest.approx(step * (1 - rest), abs=3e-3 * step)
 
 
-def test_coulomb_friction_holds_a_handle_and_then_slides():
-    handle = new_handle(mass_kg=0.2, coulomb_n=0.5)
-    handle.force_n[:] = 0.29, 0.29, 0.28  # 0.497 N in all
-    move(handle, STILL, STILL, 1.0)
-    assert not handle.position_m.any()
-    handle.force_n[:] = 0.6, 0.0, 0.0
-    move(handle, STILL, STILL, 1.0)
-    assert handle.velocity_mps[0] == pytest.approx(0.1 / 0.2)
-
-
 @pytest.mark.slow
 @settings(deadline=None)  # the first example compiles
 @given(
@@ -82,27 +71,6 @@ def test_no_stiffness_damping_or_friction_makes_energy(mass, stiffness, damping,
         after = energy()
         assert after <= before * (1 + 1e-12) + np.finfo(float).tiny  # below it, numbers lose their digits
         before = after
-
-
-def test_end_stops_hold_it():
-    handle = new_handle(mass_kg=0.2, stop_m=(0.05, 0.05, 0.05))
-    handle.force_n[:] = 8.0, -8.0, 0.0
-    move(handle, STILL, STILL, 1.0)
-    assert handle.position_m.tolist() == [0.05, -0.05, 0.0]
-    assert not handle.velocity_mps.any()
-    handle.force_n[:] = -8.0, 8.0, 0.0
-    move(handle, STILL, STILL, 0.01)
-    assert abs(handle.position_m[0]) < 0.05
-
-
-@pytest.mark.parametrize("delay", range(MOST_DELAY + 1))
-def test_a_force_acts_as_many_writes_late_as_the_device_is_delayed(delay):
-    handle = new_handle(mass_kg=0.2, delay=delay)
-    acting = []
-    for k in range(1, 12):
-        push(handle, k, -k, 2 * k)
-        acting.append(handle.force_n.tolist())
-    assert acting == [[max(k - delay, 0) * sign for sign in (1, -1, 2)] for k in range(1, 12)]
 
 
 def test_motors_saturate_each_on_its_own_and_give_whole_steps():

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from study_app.evidence.stability.withheld_force import MOST, QUICK, SHAKEN, measure
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import Ewma, Kalman
-from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import handle_limits
 from study_app.haptics.runtime.pack import pack
@@ -99,21 +97,3 @@ def test_the_force_has_no_cliff_where_inertia_exceeds_its_limit(velocity):
     assert (np.max(sent_nspm, axis=0) <= most_nspm * (1 + 1e-9)).all()
     assert (np.max(sent_nspm, axis=0) > 0.95 * most_nspm).all()
     assert sent_nspm[-1] == pytest.approx([0.15 * limit.drag_nspm for limit in limits], rel=1e-4)
-
-
-@compiled
-def test_a_quick_stroke_is_no_debt_of_the_added_mass():
-    mass = Scene(scale=3, liquids=(liquid(1000, effects=("drag", "added_mass")),), velocity=Kalman())
-    hand = Hand(mass, dynamics=MEASURED)
-    samples = [hand.tick((0.03 * np.cos(2 * np.pi * 5 * k / 1000), 0.0, 0.0)) for k in range(1000)]
-    assert not any(sample.limiters & LIMITER_ENERGY for sample in samples)
-
-
-@pytest.mark.slow
-@compiled
-@pytest.mark.parametrize("name", ["physical_glycerin", "physical_gear_oil"])
-def test_shipped_liquids_with_added_mass_meet_the_goal_of_force_withheld(name):
-    for found in measure([name], ["kalman"]):
-        if found.mode != SHAKEN:
-            assert found.strokes[-len(QUICK) :] == pytest.approx([0.0] * len(QUICK), abs=MOST / 3)
-        assert found.met

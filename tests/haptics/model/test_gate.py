@@ -7,10 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
-from study_app.haptics.model.effects.drag import Drag, cheapest_law, resistance_n
-from study_app.haptics.model.effects.wake import Wake
-from study_app.haptics.model.gate import Extremes, bounds, calls_for, describe_gate, lowered_mps, resolve
-from study_app.haptics.model.scene import Accuracy, Body, Box, Cylinder, Knee, Liquid, MotionBox, Scene
+from study_app.haptics.model.effects.drag import cheapest_law, resistance_n
+from study_app.haptics.model.gate import Extremes, bounds, calls_for, lowered_mps, resolve
+from study_app.haptics.model.scene import Accuracy, Body, Box, Cylinder, Liquid, MotionBox, Scene
 
 LIQUIDS = {
     "water": (998.2, 1.0016e-3),
@@ -115,15 +114,6 @@ def test_the_surface_is_called_for_where_the_ball_can_cross_it(depth_m, effects)
         assert bound(scene, "buoyancy") == pytest.approx(998.2 * VOLUME_M3 * 9.80665)
 
 
-def test_a_wake_is_never_taken_but_keeps_its_place_in_the_table():
-    scene = stirred("water", 1.0, wake=Wake(length=1700, scaling=1700))
-    (verdict,) = [verdict for verdict in calls_for(scene) if verdict.effect == "wake"]
-    assert verdict.bound_n > bound(scene, "drag")
-    assert not verdict.included
-    assert "name it" in verdict.why
-    assert taken(scene) == taken(stirred("water", 1.0))
-
-
 liquids = st.builds(
     Liquid,
     id=st.just("liquid"),
@@ -190,30 +180,6 @@ def test_the_law_is_the_cheapest_within_the_target_at_every_speed(scene):
     assert not any(meets(other) for other in cheaper[law])
 
 
-def test_the_knee_lowers_the_fastest_motion_too():
-    scene = stirred("water", 9.0, viscosity_pa_s=None)
-    assert bound(scene, "drag") == pytest.approx(0.5 * 998.2 * 0.47 * math.pi * 0.034**2 * 49)
-    assert lowered_mps(7.0, Knee(law="square")) == 9.0
-    assert lowered_mps(7.0, Knee(law="none")) == 7.0
-
-
-def test_the_table_in_words():
-    scene = stirred("glycerin", 0.1)
-    pool = stirred("water", 0.5, region=POOL)
-    lines = describe_gate(scene.model_copy(update={"liquids": (*scene.liquids, *pool.liquids)}))
-    assert lines[0] == "glycerin: effects chosen; up to 0.1 m/s and 0.25 m/s² in the scene"
-    assert lines[1].split() == ["effect", "bound", "[N]", "share", "why"]
-    drag, buoyancy, added_mass, history = (line.split(maxsplit=4) for line in lines[2:6])
-    assert drag[:4] == ["drag", "0.143", "5.9%", "in"]
-    assert "schiller-naumann, within 5 % or 0.05 N of haider-levenspiel" in drag[4]
-    assert added_mass[3:] == ["out", "0.026 N omitted in total, within 0.122 N"]
-    assert buoyancy[4].startswith("without it 2.06 N would be missing, more than 0.122 N")
-    assert history[0] == "history"
-    assert lines[6] == ""
-    assert lines[7].endswith("in the scene, centre 0.16 to 0.24 m deep")
-    assert all(line == line.rstrip() for line in lines)
-
-
 def later(scene):
     """Return the scene as of a file of format 2."""
     return scene.model_copy(update={"format": 2})
@@ -231,10 +197,3 @@ def later(scene):
 )
 def test_in_format_2_unsteady_drag_is_taken_up_to_re_1000(name, speed_mps, effects):
     assert taken(later(stirred(name, speed_mps))) == effects
-
-
-def test_a_damper_and_a_liquid_without_viscosity_keep_drag():
-    damper = stirred("honey", 0.1, drag=Drag(law="linear", damping_nspm=3.0))
-    assert "unsteady_drag" not in bounds(later(damper), damper.liquids[0])
-    assert "drag" in taken(later(damper))
-    assert "drag" in taken(later(stirred("water", 1.0, viscosity_pa_s=None)))

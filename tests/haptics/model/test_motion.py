@@ -36,11 +36,6 @@ def test_positions_are_read_in_order(tmp_path):
     assert motion.velocity_mps is None
 
 
-@pytest.mark.parametrize("text", [f"\ufeff{HEADER}\r\n0,1,2,3\r\n", f'{HEADER}\n"0",1,2,3\n\n\n'])
-def test_a_spreadsheets_byte_order_mark_line_ends_and_last_blank_lines_are_fine(tmp_path, text):
-    assert read(written(tmp_path, text)).position_m.tolist() == [[1, 2, 3]]
-
-
 @pytest.mark.parametrize("header", ["x_m,t_s,y_m,z_m", "t,x,y,z", f"{HEADER},vx_mps", "0,1,2,3", ""])
 def test_another_header_is_refused(tmp_path, header):
     (problem,) = problems(tmp_path, "0,1,2,3", header=header)
@@ -64,10 +59,6 @@ def test_time_must_increase(tmp_path):
         "line 4: row 3: t_s must increase, but 0.002 follows 0.002",
         "line 5: row 4: t_s must increase, but 0.001 follows 0.002",
     ]
-
-
-def test_a_file_without_rows_is_refused(tmp_path):
-    assert problems(tmp_path) == ["rows: there are none (give at least one)"]
 
 
 @pytest.mark.parametrize("content", [None, b"\xff\xfe\x00", b't_s,"x'])

@@ -9,7 +9,6 @@ from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.levels.sensitivities import sensitivities
-from study_app.evidence.thresholds.known_values import known_value
 from study_app.protocol.checks.expected_precision import (
     EstimationPlan,
     MeanPlan,
@@ -87,15 +86,6 @@ def test_many_trials_recover_the_d_prime_of_every_design(design: str, *, roving:
         assert plan.estimates(np.array([planted]), np.random.default_rng(2))[0] == pytest.approx(planted, abs=0.05)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("design", ["2ifc", "abx", "oddity", "samedifferent"])
-def test_four_times_the_trials_halve_the_spread(design: str) -> None:
-    few, many = (
-        expected_mean(SensitivityPlan(default_design(design), n, roving=False, of_each="")) for n in (120, 480)
-    )
-    assert many.spread == pytest.approx(few.spread / 2, rel=0.2)
-
-
 def test_the_spread_of_an_exponent_is_that_of_a_least_squares_slope() -> None:
     plan = plan_of(load("thickness"), "thickness")
     assert isinstance(plan, EstimationPlan)
@@ -104,19 +94,6 @@ def test_the_spread_of_an_exponent_is_that_of_a_least_squares_slope() -> None:
     exact = ESTIMATE_NOISE / math.sqrt(4 * ((x - x.mean()) ** 2).sum())
     assert expected_mean(plan).spread == pytest.approx(exact, rel=0.06)
     assert expected_mean(plan.with_trials(144)).spread == pytest.approx(exact / 2, rel=0.06)
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-def test_the_spread_is_that_of_exponents_from_simulated_answers() -> None:
-    protocol = load("thickness")
-    known = known_value("thickness", protocol)
-    studies = [known.simulate(number, seed=1) for number in range(30)]
-    found = np.array([one.value for study in studies for own in study.own for one in own])
-    expected = expected_mean(plan_of(protocol, "thickness"))
-    assert found.std(ddof=1) == pytest.approx(expected.spread, rel=0.12)  # 300 participants: ±4 %
-    means = found.reshape(-1, 10).mean(axis=1)
-    assert means.std(ddof=1) == pytest.approx(expected.spread / math.sqrt(10), rel=0.4)  # equal people
 
 
 def exact_spread(value: float, ratings: int) -> float:
@@ -142,12 +119,6 @@ def test_the_spread_of_d_a_is_that_of_the_area_under_the_roc_curve(ratings: int)
     assert (found.trials, found.threshold) == (ratings, 1.0)
     assert found.spread == pytest.approx(exact_spread(1.0, ratings), rel=0.08)
     assert found.median == pytest.approx(1.96 * found.spread, rel=1e-4)
-
-
-def test_many_ratings_recover_d_a_less_what_few_points_hide() -> None:
-    shown = [RatingPlan(points, 200_000).estimates(np.array([1.0]), np.random.default_rng(2))[0] for points in (2, 11)]
-    assert shown[0] == pytest.approx(0.707, abs=0.01)  # two points: z of the share of one answer, 0.691, is ½
-    assert 0.97 < shown[1] < 1.0
 
 
 @pytest.mark.slow
@@ -180,9 +151,3 @@ def test_an_exponent_that_was_not_published_is_one_half_and_a_modulus_is_no_tria
     changed = thickness.model_copy(update={"analysis": None, "designs": {"number": number}})
     plan = plan_of(changed, "thickness")
     assert (plan.trials, plan.value) == (36, 0.5)
-
-
-def test_blocks_of_statements_and_thresholds_have_neither() -> None:
-    for name, block in (("rek2024", "delays"), ("viscosityjnd", "viscosity")):
-        protocol = load(name)
-        assert mean_plan(protocol, protocol.blocks[block]) is None

@@ -6,7 +6,6 @@ from study_app.errors import StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import balance, describe_balance, evenness, numbered
-from tests.protocol.edited_studies import text_of
 from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")
@@ -37,18 +36,6 @@ def test_positions_and_what_follows_what_are_counted():
     assert not counted.follows_even
 
 
-def test_even_orders_are_recognised():
-    latin = evenness("abc", ["abc", "bca", "cab"])
-    assert latin.positions_even
-    assert not latin.follows_even
-    assert not latin.balanced
-    williams = evenness("abc", ["abc", "bca", "cab", "cba", "acb", "bac"])
-    assert williams.positions == ((2, 2, 2),) * 3
-    assert williams.follows == ((0, 2, 2), (2, 0, 2), (2, 2, 0))
-    assert williams.balanced
-    assert (williams.longest_run, williams.shortest_distance) == (1, None)
-
-
 @pytest.mark.parametrize("conditions", range(2, 13))
 def test_a_williams_design_balances_every_full_round_and_no_other_number(conditions: int):
     rows = conditions * (1 + conditions % 2)
@@ -67,22 +54,6 @@ def test_blocks_with_one_code_are_left_out():
     assert [block.id for block in judged.blocks] == ["liquids", "delays"]
     assert (judged.study, judged.participants, judged.seed) == ("rek2024", 5, 3)
     assert sum(map(sum, judged.blocks[1].evenness.positions)) == 5 * 7
-
-
-def test_the_seed_matters_to_random_orders_alone():
-    def counted(protocol: Protocol, seed: int):
-        return balance(protocol, numbered(6), seed).blocks[0].evenness
-
-    assert counted(REK, 1) != counted(REK, 2)
-    assert counted(ordered('order = "williams"'), 1) == counted(ordered('order = "williams"'), 2)
-
-
-def test_one_main_block_has_no_order_of_blocks():
-    text = text_of("mixed").replace('name = "mixed"', 'name = "mixed"\nblock_order = "balanced"')
-    for study in (text, text.replace("balanced", "random")):
-        judged = balance(parse(study.encode(), "mixed"), numbered(6), 1)
-        assert [block.id for block in judged.blocks] == ["stir"]
-    assert "The main blocks" not in describe_balance(judged)
 
 
 def test_a_design_needs_participants():

@@ -4,38 +4,12 @@ import math
 
 import pytest
 
-from study_app.protocol.describe import describe
-from study_app.protocol.trials.methods import START_SHARE, Adjustment
+from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.trials.tracks import adjusting_of, method_of
-from tests.protocol.trials.level_studies import key_of, run
-from tests.protocol.trials.matching import ALONE, DELAY, matching
+from study_app.protocol.trials.tracks import method_of
+from tests.protocol.trials.matching import matching
 
 LOW, HIGH = math.log10(2), math.log10(18)
-WIDE = (HIGH - LOW) * START_SHARE
-
-
-def starts(secret: bytes) -> list[float]:
-    protocol = matching(("repetitions = 4", "repetitions = 20"))
-    return [float(due.level or 0.0) for due in run(protocol, key_of(protocol, secret), "0")]
-
-
-@pytest.mark.parametrize("first", [0, 1])
-def test_settings_start_alternately_near_either_end_and_the_secret_draws_which_is_first(first: int) -> None:
-    secret = next(bytes([n] * 32) for n in range(50) if (starts(bytes([n] * 32))[0] > 6) == bool(first))
-    levels = [math.log10(level) for level in starts(secret)]
-    assert len(levels) == 20
-    for number, u in enumerate(levels):
-        low, high = (LOW, LOW + WIDE) if (number + first) % 2 == 0 else (HIGH - WIDE, HIGH)
-        assert low <= u <= high
-    assert len({round(u, 6) for u in levels}) == 20
-
-
-@pytest.mark.slow
-def test_both_ends_are_first_about_equally_often_and_no_start_is_an_end() -> None:
-    firsts = [starts(bytes([n] * 32))[0] for n in range(60)]
-    assert 15 < sum(one > 6 for one in firsts) < 45
-    assert all(2 < one < 18 for one in firsts)
 
 
 @pytest.mark.parametrize("level", ["value", "difference"])
@@ -67,15 +41,6 @@ def test_a_step_is_a_fortieth_of_the_span_or_a_factor_on_log_spacing() -> None:
     stimulus = Stimulus.model_validate({"vary": "b", "level": "value", "levels": (2.0, 18.0)})
     assert Adjustment().step(stimulus) == pytest.approx((HIGH - LOW) / 40)
     assert Adjustment(step_size=1.1).step(stimulus) == pytest.approx(math.log10(1.1))
-
-
-def test_without_the_standard_there_is_one_interval_and_a_delay_may_start_at_the_present_one() -> None:
-    assert "1 interval" in describe(matching(ALONE))
-    protocol = matching(ALONE, DELAY)
-    block = protocol.blocks["matching"]
-    setting = adjusting_of(protocol, block, 0.0, 30.0)
-    assert setting is not None
-    assert setting.comparison(setting.moved(0, 1)) > 30.0
 
 
 def test_a_task_goes_on_for_as_long_as_a_setting_may_take() -> None:

@@ -1,6 +1,5 @@
 """The target that is followed: where it is, how fast, and how long."""
 
-from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -36,25 +35,6 @@ def test_the_comparison_of_a_level(keys: dict[str, str], standard: float | None,
     assert stimulus(**keys).level_between(standard, comparison) == level
 
 
-def test_a_time_is_varied_by_differences_and_anything_else_by_weber_fractions():
-    assert stimulus(vary="delay_ms").level_kind == "difference"
-    assert stimulus().level_kind == "weber"
-
-
-def test_levels_are_evenly_spaced_in_their_logarithm():
-    levels = stimulus(levels=(1, 100), steps=5).grid
-    assert levels == pytest.approx((1, 10**0.5, 10, 10**1.5, 100), rel=1e-12)
-    assert (levels[0], levels[-1]) == (1, 100)
-
-
-def test_levels_are_evenly_spaced():
-    assert stimulus(levels=(0, 1), spacing="linear").spaced(5) == (0, 0.25, 0.5, 0.75, 1)
-
-
-def test_one_level_is_the_largest():
-    assert stimulus().spaced(1) == (0.8,)
-
-
 amplitudes, frequencies, leads = st.floats(1, 100), st.floats(0.2, 5), st.floats(0.1, 5)
 
 
@@ -85,36 +65,6 @@ def test_the_pace_is_the_rms_speed_after_the_lead(amplitude: float, frequency: f
 
 def design(kind: str) -> Design:
     return Rated(scale="agreement") if kind == "rating" else default_design(kind)
-
-
-@pytest.mark.parametrize(
-    ("kind", "intervals", "arrangements", "guess_rate"),
-    [
-        ("2ifc", 2, 2, 1 / 2),
-        ("3ifc", 3, 3, 1 / 3),
-        ("4ifc", 4, 4, 1 / 4),
-        ("abx", 3, 4, 1 / 2),
-        ("oddity", 3, 6, 1 / 3),
-        ("samedifferent", 2, 4, None),
-        ("yesno", 1, 2, None),
-        ("rating", 1, 1, None),
-        ("estimation", 1, 1, None),
-    ],
-)
-def test_intervals_arrangements_and_guess_rate(kind: str, intervals: int, arrangements: int, guess_rate: float | None):
-    built = design(kind)
-    assert built.intervals == intervals
-    assert len(built.arrangements) == len(set(built.arrangements)) == arrangements
-    assert {len(one) for one in built.arrangements} == {intervals}
-    assert built.guess_rate == guess_rate
-
-
-@pytest.mark.parametrize("kind", [kind for kind in DESIGN_KINDS if design(kind).has_correct_answer])
-def test_every_arrangement_has_a_correct_answer_and_each_is_correct_equally_often(kind: str):
-    built = design(kind)
-    correct = [built.correct(number) for number in range(len(built.arrangements))]
-    assert set(correct) == set(built.answers)
-    assert len(set(Counter(correct).values())) == 1
 
 
 @pytest.mark.parametrize(
@@ -153,11 +103,6 @@ def test_simulated_observer_without_noise_answers_correctly(kind: str):
     for number, arrangement in enumerate(built.arrangements):
         taken = [2.0 if comparison else 1.0 for comparison in arrangement]
         assert built.simulated(taken, 1.5, Sharp()) == built.correct(number)
-
-
-def test_yes_counts_as_success_whatever_was_presented():
-    built = design("yesno")
-    assert [built.success(0, "yes"), built.success(1, "yes"), built.success(0, "no")] == [True, True, False]
 
 
 @pytest.mark.parametrize(

@@ -24,17 +24,6 @@ def test_published_sleep_data() -> None:
     assert result.verdict == "out of reach"
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_the_verdict_is_that_of_the_interval(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    differences = rng.normal(rng.choice([0, 0.6]), 0.7, 20)
-    result = tost(differences, 0.5)
-    assert result.interval is not None
-    inside = result.interval.low > -0.5 and result.interval.high < 0.5
-    assert (result.p is not None and result.p <= 0.05) == inside
-    assert result.interval.low + result.interval.high == pytest.approx(2 * differences.mean())
-
-
 @pytest.mark.parametrize(
     ("differences", "verdict"),
     [
@@ -84,12 +73,6 @@ def test_people_beyond_the_bound_are_counted_whatever_the_mean() -> None:
     assert (found.beyond.interval.low, found.beyond.interval.high) == pytest.approx((0.0103, 0.2700), abs=1e-4)
 
 
-def test_a_small_but_certain_difference_can_be_equivalent() -> None:
-    result = tost(np.tile([0.2, 0.3], 10), 0.5)
-    assert result.verdict == "equivalent"
-    assert result.checks_agree
-
-
 def test_the_permutation_check_goes_through_all_signs() -> None:
     differences = np.array([0.5, -0.5, 0.0, 1.0, 0.5, 0.0])
     result = tost(differences, 1.0)
@@ -108,18 +91,6 @@ def test_the_rank_check_shifts_by_the_bound_to_both_sides() -> None:
     assert tost(differences, 2.0).p_ranks == pytest.approx(max(below, above))
     # One of three lies on the bound and two about it.
     assert tost([0.0, 1.0, 2.0], 1.0).p_ranks == pytest.approx(0.75)
-
-
-def test_without_differences_nothing_is_tested() -> None:
-    nobody = tost([np.nan, np.nan], 1.0)
-    assert (nobody.n, nobody.dropped, nobody.effect, nobody.p) == (0, 2, None, None)
-    assert nobody.note == "0 participants: no spread"
-
-
-def test_missing_differences_are_dropped() -> None:
-    result = tost([*(FIRST - SECOND), np.nan], 0.5)
-    assert (result.n, result.dropped) == (10, 1)
-    assert result.p == pytest.approx(0.98924, abs=5e-6)
 
 
 @pytest.mark.parametrize("bound", [0, -1, np.nan, np.inf])

@@ -29,11 +29,6 @@ def test_the_displaced_weight_less_the_own(density, own, diameter):
     assert vectors(felt, "force")[0] == pytest.approx(expected, rel=1e-12, abs=1e-12 * (density + own))
 
 
-def test_in_water_a_ball_of_68_mm_is_carried_by_a_newton_and_a_half():
-    light = scene(floating(998.2), body=Body(density_kg_m3=0.01))
-    assert simulate(light, moving([(0, 0, 0)])).fy_n[0] == pytest.approx(1.61, abs=0.005)
-
-
 def test_where_two_liquids_meet_the_weight_counts_once():
     left = floating(800, id="left", region=Box(centre_m=(-1, 0, 0), size_m=(2, 2, 2)))
     right = floating(1200, id="right", region=Box(centre_m=(1, 0, 0), size_m=(2, 2, 2)))

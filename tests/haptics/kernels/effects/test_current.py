@@ -32,14 +32,6 @@ def flow(felt, places_m):
     return np.divide(force, np.sqrt(size * WATER_FACTOR), out=np.zeros_like(force), where=size > 0)
 
 
-def test_a_hand_that_drifts_with_the_river_feels_nothing_and_leaves_no_wake():
-    wake = {"length": 500, "scaling": 500}
-    drifting = moving(np.tile([0.7, 0.0, -0.2], (300, 1)))
-    felt = simulate(river(Uniform(velocity_mps=(0.7, 0.0, -0.2)), wake=wake), drifting)
-    assert not vectors(felt, "force").any()
-    assert not vectors(felt, "wake").any()
-
-
 @pytest.mark.slow
 @settings(max_examples=examples(30), deadline=None)
 @given(through=st.tuples(components, st.just(0.0), components), current=velocities)

@@ -14,12 +14,6 @@ from tests.haptics.scenes import UNBENT, examples, liquid, moving, scene, vector
 speeds = st.floats(-20, 20)
 
 
-def test_water_at_one_metre_a_second_resists_with_the_drag_equation():
-    table = simulate(scene(), moving([(1.0, 0.0, 0.0)]))
-    assert table.fx_n[0] == pytest.approx(-0.5 * 1000 * 0.47 * 3.6317e-3, rel=1e-4)
-    assert (table.fy_n[0], table.fz_n[0]) == (0.0, 0.0)
-
-
 @pytest.mark.slow
 @settings(max_examples=examples(100), deadline=None)
 @given(vx=speeds, vy=speeds, vz=speeds, density=st.floats(1, 20_000), diameter=st.floats(0.001, 1), cd=st.floats(0, 10))

@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 from study_app.haptics.kernels.effects.history import TIMES, WEIGHTS
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.history import History
-from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, UNBENT, examples, liquid, moving, scene, vectors
 
@@ -64,19 +63,6 @@ def test_creeping_oscillation_is_that_of_landau_and_lifshitz(fluid, hertz, dampi
     assert inertia == pytest.approx(inertia_kg, rel=0.01)
 
 
-@pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")
-@pytest.mark.parametrize(
-    ("fluid", "factors"), [(HONEY, (1.723, 1.323, 1.229, 1.102)), (GLYCERIN, (2.814, 1.811, 1.574, 1.257))]
-)
-def test_a_sudden_start_is_felt_long_after(fluid, factors):
-    velocity = np.full((5100, 3), [CREEPING_MPS, 0.0, 0.0])
-    velocity[:10] = 0.0
-    felt = simulate(tank(("drag", "history"), **fluid), moving(velocity)).fx_n
-    stokes = 6 * np.pi * fluid["viscosity_pa_s"] * RADIUS_M * CREEPING_MPS
-    at = [9 + round(1000 * t) for t in (0.1, 0.5, 1.0, 5.0)]
-    assert -felt[at] / stokes == pytest.approx(factors, rel=0.006)
-
-
 @pytest.mark.slow
 @settings(max_examples=examples(30), deadline=None)
 @given(
@@ -94,13 +80,3 @@ def test_within_the_window_and_far_beyond_it_is_the_integral(legs, pace):
     # Ticks that come five times too fast outgrow the rows of the window: the exponentials count from a fifth of it.
     worst = 0.02 if pace == [0.21] else 0.002
     assert abs(felt[1:] - exact).max() <= worst * max(abs(np.array(exact)).max(), 1e-12)
-
-
-def test_measured_velocities_are_smoothed_first():
-    place_m = np.zeros((80, 3))
-    place_m[40:, 0] = 38e-6  # one count of an encoder, at scale 1
-    motion = Motion(np.arange(80) / 1000, place_m)
-    one = liquid(**HONEY, effects=("history",))
-    raw = one.model_copy(update={"history": History(smoothing_s=0.0)})
-    rough, smooth = (abs(simulate(scene(fluid), motion).fx_n).max() for fluid in (raw, one))
-    assert smooth < 0.35 * rough

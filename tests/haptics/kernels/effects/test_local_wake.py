@@ -7,9 +7,9 @@ from study_app.evidence.reference_model import local_wakes
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.local_wake import CELLS, LocalWake
 from study_app.haptics.model.force_rules import VERSIONS
-from study_app.haptics.model.motion import Motion, path
+from study_app.haptics.model.motion import path
 from study_app.haptics.runtime.offline import simulate
-from tests.haptics.scenes import COMPILED, UNBENT, WATER_FACTOR, Hand, examples, liquid, moving, scene, vectors
+from tests.haptics.scenes import COMPILED, UNBENT, Hand, examples, liquid, moving, scene, vectors
 
 STEP_S = 1e-3
 
@@ -79,69 +79,6 @@ def test_what_fades_counts_less_in_the_response_too(exponent):
     assert vectors(simulate(felt, motion), "wake")[moved:again] == pytest.approx(
         exact[moved:again], rel=0.01, abs=1e-12
     )
-
-
-@pytest.mark.compiled
-def test_who_leaves_fast_after_a_stop_feels_nothing_and_who_returns_does():
-    there, back = ((0.0, 0.0, 2.0), 0.3), ((0.0, 0.0, -2.0), 0.3)
-    motion, (_, stopped, left, _, returned, _) = legs(
-        ((1.0, 0, 0), 0.8), ((0.0, 0, 0), 0.2), there, ((0, 0, 0), 0.1), back, ((0, 0, 0), 0.1)
-    )
-    wake = {"length": 3000, "scaling": 3000}
-    tail = simulate(scene(liquid(wake={**wake, "breaking_span_m": 0.0}), knee=UNBENT), motion)
-    local = simulate(tank(**wake, decay=0.999975, spreading_m2ps=1e-3), motion)
-    push_there, push_away, push_again = local.fx_n[stopped - 1], local.fx_n[left + 50], local.fx_n[returned + 50]
-    assert tail.wake_x_mps[left + 50] > 0.25  # the fault: 0.6 m away, the tail still pushes to where it was going
-    assert tail.fx_n[left + 50] > 1000 * push_there * 1e-4
-    assert push_there > 0.0
-    assert abs(push_away) < 1e-6 * push_there
-    assert push_again > 0.5 * push_there
-
-
-def test_steady_motion_meets_liquid_at_rest_but_for_what_is_right_behind():
-    motion, _ = legs(((1.0, 0, 0), 3.0))
-    local = simulate(tank(length=1700, scaling=1700), motion)
-    tail = simulate(scene(liquid(wake={"length": 1700, "scaling": 1700}), knee=UNBENT), motion)
-    assert local.wake_x_mps[-1] < 0.07
-    assert local.fx_n[-1] < -0.85 * WATER_FACTOR
-    assert tail.fx_n[-1] > -0.01 * WATER_FACTOR
-
-
-@pytest.mark.skipif(not COMPILED, reason="seconds of motion are for compiled code")
-def test_circling_in_one_place_builds_a_whirl_that_is_felt_in_all_of_it():
-    motion = path("circle", radius_m=0.1, revolutions=8.0, rest_s=0.5)
-    felt = simulate(tank(length=5000, scaling=5000), motion)
-    round_once = round(2 * np.pi * 0.1 / STEP_S)
-    along = (vectors(felt, "wake") * motion.velocity_mps).sum(axis=1)
-    assert (along[round_once : 5 * round_once] > 1.5 * along[round_once // 2]).mean() > 0.9
-
-
-def test_rest_displaces_it_within_its_length():
-    motion, (_, stopped) = legs(((1.0, 0.0, 0.0), 0.1), ((0.0, 0.0, 0.0), 0.1))
-    felt = simulate(tank(), Motion(motion.t_s, np.zeros_like(motion.position_m), motion.velocity_mps))
-    assert felt.wake_x_mps[100] == pytest.approx(1.0)
-    assert felt.wake_x_mps[100:stopped] == pytest.approx(1 - np.arange(100) / 100, abs=0.07)
-
-
-@pytest.mark.parametrize("spreading", [0.0, 1e-3, 5e-3])
-def test_it_spreads_as_in_a_viscous_liquid(spreading):
-    motion, (moved, _) = legs(((0.5, 0.0, 0.0), 0.02), ((0.0, 0.0, 0.0), 2.0))
-    felt = simulate(tank(length=50_000, scaling=50_000, spreading_m2ps=spreading, reach_m=0.1), motion)
-    age_s = motion.t_s - motion.t_s[moved - 1]
-    wide_m2 = 0.1**2 + 2 * spreading * age_s
-    expected = felt.wake_x_mps[moved] * (0.1**2 / wide_m2) ** 1.5
-    assert felt.wake_x_mps[moved:] == pytest.approx(expected[moved:], rel=0.02)
-
-
-@pytest.mark.parametrize("distance", [0.0, 0.05, 0.1, 0.2])
-def test_it_fades_with_the_distance_from_its_place(distance):
-    velocity = np.zeros((40, 3))
-    velocity[:10, 0] = 0.3
-    position = np.zeros((40, 3))
-    position[10:, 2] = distance
-    felt = simulate(tank(reach_m=0.1), Motion(np.arange(40) * STEP_S, position, velocity)).wake_x_mps
-    near = simulate(tank(reach_m=0.1), Motion(np.arange(40) * STEP_S, 0 * position, velocity)).wake_x_mps
-    assert felt[10:] == pytest.approx(near[10:] * np.exp(-0.5 * (distance / 0.1) ** 2), rel=1e-9)
 
 
 @pytest.mark.slow

@@ -4,9 +4,6 @@ import numpy as np
 import pytest
 
 from study_app.evidence.reference_model import non_newtonian_n
-from study_app.haptics.model import laws
-from study_app.haptics.model.effects.non_newtonian import steady_n
-from study_app.haptics.model.laws import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.layout import LIMITER_SLOPE
 from study_app.haptics.model.slope_limits import steady
 from study_app.haptics.runtime.offline import simulate
@@ -16,7 +13,6 @@ from tests.haptics.scenes import COMPILED, UNBENT, Hand, moving, scene, vectors
 pytestmark = pytest.mark.slow
 
 D = 0.068
-DIRECTION = np.array([2.0, -1.0, 2.0]) / 3
 compiled = pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")
 
 
@@ -39,62 +35,11 @@ def random_motion(seed, ticks=2000):
 
 
 @pytest.mark.parametrize("name", PRESETS)
-@pytest.mark.parametrize("speed_mps", [0.02, 0.5])
-def test_an_even_motion_meets_the_steady_force(name, speed_mps):
-    tank_scene = tank(name, scale=3.0)
-    ticks = round({"slime": 2000, "ketchup": 50 / speed_mps, "toothpaste": 350 / speed_mps}.get(name, 20))
-    if not COMPILED and ticks > 2500:
-        pytest.skip("thousands of ticks are for compiled code")
-    found = force(tank_scene, np.tile(speed_mps * DIRECTION, (ticks, 1)))[-1]
-    assert found == pytest.approx(-sum(steady_n(tank_scene, tank_scene.liquids[0], speed_mps)) * DIRECTION, rel=6e-3)
-
-
-@pytest.mark.parametrize("name", PRESETS)
 def test_it_equals_its_law_by_the_letter(name):
     tank_scene = tank(name, scale=3.0)
     velocity = random_motion(3, ticks=1500 if COMPILED else 300)
     expected = non_newtonian_n(tank_scene, velocity, np.full(len(velocity), 1e-3), slack_m=2 * 38e-6 * tank_scene.scale)
     assert abs(force(tank_scene, velocity) - expected).max() <= 0.01 * abs(expected).max()
-
-
-def newtonian(viscosity_pa_s, velocity_mps):
-    table = HerschelBulkley(consistency_pa_sn=viscosity_pa_s)
-    return force(tank("slime", table=table), velocity_mps)
-
-
-def test_liquids_without_their_peculiarity_are_newtonian():
-    velocity = random_motion(4, ticks=300)
-    expected = newtonian(2.0, velocity)
-    for table in (
-        Carreau(zero_shear_viscosity_pa_s=2, time_constant_s=0.1, flow_index=1.0),
-        Carreau(zero_shear_viscosity_pa_s=2, time_constant_s=1e-4, flow_index=0.3),
-        Maxwell(zero_shear_viscosity_pa_s=2, relaxation_time_s=1e-3),
-        ShearThickening(zero_shear_viscosity_pa_s=2, thickened_viscosity_pa_s=2, onset_shear_rate_per_s=5),
-        HerschelBulkley(consistency_pa_sn=2, flow_index=0.99999),
-    ):
-        assert abs(force(tank("slime", table=table), velocity) - expected).max() <= 1e-3 * abs(expected).max()
-
-
-def test_a_short_relaxation_lags_by_itself_and_a_long_one_is_a_spring():
-    velocity = np.outer(np.sin(3 * np.arange(600) / 1000), [0.2, 0.1, 0.0])
-    short = force(tank("slime", table=Maxwell(zero_shear_viscosity_pa_s=2, relaxation_time_s=0.011)), velocity)
-    later = np.concatenate([np.zeros((11, 3)), newtonian(2.0, velocity)[:-11]])
-    assert abs(short - later).max() <= 0.01 * abs(later).max()
-    modulus_pa = 5.0
-    spring = Maxwell(zero_shear_viscosity_pa_s=modulus_pa * 1000, relaxation_time_s=1000)
-    place_m = np.cumsum(velocity, axis=0) * 1e-3
-    stiff = 3 * np.pi * D * modulus_pa
-    assert force(tank("slime", table=spring), velocity) == pytest.approx(-stiff * place_m, abs=2e-3 * stiff)
-
-
-def test_after_a_stop_slime_relaxes_and_ketchup_holds():
-    velocity = np.zeros((1600, 3))
-    velocity[:1000, 0] = 0.1
-    slime, ketchup = (force(tank(name, scale=3.0), velocity)[:, 0] for name in ("slime", "ketchup"))
-    relaxation_s = PRESETS["slime"][1].relaxation_time_s
-    later = round(1e3 * relaxation_s)
-    assert slime[999 + later] / slime[999] == pytest.approx(np.exp(-1), rel=0.03)
-    assert ketchup[1001:] == pytest.approx(-laws.yield_n(PRESETS["ketchup"][1], D), rel=1e-3)
 
 
 @compiled

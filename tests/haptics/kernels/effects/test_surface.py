@@ -56,31 +56,6 @@ def test_the_cap_of_a_ball(depth, volume, upright, level, region):
     assert shares(depth, region) == pytest.approx((volume, upright, level), abs=5e-5)
 
 
-def test_drag_meets_what_is_under_the_surface():
-    half_under = [TOP_M]
-    level = simulate(pool("drag"), through(half_under, (1.0, 0, 0))).fx_n[0]
-    upright = simulate(pool("drag"), through(half_under, (0, 1.0, 0))).fy_n[0]
-    slanted = vectors(simulate(pool("drag"), through(half_under, (0.6, 0.8, 0))), "force")[0]
-    assert level == pytest.approx(-0.5 * WATER_FACTOR)
-    assert upright == pytest.approx(-WATER_FACTOR)
-    assert slanted == pytest.approx(-(0.36 * 0.5 + 0.64) * WATER_FACTOR * np.array([0.6, 0.8, 0]))
-
-
-@pytest.mark.parametrize("effect", ["added_mass", "history"])
-def test_what_goes_by_volume_meets_the_part_under_the_surface(effect):
-    ticks = np.arange(30)
-    halting = np.outer(np.maximum(20 - ticks, 0) * 0.01, [1.0, 0.0, 0.0])
-
-    def force(y_m):
-        places = np.column_stack([0 * ticks, np.full(30, y_m), 0 * ticks])
-        motion = Motion(ticks / 1000, places, halting)
-        return simulate(pool(effect, viscosity_pa_s=1.0), motion).fx_n
-
-    quarter_up, whole = force(TOP_M + RADIUS_M / 2), force(TOP_M - 1)
-    assert quarter_up == pytest.approx(0.15625 * whole)
-    assert whole[19] > 0.1
-
-
 @pytest.mark.compiled
 @pytest.mark.parametrize(
     ("effects", "velocity"),

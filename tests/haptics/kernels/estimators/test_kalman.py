@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from study_app.evidence.stability.bench import fast_part
 from study_app.evidence.stability.damping_limits import boundary_nspm
 from study_app.evidence.stability.withheld_force import measure
 from study_app.haptics.kernels import estimators as kalman
@@ -108,49 +107,6 @@ def test_it_is_its_definition_with_late_and_missing_samples(delay_ticks):
     assert np.abs(expected).max() > 0.05
     blind = literal(np.array(places), intervals, np.zeros((len(places), 3)))
     assert np.abs(expected - blind).max() > 0.005 * np.abs(expected).max()
-
-
-def drag_error(velocity, hz):
-    """Return the error of v·|v| [% of its mean square root] on a sinusoid of ±30 mm."""
-    t_s, w = np.arange(6000) / 1000, 2 * np.pi * hz
-    v = felt(velocity, 0.03 * np.sin(w * t_s + 0.3))[1000:, 0]
-    true = 0.03 * w * np.cos(w * t_s + 0.3)[1000:]
-    return 100 * np.sqrt(np.mean((v * abs(v) - true * abs(true)) ** 2) / np.mean(true**4))
-
-
-@compiled
-@pytest.mark.parametrize("hz", [1, 2, 3, 5])
-def test_quadratic_drag_in_smooth_strokes_is_right_to_2_5_percent(hz):
-    assert drag_error(Kalman(), hz) < 2.5
-    assert drag_error(Ewma(), hz) > 6.5
-
-
-def noise_mmps(velocity, speed_mps, tremor_m=0.0):
-    """Return the velocity above 20 Hz (mean square root of an axis) at even speed or at rest with tremor."""
-    squares = []
-    t_s = np.arange(5000) / 1000
-    for seed in range(6):
-        place = np.random.default_rng(seed).uniform(0, COUNT_M)
-        v = felt(velocity, place + speed_mps * t_s + tremor_m * np.sin(18 * np.pi * t_s))
-        squares.append(fast_part(v, 1000.0, 20.0, 1000, 5000) ** 2)
-    return 1e3 * math.sqrt(np.mean(squares))
-
-
-@compiled
-@pytest.mark.parametrize(
-    ("speed_mps", "tremor_m", "most"),
-    [(0, 20e-6, 1.3), (0.005, 0, 0.5), (0.02, 0, 0.5), (0.05, 0, 0.6), (0.2, 0, 1.05)],
-)
-def test_it_is_quieter_than_ewma_in_motion_and_about_as_quiet_at_rest(speed_mps, tremor_m, most):
-    assert noise_mmps(Kalman(), speed_mps, tremor_m) < most * noise_mmps(Ewma(), speed_mps, tremor_m)
-
-
-@compiled
-@pytest.mark.parametrize(("delay", "least"), [(0, 180), (1, 80), (2, 58), (3, 40)])
-def test_a_free_handle_bears_more_than_with_ewma(delay, least):
-    found = boundary_nspm(Kalman(), 1e-3, delay)
-    assert found > least
-    assert found > 0.95 * boundary_nspm(Ewma(), 1e-3, delay)
 
 
 @compiled

@@ -35,13 +35,6 @@ def test_a_step_of_speed_is_there_to_99_percent_after_44_samples():
     assert v[1:] == pytest.approx(1 - 0.9 ** np.arange(1, 100))
 
 
-@pytest.mark.parametrize("rate_hz", [250.0, 500.0, 2000.0])
-def test_it_is_the_same_filter_at_any_rate(rate_hz):
-    seconds = 0.02
-    slow = felt(np.arange(round(seconds * rate_hz) + 1) / rate_hz, rate_hz=rate_hz)
-    assert slow[-1] == pytest.approx(1 - 0.9**20)
-
-
 def test_given_velocities_are_taken_as_they_are():
     v = np.random.default_rng(3).normal(0, 1, (20, 3))
     assert (vectors(simulate(scene(knee=UNBENT), moving(v)), "velocity") == v).all()

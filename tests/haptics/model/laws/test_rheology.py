@@ -8,7 +8,6 @@ from study_app.errors import StudyError
 from study_app.haptics.model import laws
 from study_app.haptics.model.effects.non_newtonian import steady_n
 from study_app.haptics.model.estimators import Kalman
-from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.laws import Carreau, HerschelBulkley, Maxwell, ShearThickening
 from study_app.haptics.model.overrides import override
 from study_app.haptics.model.scene import Liquid, Scene
@@ -25,14 +24,6 @@ def force_n(table, speed_mps):
 
 def stokes_n(viscosity_pa_s, speed_mps):
     return 3 * np.pi * viscosity_pa_s * D * speed_mps
-
-
-@pytest.mark.parametrize("speed_mps", SPEEDS)
-def test_a_bingham_liquid_without_yield_stress_is_newtonian(speed_mps):
-    newtonian = HerschelBulkley(consistency_pa_sn=2.0)
-    assert force_n(newtonian, speed_mps) == pytest.approx(stokes_n(2.0, speed_mps), rel=1e-12)
-    nearly = HerschelBulkley(consistency_pa_sn=2.0, flow_index=0.9999, yield_stress_pa=1e-9)
-    assert force_n(nearly, speed_mps) == pytest.approx(stokes_n(2.0, speed_mps), rel=2e-3)
 
 
 @pytest.mark.parametrize("speed_mps", SPEEDS)
@@ -116,14 +107,6 @@ def test_a_bad_value_is_one_line(values, said):
 def test_a_liquid_has_a_viscosity_or_a_flow_curve(effects):
     with pytest.raises(ValidationError, match="remove one of them"):
         Liquid(id="a", density_kg_m3=1000, viscosity_pa_s=1, effects=effects, non_newtonian=PRESETS["ketchup"][1])
-
-
-@pytest.mark.parametrize("name", PRESETS)
-def test_the_gate_chooses_it_where_a_liquid_has_a_flow_curve(name):
-    (liquid,) = resolve(tank(name, effects="auto")).liquids
-    assert "non_newtonian" in liquid.effects
-    assert not {"drag", "unsteady_drag", "history"} & set(liquid.effects)
-    assert "not modelled: thixotropy" in "\n".join(describe_gate(tank(name, effects="auto")))
 
 
 @pytest.mark.parametrize("velocity", [Scene().velocity, Kalman()])
