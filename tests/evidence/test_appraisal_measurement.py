@@ -1,6 +1,5 @@
 """What a scene costs and how true it is, here and in the process that answers a lab."""
 
-import itertools
 import math
 from dataclasses import replace
 
@@ -17,7 +16,7 @@ from study_app.evidence.expected_error import error_report, expected
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.wake import Wake
-from study_app.haptics.model.estimators import Ewma, Given, Kalman, Raw
+from study_app.haptics.model.estimators import Given, Kalman
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.offline import samples_along
@@ -31,27 +30,6 @@ if numba.config.DISABLE_JIT:
 THESIS, PHYSICAL = load_scenes("rek2024"), load_scenes("physical_liquids")
 SHAKE = Stroke(5.0, 0.03)
 QUICK = Stroke(8.0, 0.03)
-
-
-def test_costs_name_every_effect_and_why_it_is_not_there() -> None:
-    found = {it.effect: it for it in appraisal_measurement.costs(THESIS["water"], batches=5).effects}
-    assert found["wake"].ns is not None
-    assert found["wake"].ns > 0
-    assert (found["history"].ns, found["history"].why) == (None, "not used")
-    chosen = {it.effect: it for it in appraisal_measurement.costs(PHYSICAL["water"], batches=5).effects}
-    assert chosen["buoyancy"].ns is None
-    assert chosen["buoyancy"].why.startswith("out, 0.")
-    assert chosen["current"].why == "not used"
-
-
-@pytest.mark.parametrize("name", ["water", "light_oil", "syrup"])
-def test_the_thesis_liquids_are_the_definition_to_rounding(name: str) -> None:
-    found = appraisal_measurement.errors(THESIS[name])
-    assert found.wake is not None
-    assert found.force_n is not None
-    assert found.wake < 1e-12
-    assert found.force_n < 1e-9
-    assert found.left_out == ()
 
 
 @pytest.mark.parametrize(
@@ -88,14 +66,6 @@ def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found.wake > 1e-4
 
 
-@pytest.mark.parametrize(
-    ("velocity", "lag_ms"), [(Ewma(), 9.5), (Ewma(alpha=0.5), 1.5), (Raw(), 0.5)], ids=["ewma", "quick", "raw"]
-)
-def test_the_lag_of_a_filter_is_that_of_its_closed_form(velocity: Ewma, lag_ms: float) -> None:
-    scene = THESIS["water"].model_copy(update={"velocity": velocity})
-    assert 1e3 * appraisal_measurement.lag_s(scene) == pytest.approx(lag_ms, rel=1e-6)
-
-
 def test_an_exploration_may_be_shaken_and_a_reach_goes_as_far_as_its_targets() -> None:
     tank_m = (0.1, 0.06, 0.06)
     assert Explore(kind="explore", min_s=1, max_s=3, instruction="Explore.").fastest_stroke(tank_m) == SHAKE
@@ -109,21 +79,6 @@ def test_an_exploration_may_be_shaken_and_a_reach_goes_as_far_as_its_targets() -
     following = zip(reach.targets_m, (*reach.targets_m[1:], reach.targets_m[0]), strict=True)
     assert 2 * stroke.amplitude_m == pytest.approx(max(math.dist(*pair) for pair in following))
     assert stroke.frequency_hz == pytest.approx(1 / 0.6)
-
-
-def test_a_stroke_is_made_where_the_device_is_in_the_scene() -> None:
-    here = THESIS["light_oil"]
-    origin_m = (2.0, -1.0, 0.5)
-    there = here.model_copy(
-        update={
-            "origin_m": origin_m,
-            "liquids": tuple(
-                liquid.model_copy(update={"region": Box(centre_m=origin_m, size_m=(1.0, 1.0, 1.0))})
-                for liquid in here.liquids
-            ),
-        }
-    )
-    assert withheld_share(there, QUICK, UNKNOWN) == pytest.approx(withheld_share(here, QUICK, UNKNOWN), rel=1e-3)
 
 
 def test_what_is_withheld_depends_on_the_device_and_the_rate() -> None:
@@ -238,12 +193,6 @@ def test_each_effect_costs_what_it_adds(monkeypatch):
     assert measured.rest_ns == 20
     chosen = ("drag", "buoyancy", "added_mass")  # the pool's surface is out of reach
     assert measured.scene_ns == 20 + 2 + 40 + sum(PRICES[it] for it in chosen)
-
-
-def test_the_median_is_told_not_the_mean(monkeypatch):
-    times = itertools.cycle([10, 10, 1000])
-    Clock(monkeypatch, lambda scene: next(times))
-    assert measure(Scene(), batches=9).rest_ns == 10
 
 
 def test_a_report_has_the_gates_table_with_costs_and_the_whole(monkeypatch):

@@ -1,13 +1,11 @@
 """What each figure of the thesis states, asserted on the very runs that are drawn; then the files."""
 
-import itertools
-
 import numpy as np
 import pytest
 
 from study_app.errors import StoreError
 from study_app.evidence import thesis_figures
-from study_app.evidence.thesis_figures import EXPONENTS, FIGURES, LENGTH, figure_3, figure_4, figure_5, figure_6
+from study_app.evidence.thesis_figures import EXPONENTS, FIGURES, LENGTH, figure_3, figure_4, figure_5
 from tests.haptics.scenes import COMPILED, WATER_FACTOR, vectors
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
@@ -77,28 +75,6 @@ def test_figure_5_a_jump_above_plain_drag_then_the_fall_after_the_stop():
     assert felt[-1] == 0.0
 
 
-def test_figure_6_the_wake_stays_limited_unless_the_breaking_angle_exceeds_the_turns():
-    broken, whole = figure_6().runs
-    assert "45°" in broken.label
-    assert "100°" in whole.label
-    last_leg = slice(-400, None)
-    assert size(vectors(broken.table, "wake"))[last_leg].max() < 0.8
-    assert size(force(broken))[last_leg].min() > 0.3 * INITIAL_N
-    assert size(vectors(whole.table, "wake"))[last_leg].min() > 0.9
-    assert size(force(whole))[last_leg].max() < 0.02 * INITIAL_N
-    assert size(force(broken))[0] == pytest.approx(INITIAL_N)
-
-
-def test_figure_7_a_coarser_resolution_fills_more_slowly():
-    runs = thesis_figures.figure_7().runs
-    wakes = [run.table.wake_x_mps for run in runs]
-    for finer, coarser in itertools.pairwise(wakes):
-        assert (coarser[1:] <= finer[1:] + 1e-12).all()
-        assert coarser[3000] == pytest.approx(finer[3000] / 2, rel=0.05)
-    assert wakes[0][5000] == pytest.approx(wakes[0][-1])
-    assert [round(abs(run.table.fx_n[3000]) / INITIAL_N, 1) for run in runs] == [0.2, 0.5, 0.7]
-
-
 @pytest.mark.slow
 def test_figure_8_the_wake_fills_as_the_power_of_the_share_that_is_filled():
     runs = thesis_figures.figure_8().runs
@@ -126,20 +102,6 @@ def test_every_figure_has_its_number_title_and_caption():
         assert f"Fig. {shown.number}" in words
         assert shown.title in words
         assert shown.caption in words
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-def test_the_same_bytes_every_time_in_three_formats_with_the_caption_as_text(monkeypatch, tmp_path):
-    monkeypatch.setattr(thesis_figures, "FIGURES", [figure_3, thesis_figures.figure_8])
-    first, second = thesis_figures.figures(tmp_path / "new" / "a"), thesis_figures.figures(tmp_path / "b")
-    assert [path.name for path in first] == [
-        f"figure-{number}.{kind}" for number in (3, 8) for kind in ("png", "svg", "pdf", "txt")
-    ]
-    assert sorted(path.name for path in (tmp_path / "b").iterdir()) == sorted(path.name for path in second)
-    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
-    caption = (tmp_path / "b" / "figure-3.txt").read_text(encoding="utf-8")
-    assert caption.startswith("Fig. 3: Three circles, drag alone. The body performs three circles")
 
 
 def test_a_folder_that_cannot_be_is_named(tmp_path):

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from study_app.evidence.expected_error import error_report, expected, physical_n
+from study_app.evidence.expected_error import expected, physical_n
 from study_app.evidence.reference_solutions import stroke
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.local_wake import LocalWake
@@ -39,16 +39,6 @@ def test_what_a_scene_leaves_out_is_expected_to_be_missing():
     assert both.error_n == pytest.approx(lacking.error_n)
     assert "drag by experiments" in both.against
     assert expected(Scene()).error_n == 0
-
-
-@compiled
-def test_the_expected_error_is_reported_in_a_line():
-    line = error_report(TANK, 2)
-    causes = expected(TANK, 2).causes
-    assert "expected error in its fastest strokes, delay 2: " in line
-    assert f"of the force; by velocity {100 * causes.velocity:.2g} %, acceleration none, limits " in line
-    assert ", law none; against the definition of drag and wake" in line
-    assert "\n" not in line
 
 
 @compiled

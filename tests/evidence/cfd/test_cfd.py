@@ -114,35 +114,6 @@ def test_a_table_is_of_the_shipped_liquid_and_says_what_made_it(stored, expected
         assert elsewhere < 0.2, check
 
 
-@pytest.mark.parametrize("expected", CASES, ids=lambda it: it.name)
-def test_a_stored_motion_is_the_one_that_was_asked_for(stored, expected):
-    t_s, velocity_mps, _ = stored[expected.name].columns.values()
-    speeds = expected.speed_mps * expected.profile.speed(t_s / expected.unit_s)
-    np.testing.assert_allclose(velocity_mps, speeds, atol=1e-4)
-    assert t_s[-1] == pytest.approx(expected.profile.end * expected.unit_s)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_stored_force_resists_then_pushes_on_and_fades(stored, name):
-    table = stored[name]
-    t_s, _, force_n = table.columns.values()
-    t = t_s / table.case.unit_s
-    assert (force_n[(t > 0.01) & (t <= STOP)] < 0).all()
-    after = force_n[t > STOP + RAMP]
-    assert (after > 0).all()
-    assert (np.diff(after) < 0).all()
-    assert after[-1] < 0.1 * -force_n[t <= STOP][-1]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_before_the_stop_the_force_is_that_of_steady_drag(stored, name):
-    table, steady = stored[name], stored_flows.steady()
-    t_s, _, force_n = table.columns.values()
-    reynolds, coefficient = (np.log(it) for it in list(steady.columns.values())[:2])
-    expected = np.exp(np.interp(np.log(table.case.reynolds), reynolds, coefficient)) * np.pi / 8 * table.case.unit_n
-    assert -force_n[t_s <= STOP * table.case.unit_s][-1] == pytest.approx(expected, rel=0.03)
-
-
 def test_steady_drag_is_what_was_published_and_independent_of_the_grid():
     reynolds, drag, coarse, narrow = stored_flows.steady().columns.values()
     np.testing.assert_allclose(coarse, drag, rtol=4e-3)
@@ -215,17 +186,6 @@ def test_a_fit_made_again_is_the_stored_one(stored, fits):
     (model,) = [it for it in fitted.MODELS if it.free == ("coefficient",)]
     values, _ = fitted.fit_one(model, stored["glycerin-600mmps"])
     assert values == pytest.approx(of(fits, "glycerin-600mmps", model.name).values, rel=1e-3)
-
-
-@COMPILED
-@pytest.mark.parametrize("name", NAMES)
-def test_drag_alone_never_pushes_and_history_does(fits, name):
-    assert of(fits, name, "drag of the Reynolds number").push == 0
-    history = of(fits, name, "... history, added mass")
-    assert 0.5 < history.push < 2
-    assert (
-        history.rms_n < of(fits, name, "... and added mass").rms_n < of(fits, name, "drag of the Reynolds number").rms_n
-    )
 
 
 # --- The solver ---

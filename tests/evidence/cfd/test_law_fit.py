@@ -5,7 +5,6 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.errors import StudyError
 from study_app.evidence.cfd import fits, law_fit, stored_flows
 from study_app.evidence.cfd.solved_cases import HELD_OUT, TRAINING
 from study_app.evidence.cfd.stored_flows import MOTION, Table
@@ -54,19 +53,6 @@ def test_planted_constants_are_found_and_a_motion_left_out_is_met():
     text = law_fit.evidence(found).text
     assert "| c_z | 5 | 3.15 |" in text
     assert text.count("gear_oil | ") == len(tables)
-
-
-@pytest.mark.nightly
-def test_the_stored_constants_without_a_motion_are_those_that_a_fit_gives(tmp_path):
-    tables = {it.case.name: it for it in (*stored_flows.stored(), *stored_flows.training())}
-    stored = stored_flows.left_out()
-    assert set(stored) == set(tables)
-    name = "reversal-glycerin-164mmps"
-    fitted = law_fit.fit_constants([it for other, it in tables.items() if other != name])
-    assert tuple(fitted) == pytest.approx(tuple(stored[name]), rel=5e-3)
-    (tmp_path / stored_flows.LEFT_OUT_FILE).write_text("motion,c_m\na,1\n", "utf-8")
-    with pytest.raises(StudyError, match=r"left_out\.csv cannot be used .* --refit"):
-        stored_flows.left_out(tmp_path)
 
 
 def test_the_program_meets_motions_that_no_fit_used():

@@ -75,10 +75,6 @@ def test_the_boundary_is_that_of_the_eigenvalues_and_of_the_published_table(peri
     assert exact == pytest.approx(published, rel=0.02)
 
 
-def test_at_1_khz_with_one_tick_of_delay_it_is_71_and_a_half():
-    assert boundary_nspm(Ewma(), 1e-3, 1) == pytest.approx(71.5, abs=1)
-
-
 @pytest.mark.parametrize(("mass_kg", "friction_nspm"), [(0.25, 0.5), (0.1, 5.0)])
 def test_mass_and_friction_move_it_as_the_eigenvalues_say(mass_kg, friction_nspm):
     exact = critical_nspm(1e-3, 1, 0.1, mass_kg, friction_nspm)

@@ -64,15 +64,6 @@ def test_verdicts_do_not_depend_on_the_executor(all_workers):
 
 
 @compiled
-def test_a_case_is_judged_the_same_each_time():
-    case = parse(UNSTABLE)
-    first, second = (judge(case, safe=False) for _ in range(2))
-    assert first == second
-    assert not first.stable
-    assert judge(case, safe=True).stable
-
-
-@compiled
 @pytest.mark.parametrize("speed_mps", [0.1, 0.2, 0.3, 0.6, 1.0])
 @pytest.mark.parametrize("quantum_um", [20.0, 38.0, 60.0])
 def test_a_handle_without_any_friction_comes_to_rest_in_tar(speed_mps, quantum_um):

@@ -2,9 +2,7 @@
 
 import pytest
 
-from study_app.evidence.thresholds import noticed_delays
 from study_app.evidence.thresholds.noticed_delays import (
-    ADAPTED_S,
     CRITERIA_S,
     JND_S,
     MEAN_CRITERION_S,
@@ -37,15 +35,6 @@ def test_the_forced_choice_finds_the_known_delay_and_the_rating_the_criterion(fo
         assert one.found.lower is not None
         assert one.found.lower > high
     assert [one.criterion_s for one in plain] == list(CRITERIA_S)
-
-
-def test_people_rate_by_every_criterion_and_once_more_after_adaptation(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(noticed_delays, "detected", lambda *_: (250.0, 240.0, 260.0))
-    monkeypatch.setattr(
-        noticed_delays, "rated", lambda _people, criterion_s, adapted_s, _seed: (criterion_s, adapted_s)
-    )
-    plain = [(criterion_s, 0.0) for criterion_s in CRITERIA_S]
-    assert compare(3, 1).rated == (*plain, (MEAN_CRITERION_S, ADAPTED_S))
 
 
 def test_adaptation_moves_the_rating_and_no_forced_choice(found: Compared) -> None:

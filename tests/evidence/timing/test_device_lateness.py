@@ -11,7 +11,6 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
-from study_app.errors import StudyError
 from study_app.evidence.timing import device_lateness
 from study_app.evidence.timing.device_lateness import emulated_devices, time_devices
 from study_app.evidence.timing.measurement import Ticks
@@ -60,17 +59,6 @@ def test_devices_take_turns_and_are_compared_with_the_scripted_hand(monkeypatch:
     assert slow.verdict == "missed"
     assert shaky.ratio > 1.5 > shaky.low
     assert shaky.verdict == "undecided: measure for longer"
-
-
-def test_it_ends_when_it_is_asked_to_and_refuses_too_short_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    order = times(monkeypatch, {"scripted": lambda _: 1.0})
-    ending = threading.Event()
-    ending.set()
-    with pytest.raises(KeyboardInterrupt):
-        time_devices(2.0, ["scripted"], ending=ending)
-    assert order == []
-    with pytest.raises(StudyError, match=r"for 0\.5 to 3600 s, not 0\.1"):
-        time_devices(0.1, ["scripted"], ending=threading.Event())
 
 
 def test_every_emulated_device_is_compared() -> None:

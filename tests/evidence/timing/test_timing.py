@@ -134,14 +134,6 @@ def test_the_page_of_timing_has_such_a_table_to_be_replaced_whole():
         assert words in held, "put DIR/timing.md, as timing --load gui --to DIR writes it, in place of the table"
 
 
-@pytest.mark.parametrize(("late_us", "shown"), [(100, "5.00"), (500, "25"), (19_980, "999"), (20_000, "> 1,000")])
-def test_a_ratio_to_the_bare_loop_has_as_many_digits_as_it_is_worth(late_us, shown):
-    loops = (lane("bare", NORMAL, STEADY), lane("qt", NORMAL, np.full(1000, float(late_us))))
-    table = evidence(found(*loops)).files["timing.md"]
-    (row,) = [line for line in table.splitlines() if "Qt timer" in line]
-    assert row.count(f"| {shown} ") == 2, row
-
-
 @pytest.fixture
 def run(monkeypatch, capsys, tmp_path):
     """Return what runs the command in this process; it returns exit code and what was said."""
