@@ -123,14 +123,6 @@ def test_mean_variance_and_interval_are_those_of_statsmodels(spread):
     assert (found.low, found.high) == pytest.approx((low, high), abs=1e-5)
 
 
-def test_few_estimates_have_a_mean_and_no_interval():
-    one, two = group_mean([0.3], [0.1]), group_mean([0.2, 0.6], [0.1, 0.1])
-    assert (one.n, one.mean, one.low) == (1, pytest.approx(0.3), None)
-    assert (two.n, two.mean, two.high) == (2, pytest.approx(0.4), None)
-    with pytest.raises(ValueError, match="needs an estimate"):
-        group_mean([], [])
-
-
 @pytest.mark.parametrize("people", [3, 5, 10, 20])
 def test_intervals_cover_the_mean(people):
     draw, covered = np.random.default_rng(people), 0

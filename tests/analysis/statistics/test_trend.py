@@ -14,22 +14,8 @@ from study_app.errors import AnalysisError
 # Siegel & Castellan, p. 186.
 SIEGEL_TEXT = "797 873 888 923 942 956 794 772 908 982 946 913 838 801 853 951 883 837 815 801 747 859 887 902"
 SIEGEL = np.array(SIEGEL_TEXT.split(), dtype=float).reshape(4, 6)
-# Sachs, p. 464: columns A B C D, expected B < C < D < A.
-SACHS_TEXT = "3214 4231 4123 4231 3214 4123 4321 3124 3142"
-SACHS = np.array([list(map(int, row)) for row in SACHS_TEXT.split()])
 DELAYS = (0, 50, 75, 100, 125, 150, 200)
 answers = st.lists(st.lists(st.integers(1, 4), min_size=4, max_size=4), min_size=1, max_size=3)
-
-
-@pytest.mark.parametrize(
-    ("values", "direction", "statistic", "p", "tolerance"),
-    [(SIEGEL, "increasing", 342, 0.0005661, 1e-4), (SACHS[:, [1, 2, 3, 0]], "increasing", 252, 0.0007053, 1e-4)],
-)
-def test_published_trends(values: np.ndarray, direction: str, statistic: float, p: float, tolerance: float) -> None:
-    result = trend(values, direction)  # type: ignore[arg-type]
-    assert result.statistic == statistic
-    assert result.p_page == pytest.approx(p, rel=tolerance)
-    assert "exact permutation" in result.method
 
 
 @given(answers)
@@ -122,53 +108,6 @@ def test_bad_delays_and_a_single_setting_are_refused() -> None:
         step_down(np.ones((3, 2)), (0, 50, 100))
     with pytest.raises(AnalysisError, match="at least 2"):
         trend(np.ones((3, 1)))
-
-
-# Depression scores at two visits (Hollander & Wolfe 1973; R, wilcox.test).
-FIRST = [1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30]
-SECOND = [0.878, 0.647, 0.598, 2.05, 1.06, 1.29, 1.06, 3.14, 1.29]
-levels = st.lists(st.tuples(st.integers(1, 7), st.integers(1, 7)), min_size=1, max_size=9)
-
-
-def test_published_depression_scores() -> None:
-    result = paired(FIRST, SECOND)
-    assert result.statistic == 40
-    assert result.p == pytest.approx(0.0390625, rel=1e-12)
-    assert result.effect == pytest.approx(0.777778, abs=1e-6)
-    assert result.interval is not None
-    assert (result.interval.low, result.interval.high) == pytest.approx((0.2953631, 0.9441559), abs=1e-6)
-
-
-def test_published_differences_with_ties_and_zeros() -> None:
-    result = paired([0, 1, 1, -1, 2, 2, 3, 0, 1, 1], np.zeros(10))
-    assert result.p == pytest.approx(0.046875, rel=1e-12)
-    assert (result.n, result.zeros) == (10, 2)
-    assert "equal pairs left out" in result.method
-
-
-@pytest.mark.parametrize(
-    ("n", "smallest"),
-    [(4, 0.125), (5, 0.0625), (6, 0.03125), (7, 0.015625), (8, 0.0078125), (10, 0.001953125), (11, 0.0009765625)],
-)
-def test_the_smallest_p_of_so_many_pairs(n: int, smallest: float) -> None:
-    result = paired(np.arange(n) + 2.0, np.ones(n))
-    assert result.smallest_p == pytest.approx(smallest, rel=1e-12)
-    assert result.p == result.smallest_p
-    assert (result.smallest_p <= 0.05) == (n >= 6)
-    assert ("cannot reach p ≤ 0.05" in result.note) == (n < 6)
-
-
-def test_there_is_no_interval_where_it_would_be_dishonest() -> None:
-    few = paired([2, 3, 4, 1, 6], [1, 1, 1, 3, 1])
-    assert few.interval is None
-    assert "below 6 pairs" in few.no_interval
-    alike = paired(np.arange(8) + 2, np.ones(8))
-    assert alike.interval is None
-    assert alike.no_interval == "no interval: all 8 pairs that differ went one way"
-    assert (alike.effect, alike.note) == (1.0, "all 8 pairs that differ went one way")
-    nothing = paired([3, 3], [3, 3])
-    assert (nothing.statistic, nothing.effect, nothing.no_interval) == (None, None, "no interval: no pair differs")
-    assert paired([], []).note == "no participant answered under both settings"
 
 
 def test_many_pairs_are_approximated_closely() -> None:
