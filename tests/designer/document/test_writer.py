@@ -18,7 +18,7 @@ from tests.designer.document.grown import texts
 from tests.designer.document.random_edits import check_edit, edit_of, holds_nothing
 
 EDITS = int(os.environ.get("LIQUID_STUDY_EDITS", "0"))
-"""How many random edits are tried; without it about 400. `tests/benchmarks/windows/designer.py` prints their times."""
+"""How many random edits are tried; without it about 400."""
 TEXTS = texts()
 STEPS = 16
 

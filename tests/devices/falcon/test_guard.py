@@ -63,17 +63,6 @@ def guard_for(bridge):
     return guarding.Guard("falcon", ENDS_TORQUE, bridge)
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGABRT])
-def test_a_program_that_is_killed_leaves_no_torque(server, how):
-    running = program(server.path)
-    assert server.bridge.sent == [PUSHING]
-    running.send_signal(how)
-    assert ended(running) == -how
-    server.wait_for(1 + PACKETS)
-    assert server.bridge.sent == [PUSHING, *QUIET]
-    assert server.bridge.controls == []  # the bridge stays as it was
-
-
 @pytest.mark.parametrize("how", [signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU])
 def test_a_program_that_is_guarded_is_not_suspended_while_it_pushes(server, how):
     running = program(server.path, "sys.stdin.readline(); os.kill(os.getpid(), signal.SIGKILL)")
@@ -88,13 +77,20 @@ def test_a_program_that_is_guarded_is_not_suspended_while_it_pushes(server, how)
 
 
 @pytest.mark.parametrize(
-    ("then", "code"), [("sys.exit(3)", 3), ("import os; os._exit(7)", 7), ("raise SystemError", 1)]
+    ("then", "code"),
+    [
+        *((f"os.kill(os.getpid(), signal.{how})", -getattr(signal, how)) for how in ("SIGKILL", "SIGTERM", "SIGABRT")),
+        ("sys.exit(3)", 3),
+        ("os._exit(7)", 7),
+        ("raise SystemError", 1),
+    ],
 )
-def test_a_program_that_ends_without_a_word_leaves_no_torque(server, then, code, capfd):
+def test_a_program_that_is_killed_or_ends_without_a_word_leaves_no_torque(server, then, code, capfd):
     running = program(server.path, then)
     assert ended(running) == code
     server.wait_for(1 + PACKETS)
     assert server.bridge.sent == [PUSHING, *QUIET]
+    assert server.bridge.controls == []  # the bridge stays as it was
     capfd.readouterr()
 
 

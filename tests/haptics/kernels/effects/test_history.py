@@ -3,7 +3,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.haptics.kernels.effects.history import TIMES, WEIGHTS
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.history import History
 from study_app.haptics.runtime.offline import simulate
@@ -29,13 +28,6 @@ def basset(fluid, t_s, speed_mps, ages_s):
     slope = np.diff(speed_mps) / np.diff(t_s)
     since = np.sqrt(np.maximum(ages_s - t_s[:-1], 0)) - np.sqrt(np.maximum(ages_s - t_s[1:], 0))
     return -factor * np.sum(slope * 2 * since)
-
-
-def test_the_exponentials_are_the_kernel_within_a_percent_up_to_a_hundred_windows():
-    tau = np.geomspace(1, 100, 4000)
-    times, weights = np.array(TIMES), np.array(WEIGHTS)
-    kernel = (weights * np.sqrt(np.e / times) * np.exp(-tau[:, None] / (2 * times))).sum(axis=1)
-    assert abs(kernel * np.sqrt(tau) - 1).max() <= 0.007
 
 
 @pytest.mark.slow
