@@ -19,6 +19,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import unbundled
+from study_app.store import receipt
 from study_app.store.atomic import cannot_write, create_folder
 from study_app.store.blinded.allocation import allocate
 from study_app.store.blinded.blinding import open_or_draw_key, opened_key, reveals, sealed
@@ -92,10 +93,10 @@ class SimulatedStudy:
             simulated=True,
         )
         sealed_measures = not reveals(self.folder.path)
-        self.started, receipt = first_records(
+        self.started, first_receipt = first_records(
             protocol, source, start, key_hash=self.key.hash, measures_sealed=sealed_measures, clock=SessionClock()
         )
-        self._receipt = plain(receipt)
+        self.receipt = plain(first_receipt)
 
     def begin(self, participant: str, clock: SessionClock) -> SimulatedSession:
         """Return the session of a participant, which is not on the disk before it is finished."""
@@ -110,10 +111,8 @@ class SimulatedStudy:
             Another program was first, or it cannot be written.
         """
         place, lines, key = session.place, session.lines, opened_key(self.folder)
-        identity = {"participant": place.folder.participant, "started_at": session.clock.at(0)}
         ended = {**lines[-1].fields(), "ended_at": lines[-1].at}
-        clock = {"origin_ns": session.clock.origin_ns, "origin_at": session.clock.at(0)}
-        text = json.dumps({**self._receipt, **identity, **ended, "clock": clock}, indent=2, ensure_ascii=False)
+        text = json.dumps({**session.receipt, **ended}, indent=2, ensure_ascii=False)
         files = {
             place.folder.journal.name: bytes(session.content),
             place.folder.receipt.name: f"{text}\n".encode("utf-8", "backslashreplace"),
@@ -165,7 +164,11 @@ class SimulatedSession:
         allocation = allocate(study.folder, study.key, participant, waits=False)
         self.protocol = own_protocol(study.protocol, None if allocation is None else allocation.group, 1)
         entry = None if allocation is None else allocation.entry
-        self.append(replace(study.started, participant=participant, entry=entry), t_s=0.0)
+        started_at = clock.at(0)
+        at = {"started_at": started_at, "clock": {"origin_ns": clock.origin_ns, "origin_at": started_at}}
+        self.receipt = {**study.receipt, "participant": participant, **at}
+        own = {"participant": participant, "entry": entry, "receipt_hash": receipt.digest(self.receipt)}
+        self.append(replace(study.started, **own), t_s=0.0)
         if allocation is not None:
             self.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))
 

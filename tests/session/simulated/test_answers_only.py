@@ -1,6 +1,7 @@
 """Answers without a servo: the files that a held session leaves, and the answers that the model gives."""
 
 import csv
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,10 @@ from study_app.protocol.load import load
 from study_app.session.simulated import answers_only
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import condition_features, rehearse
+from study_app.store import receipt
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.store.forging import cover_up
 from tests.studies import made_up
 
 pytestmark = pytest.mark.slow
@@ -48,6 +51,14 @@ def test_the_folder_is_sound_and_every_row_says_simulated(twelve: Path) -> None:
     for name, held in tables(twelve).items():
         assert held, name
         assert {row["simulated"] for row in held} == {"true"}, name
+
+
+def test_a_receipt_that_was_changed_with_its_proofs_differs_from_the_journal(twelve: Path, tmp_path: Path) -> None:
+    study = shutil.copytree(twelve, tmp_path / "study")
+    path = study / "data/sub-P001/ses-01/receipt.json"
+    receipt.write(path, receipt.read(path) | {"screens": {}})
+    cover_up(study)
+    assert "what the session began with: differ from the journal" in "\n".join(map(str, verify(study).errors))
 
 
 def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Path, tmp_path: Path) -> None:
