@@ -123,6 +123,8 @@ def withdraw(
     """
     by, reason = readable(by, reason, "a withdrawal needs initials and a reason")
     study = StudyFolder(folder)
+    if not folder.is_dir():
+        raise StoreError(f"{folder} is not a folder: give a study's folder, such as results/rek2024")
     copies, shared = _found(study, also)
     for one in (study, *copies):
         refuse_special(one.data / f"sub-{participant}")

@@ -1,5 +1,6 @@
 """Opening and scaling videos with PyAV, an optional extra that only this module imports."""
 
+import errno
 import os
 import sys
 import threading
@@ -45,7 +46,8 @@ def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **o
     try:
         container = av.open(source, format=kind, options=options, timeout=timeout)
     except (FFmpegError, OSError, ValueError) as error:
-        raise VideoError(reason(error)) from error
+        refused = "format_whitelist" in options and getattr(error, "errno", None) == errno.EINVAL
+        raise VideoError("its format is not accepted" if refused else reason(error)) from error
     if not container.streams.video:
         container.close()
         raise VideoError("it holds no video")
