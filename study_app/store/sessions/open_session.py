@@ -187,7 +187,7 @@ class SessionStore:
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
         table = partial(write_participants, self.place.study_folder, self.place.study)
-        for write in (self._write_receipt, table, self._write_checksums):
+        for write in (self._write_proofs, table):
             try:
                 write()
             except StoreError as error:
@@ -230,7 +230,9 @@ class SessionStore:
             since["outlets_lost"] = dict(lost)
         receipt.write(self.folder.receipt, self._receipt)
 
-    def _write_checksums(self) -> None:
+    def _write_proofs(self) -> None:
+        """Write the receipt, and then its proofs: without it these would be of the receipt before."""
+        self._write_receipt()
         found = fingerprint(write_checksums(self.folder), self._lines)
         if not self.fingerprint:
             note_fingerprint(self.place.study_folder, self.folder, found)

@@ -167,7 +167,7 @@ class SimulatedSession:
         started_at = clock.at(0)
         at = {"started_at": started_at, "clock": {"origin_ns": clock.origin_ns, "origin_at": started_at}}
         self.receipt = {**study.receipt, "participant": participant, **at}
-        own = {"participant": participant, "entry": entry, "receipt_hash": receipt.digest(self.receipt)}
+        own: dict[str, Any] = {"participant": participant, "entry": entry, "receipt_hash": receipt.digest(self.receipt)}
         self.append(replace(study.started, **own), t_s=0.0)
         if allocation is not None:
             self.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))

@@ -15,6 +15,7 @@ from study_app.store import receipt
 from study_app.store.journals import journal, journal_events
 from study_app.store.recordings import read_facts
 from study_app.store.sessions.open_session import SessionStore
+from study_app.store.verification.verify_study import verify
 from tests.journal_lines import event_of
 from tests.store.conftest import Make, Start
 
@@ -97,18 +98,19 @@ def test_a_recording_that_is_lost_is_said_to_be(start: Start, samples_of: Make) 
     assert rows_of(store, "trials")[0]["recording"] == "n/a"
 
 
+@pytest.mark.parametrize("written", ["write_participants", "write_file", "receipt.write", "write_checksums"])
 def test_an_end_that_was_half_written_is_finished_by_another_call(
-    start: Start, monkeypatch: pytest.MonkeyPatch
+    start: Start, monkeypatch: pytest.MonkeyPatch, written: str
 ) -> None:
     store = start()
     with monkeypatch.context() as patched:
         full = mock.Mock(side_effect=StoreError("no space left"))
-        patched.setattr("study_app.store.sessions.open_session.write_participants", full)
+        patched.setattr(f"study_app.store.sessions.open_session.{written}", full)
         with pytest.raises(StoreError, match="no space"):
             store.finish("completed")
     store.finish("completed")
     assert [line.event for line in store.lines].count("session_ended") == 1
-    assert store.folder.checksums.exists()
+    assert verify(store.place.study_folder.path).errors == ()
 
 
 def test_while_it_runs_only_the_journal_is_waited_for_and_at_its_end_every_table(
