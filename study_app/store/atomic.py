@@ -154,9 +154,11 @@ def temporary_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
 
 
-def temporaries(folder: Path) -> tuple[Path, ...]:
-    """Return the temporary files in ``folder`` itself, of a program that writes now or was killed."""
-    return tuple(sorted(path for path in folder.glob(".*.tmp") if _TEMPORARY.fullmatch(path.name)))
+def temporaries(folder: Path, of: str = "") -> tuple[Path, ...]:
+    """Return the temporary files in ``folder`` itself, ``of`` a name, of a program that writes now or was killed."""
+    begins = f".{of}." if of else "."
+    found = (path for path in folder.glob(".*.tmp") if path.name.startswith(begins))
+    return tuple(sorted(path for path in found if _TEMPORARY.fullmatch(path.name)))
 
 
 def sweep_old(folder: Path) -> None:

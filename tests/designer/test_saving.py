@@ -61,13 +61,17 @@ def test_a_draft_that_cannot_be_deleted_is_said_once_and_stops_no_step(drafted: 
     assert draft_of(drafted.file) is None
 
 
-def test_a_file_is_saved_though_its_draft_cannot_be_deleted(
+def test_a_file_is_saved_though_its_draft_cannot_be_deleted_and_half_a_file_is_left(
     drafted: Any, stuck: pytest.MonkeyPatch, qtbot: Any
 ) -> None:
+    halves = [drafted.file.with_name(f".{name}.0123abcd.tmp") for name in (drafted.file.name, "other.toml")]
+    for half in halves:
+        half.write_text("format = ")
     with qtbot.waitSignal(drafted.saving.saved, timeout=1000):
         drafted.saving.save()
     assert drafted.file.read_text() == drafted.text
     assert "The study was not saved" not in dict(drafted.messages)
+    assert [half.exists() for half in halves] == [False, True]
 
 
 def test_nothing_is_written_where_the_content_cannot_be_kept(drafted: Any, monkeypatch: pytest.MonkeyPatch) -> None:

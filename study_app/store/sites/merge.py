@@ -208,8 +208,8 @@ def _create(merged: Merged, sources: tuple[_Source, ...]) -> None:
     half = temporary_path(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        for path in temporaries(target.parent):  # of merges that were killed
-            if path.name.startswith(f".{target.name}.") and path.is_dir() and not is_open(path):
+        for path in temporaries(target.parent, target.name):  # of merges that were killed
+            if path.is_dir() and not is_open(path):
                 shutil.rmtree(path, ignore_errors=True)
         opening = create_opened(half)
         (half / FOLDER).mkdir()
