@@ -89,10 +89,11 @@ def found(words: str) -> tuple[HelpEntry, ...]:
 
 @cache
 def text_of(page: str) -> str:
-    """Return a page as Markdown without comments, HTML and empty cells, which Qt joins with the ones before."""
+    """Return a page as Markdown without comments, HTML, empty cells, which Qt joins, and bars in cells."""
     text = _HTML_IMAGE.sub(r"![\2](\1)", _COMMENT.sub("", documentation.page(page)))
     return "\n".join(
-        _EMPTY_CELL.sub("\N{NO-BREAK SPACE}", line) if line.startswith("|") else line for line in text.split("\n")
+        _EMPTY_CELL.sub("\N{NO-BREAK SPACE}", line).replace(r"\|", "\N{DIVIDES}") if line.startswith("|") else line
+        for line in text.split("\n")
     )
 
 
@@ -246,6 +247,9 @@ class PageReader(Coloured, QTextBrowser):
                 shape.setBottomMargin(12)
                 shape.setWidth(QTextLength(QTextLength.Type.PercentageLength, 100))
                 frame.setFormat(shape)
+                first = frame.cellAt(0, 0).firstCursorPosition()
+                if not first.block().text() and first.block().next().text() and not first.atEnd():
+                    first.deleteChar()  # Qt's empty block, in a table that follows code
 
     def _scroll_to(self, anchor: str) -> None:
         block = self.document().begin()

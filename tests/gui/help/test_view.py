@@ -2,7 +2,7 @@
 
 import pytest
 from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices, QTextDocument
+from PySide6.QtGui import QDesktopServices, QTextDocument, QTextTable
 
 from study_app.gui.help.view import PAGE
 from tests.gui import windows
@@ -41,3 +41,11 @@ def test_an_address_is_opened_outside_the_program(place, monkeypatch):
     place.reader.anchorClicked.emit(QUrl("https://jobqueue.dask.org"))
     assert opened == [QUrl("https://jobqueue.dask.org")]
     assert place.reader.page == "index"
+
+
+def test_tables_after_code_begin_with_their_heading_and_bars_have_no_backslash(place):
+    place.open_page("lab-streaming-layer")
+    table = next(frame for frame in place.reader.document().rootFrame().childFrames() if isinstance(frame, QTextTable))
+    assert table.cellAt(0, 0).firstCursorPosition().block().text() == "field"
+    place.open_page("commands")
+    assert "none∣gui∣gui+cpu" in place.reader.document().toPlainText()
