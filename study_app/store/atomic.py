@@ -85,14 +85,17 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True,
         if waits:
             sync_folder(half)
         half.rename(path)
-        if waits:
-            sync_folder(path.parent)
     except OSError as error:
         if any((path / name).exists() for name in files):
             return False
         raise cannot_write(path, error) from error
     finally:
         shutil.rmtree(half, ignore_errors=True)
+    try:
+        if waits:
+            sync_folder(path.parent)
+    except OSError as error:
+        raise cannot_write(path, error) from error
     return True
 
 

@@ -15,6 +15,7 @@ from study_app.session.transitions.events import Note
 from study_app.session.transitions.state import Phase
 from study_app.store.journals import journal
 from study_app.store.verification.verify_study import verify
+from tests.benchmarks.sessions import disk
 from tests.faults.support.worlds import StoredWorld
 from tests.session import small
 
@@ -99,3 +100,18 @@ def test_a_disk_that_is_full_at_the_start_refuses_the_session_and_keeps_its_id_f
     world.start()
     finish(world)
     assert verify(tmp_path / "study").errors == ()
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", disk.CALLS)
+def test_a_fault_at_any_call_of_the_disk_leaves_a_session_that_begins_and_ends_soundly(
+    tmp_path: Path, kind: str
+) -> None:
+    for call in range(300):
+        used = disk.Disk(kind, call)
+        disk.held(tmp_path / f"{call:03d}", "P001", used)
+        assert verify(tmp_path / f"{call:03d}").errors == (), call
+        if not used.happened:
+            return
+    raise AssertionError("the session never ended")

@@ -218,13 +218,15 @@ class Journal:
         StoreError
             It exists already, or cannot be created.
         """
-        try:
-            file = path.open("xb", buffering=0)
-            sync_folder(path.parent)
-        except FileExistsError as error:
-            raise StoreError(f"{path} exists already: a journal is never overwritten; use a new session") from error
-        except OSError as error:
-            raise cannot_write(path, error) from error
+        with contextlib.ExitStack() as failing:
+            try:
+                file = failing.enter_context(path.open("xb", buffering=0))
+                sync_folder(path.parent)
+            except FileExistsError as error:
+                raise StoreError(f"{path} exists already: a journal is never overwritten; use a new session") from error
+            except OSError as error:
+                raise cannot_write(path, error) from error
+            failing.pop_all()
         return cls(path, file, clock if clock is not None else SessionClock())
 
     @classmethod

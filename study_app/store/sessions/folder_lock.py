@@ -93,7 +93,9 @@ def create_opened(folder: Path) -> Opening | None:
     try:
         created = create_folder(folder, {opening.marker.name: json.dumps(_this_program()).encode()})
     except StoreError:
-        if is_there(folder):
+        if is_there(opening.marker):  # created, but not flushed to the disk
+            shutil.rmtree(folder, ignore_errors=True)
+        elif is_there(folder):
             return None
         raise
     return opening if created else None

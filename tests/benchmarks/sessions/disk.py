@@ -39,11 +39,11 @@ ANSWERS = 2 * 3
 
 
 class Disk:
-    """A disk that fails from one call of a kind on, once or, when it is full, for a while."""
+    """A disk that fails from the ``call`` of a kind on, once or, when it is full, for a while."""
 
-    def __init__(self, kind: str, chance: random.Random) -> None:
+    def __init__(self, kind: str, call: int) -> None:
         self.kind, self.happened = kind, 0
-        self._until = chance.randrange(MOST_CALL)
+        self._until = call
         self._times = FULL_FOR if kind == "full" else 1
 
     def fails(self, call: str) -> bool:
@@ -122,7 +122,7 @@ def main() -> None:
     happened, times = Counter[str](), []
     with tempfile.TemporaryDirectory() as kept:
         for number in range(asked.sessions):
-            began_s, disk = time.process_time(), Disk(chance.choice([*CALLS]), chance)
+            began_s, disk = time.process_time(), Disk(chance.choice([*CALLS]), chance.randrange(MOST_CALL))
             held(Path(kept, f"{number // OF_STUDY:03d}"), f"P{number % OF_STUDY + 1:03d}", disk)
             happened[disk.kind] += disk.happened > 0
             times.append(time.process_time() - began_s)
