@@ -418,7 +418,7 @@ class Finding(Generic[R]):
         return ()
 
     def section(self) -> Iterable[str]:
-        """Return the HTML of its part of the report's section of the block."""
+        """Return its part of the report's section of the block, of `analysis.report.html_page`; text is escaped."""
         return ()
 
     def limits(self) -> Iterable[str]:
@@ -438,7 +438,7 @@ class Finding(Generic[R]):
         return drawn(self._pictures, self.figure_name)
 
     def answer(self) -> Answer:
-        """Return the answer to its question of the first page, once the key is open."""
+        """Return the answer to its question of the first page, once the key is open, also where nothing was found."""
         raise NotImplementedError
 
     def answered(self, verdict: str, text: str, *, claims: bool = False) -> Answer:

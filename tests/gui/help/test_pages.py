@@ -23,6 +23,14 @@ ASKED = [
     ("Can a person come on two days?", "second visit another day", "groups", "`sequences` those of session 1, 2"),
     ("Which of three is different: how?", "3AFC odd one out", "trials", "the odd or repeated interval"),
     ("How right is the force?", "how accurate is the force", "accuracy", "is within 3 %"),
+    ("Does it drive our Touch?", "3D Systems Touch", "device-contract", "Devices, none tried"),
+    (
+        "Can I tell them if they were right?",
+        "feedback after each trial",
+        "trials",
+        "Only then can a block have feedback",
+    ),
+    ("Is the force safe?", "maximum force safe", "safety", "the force limit (8 N)"),
     # A researcher, after five participants
     ("A word in a question is wrong.", "typo after five participants", "designer", "proposes the next version"),
     ("There is a new version: take it?", "update in the middle of a study", "year", "Do not update if you can stay."),
@@ -36,6 +44,8 @@ ASKED = [
     ("I typed P12 instead of P21.", "wrong participant number", "run-a-session", "A wrong participant ID"),
     ("She has to go to the toilet.", "participant needs a break", "run-a-session", "P pauses"),
     ("The power failed.", "power cut during a trial", "run-a-session", "No answer is lost."),
+    ("The device hums.", "headphones noise motors", "run-a-session", "masked by headphones or noise"),
+    ("He comes again.", "second session same participant", "run-a-session", "enter the same ID and *Session* 2"),
     # An analyst, with a folder of results
     ("Where are reaction times?", "reaction time", "level-results", "time to answer"),
     ("How do I read recordings?", "open recordings in matlab", "export", "`parquetread` in MATLAB"),
@@ -46,6 +56,15 @@ ASKED = [
         "valid-trials",
         "count whether it is valid or not",
     ),
+    ("Verify says: not sound.", "not sound", "back-ups", "the lines above it name file and cause"),
+    ("Where can I unblind?", "unblind on another computer", "back-ups", "the folder is enough"),
+    (
+        "How do I align answers with EEG?",
+        "align with EEG",
+        "lab-streaming-layer",
+        "Markers have the time of their event",
+    ),
+    ("May I use my own observer?", "run headless from a script", "api", "`question.felt` has for each interval"),
     ("How late was everything together?", "total latency", "photodiode", "From a motion of the hand to the screen"),
 ]
 """What new readers asked, the words that they typed into the search, the page, and what answers them there."""
