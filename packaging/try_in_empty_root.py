@@ -1,10 +1,11 @@
 """Run the bundled program in an empty root: no Python, no shell, only the libraries of X and GL that a desktop has.
 
-    sudo python packaging/try_in_empty_root.py [dist/liquid-study]
+    sudo python packaging/try_in_empty_root.py [dist/liquid-study] [--window]
 
 Linux alone, as root. Copies into the root: the C library and its loader, the libraries below, one font, and the bundle.
 Then, each as one program: the version, the start of a session's windows on a fresh machine, the pages of Help, a
-rehearsal, its check and report, and a rehearsal with code compiled for another CPU. Prints how long each took.
+rehearsal, its check and report, and a rehearsal with code compiled for another CPU; with --window only the first two.
+Prints how long each took.
 """
 
 from __future__ import annotations
@@ -142,16 +143,19 @@ def main() -> None:
     """Furnish the root, run, and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bundle", type=Path, nargs="?", default=ROOT / "dist" / "liquid-study")
-    bundle = parser.parse_args().bundle
+    parser.add_argument("--window", action="store_true", help="end after the windows of the first session")
+    asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
-        furnish(root, bundle)
+        furnish(root, asked.bundle)
         found = [
             path for path in root.rglob("*") if PYTHON.match(path.name) and path.is_file() and os.access(path, os.X_OK)
         ]
         print(f"programs called python in the root: {len(found)}", flush=True)
         run(root, "version", "--version")
         run(root, "first session of a fresh machine", "-c", SESSION)
+        if asked.window:
+            return
         run(root, "second session", "-c", SESSION.replace("P001", "P002"))
         run(root, "pages of Help", "-c", HELP)
         run(root, "rehearsal", "rehearse", "demo", "--participants", "2", "--results", "/home/demo")

@@ -66,6 +66,25 @@ def test_only_equal_copies_of_a_library_are_dropped_and_links_are_kept(bundle: d
     assert (tmp_path / "alone").read_bytes() == b"z"
 
 
+@pytest.mark.nightly
+@pytest.mark.timeout(3600)
+def test_with_the_newest_libraries_it_opens_a_sessions_windows_in_an_empty_root(tmp_path: Path) -> None:
+    if sys.platform != "linux" or os.geteuid() != 0:
+        pytest.skip("an empty root needs Linux and root")
+    python = tmp_path / "venv" / "bin" / "python"
+    subprocess.run([sys.executable, "-m", "venv", tmp_path / "venv"], check=True)
+    pip = [python, "-m", "pip", "install", "--quiet", "--upgrade", "--upgrade-strategy", "eager"]
+    if subprocess.run([*pip, "pip"], check=False).returncode:
+        pytest.skip("there is no package index here")
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    for command in (
+        [*pip, f"{PACKAGING.parent}[bundle]"],
+        [python, PACKAGING / "bundle.py", "--no-archive", "--to", tmp_path],
+        [python, PACKAGING / "try_in_empty_root.py", tmp_path / "liquid-study", "--window"],
+    ):
+        subprocess.run(command, check=True, env=environment)
+
+
 def test_the_recipe_contains_the_pages_of_help(monkeypatch: pytest.MonkeyPatch) -> None:
     hooks = types.ModuleType("PyInstaller.utils.hooks")
     hooks.copy_metadata = lambda _name: []  # type: ignore[attr-defined]

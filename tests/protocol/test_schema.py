@@ -1,7 +1,11 @@
 """The page of the protocol file: every key of the schema, with links that lead to its tables."""
 
+import json
 import re
+import shutil
+import subprocess
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -73,6 +77,26 @@ def test_the_schema_knows_every_kind_of_design(kind: str) -> None:
 )
 def test_the_schema_refuses_what_check_refuses(study: str, old: str, new: str) -> None:
     assert complaints(text_of(study).replace(old, new)) != []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("taplo") is None, reason="taplo is not installed")
+def test_an_editor_of_toml_accepts_shipped_studies_and_names_the_line_of_a_mistake(tmp_path: Path) -> None:
+    (tmp_path / "schema.json").write_text(json.dumps(SCHEMA), encoding="utf-8")
+    for name in shipped():
+        (tmp_path / f"{name}.toml").write_text(text_of(name), encoding="utf-8")
+    words = ["taplo", "lint", "--colors", "never", "--schema", (tmp_path / "schema.json").as_uri()]
+
+    def lint() -> tuple[int, str]:
+        done = subprocess.run([*words, *map(str, tmp_path.glob("*.toml"))], capture_output=True, text=True, check=False)
+        return done.returncode, done.stderr
+
+    assert lint()[0] == 0
+    wrong = text_of("demo").replace('order = "shuffled"', 'order = "shufled"')
+    (tmp_path / "demo.toml").write_text(wrong, encoding="utf-8")
+    line = wrong[: wrong.index('\norder = "shufled"')].count("\n") + 2
+    code, said = lint()
+    assert (code, f"demo.toml:{line}:9" in said) == (1, True)
 
 
 def test_every_key_is_described():
