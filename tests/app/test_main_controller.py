@@ -2,20 +2,18 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
-from PySide6.QtWidgets import QDialog, QLabel
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QDialog
 
 from study_app.app import main_controller
 from study_app.app.failures import BY_SIGNAL_S
-from study_app.app.main_controller import MainController, home
+from study_app.app.main_controller import MainController
 from study_app.app.session import live_session
 from study_app.errors import DeviceLost, DeviceNotFound
 from study_app.gui.widgets.controls import ActionButton
@@ -38,18 +36,6 @@ class Machine:
         self.stopped = True
         if self._lost:
             raise DeviceLost("the device 'falcon' is gone")
-
-
-def take_steps(visit: MainController, steps: Iterable[Callable[[], object]]) -> None:
-    """Take the steps one after another, with the window's events between them."""
-    left = iter(steps)
-
-    def step() -> None:
-        next(left, timer.stop)()
-
-    timer = QTimer(visit.window, interval=10)
-    timer.timeout.connect(step)
-    timer.start()
 
 
 @pytest.mark.slow
@@ -186,14 +172,6 @@ def test_the_sidebar_has_one_width_per_size_of_window_at_every_place(visit: Main
             assert (visit.window.size().toTuple(), visit.window.rail.width()) == (size, width), name
 
 
-def test_results_show_what_was_run_last(visit: MainController, monkeypatch: Any) -> None:
-    shown: list[Path] = []
-    monkeypatch.setattr(main_controller, "LiveSession", Held)
-    monkeypatch.setattr(visit, "results_controller", SimpleNamespace(choose=shown.append))
-    visit.window.place("home").session_asked.emit(CHOSEN)
-    assert (shown, visit.live) == ([CHOSEN.results], None)
-
-
 def test_a_mistake_before_the_first_window_leads_home_again(
     visit: MainController, monkeypatch: Any, capsys: Any
 ) -> None:
@@ -238,49 +216,6 @@ def test_back_leads_from_the_help_to_the_place_where_it_was_asked_for(visit: Mai
     window.go("home")
     window.go("help")
     assert not visit.help.back.isEnabled(), "the place was left in another way"
-
-
-def test_a_place_that_cannot_be_made_is_told_of_once_and_the_help_of_a_key_is_too(
-    qtbot: Any, tmp_path: Path, monkeypatch: Any
-) -> None:
-    seen: list[list[str]] = []
-    monkeypatch.setattr("study_app.gui.help.view.HelpPlace", lambda: 1 // 0)
-
-    def look(visit: MainController) -> None:
-        seen.append([notice.windowTitle() for notice in visit.window.findChildren(QDialog) if notice.isVisible()])
-        for notice in visit.window.findChildren(QDialog):
-            notice.reject()
-
-    def then(visit: MainController) -> None:
-        go = partial(visit.window.go, "help")
-        take_steps(visit, (go, partial(look, visit), visit.show_help, partial(look, visit), visit.window.close))
-
-    with qtbot.captureExceptions() as printed:
-        home(tmp_path / "results", then=then)
-    assert len(printed) == 2
-    assert seen == [["“Help” could not be opened"]] * 2
-
-
-def test_an_exception_that_no_slot_catches_is_shown_once_and_printed(qtbot: Any, qapp: Any, tmp_path: Path) -> None:
-    seen: list[str] = []
-
-    def fail() -> None:
-        raise NameError("name 'unsaved' is not defined")
-
-    def look(visit: MainController) -> None:
-        if visit.window.notice is not None:
-            seen.append(visit.window.notice.findChildren(QLabel)[1].text())
-            visit.window.notice.accept()
-            visit.window.notice = None
-
-    def then(visit: MainController) -> None:
-        take_steps(visit, (fail, partial(look, visit), fail, partial(look, visit), visit.window.close))
-
-    with qtbot.captureExceptions() as printed:
-        home(tmp_path / "results", then=then)
-    assert len(printed) == 2
-    (sentence,) = seen
-    assert sentence.startswith("NameError: name 'unsaved' is not defined. This is a bug")
 
 
 def test_each_form_leads_to_the_glossary_and_back(visit: MainController, qtbot: Any) -> None:

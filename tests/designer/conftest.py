@@ -1,12 +1,15 @@
 """The designer in the main window, and what is made of it by many tests."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from tests.designer.support.designer import Designer
+from tests.designer.support.record import NEVER_MS, Record
 from tests.gui.conftest import pytest_pycollect_makemodule
 
 __all__ = ["pytest_pycollect_makemodule"]
@@ -19,6 +22,26 @@ def designer(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
     qtbot.waitUntil(made.window.isActiveWindow)
     yield made
     made.close()
+
+
+@pytest.fixture
+def record(designer: Designer, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Record]:
+    """Return what begins a record: the participant's page stands still, typing is one step, and drafts are due."""
+    for module in ("document.document", "place.editing", "participant.preview"):
+        monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
+    monkeypatch.setattr("study_app.designer.place.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
+    for timer in (
+        "place.saving.DRAFT",
+        "form.fields.HAND_ON",
+        "form.fields.CLICK",
+        "place.file.HAND_ON",
+        "problems.REST",
+    ):
+        monkeypatch.setattr(f"study_app.designer.{timer}_MS", NEVER_MS)  # each is let go by the record, after an act
+    spoken: list[str] = []
+    for module in ("header", "view"):
+        monkeypatch.setattr(f"study_app.designer.place.{module}.say", lambda _by, words: spoken.append(words))
+    return partial(Record, designer, spoken)
 
 
 @pytest.fixture(params=["special editors", "no special editors"])

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 import shiboken6
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QGuiApplication, QMouseEvent
+from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
 from study_app.designer.document.steps import AddKey, RenameElement
@@ -41,50 +41,6 @@ def test_a_shown_text_that_qt_normalises_is_no_edit(qtbot: Any, kind: type[Typed
     assert field.pending
     field.flush()
     assert typed == ["ca\nb"]
-
-
-def test_esc_restores_the_value_of_a_field_that_was_left_with_a_refused_text(qtbot: Any, designer: Any) -> None:
-    designer.open("kitchen", "blocks", "liquids")
-    row = designer.form_row("blocks", "liquids", "repetitions")
-    line = row.field.line
-    designer.fill(line, "2x\t", "")
-    value = designer.value("blocks", "liquids", "repetitions")
-    assert row.wrong.sentence.text() == f"“2x” is not a whole number. The study keeps {value}; Esc restores it."
-    line.setFocus()
-    qtbot.keyClick(line, Qt.Key.Key_Escape)
-    assert (line.text(), row.wrong.isVisible()) == (str(value), False)
-
-
-def test_the_refusal_of_a_value_of_one_of_several_kinds_is_shown(designer: Any) -> None:
-    levels = ("methods", "easy", "levels")
-    designer.controller.begin("template:viscosity-jnd", "thicker")
-    designer.go_to(*levels[:2])
-    row = designer.form_row(*levels)
-    designer.fill(row.field.inner.line, "0.5 x")
-    assert row.wrong.isVisible()
-    assert "Esc restores it" in row.wrong.sentence.text()
-    designer.hit("Escape")
-    assert not row.wrong.isVisible()
-
-
-@pytest.mark.parametrize(
-    ("path", "words"),
-    [
-        (("liquids", "damper", "drag", "damping_nspm"), "Viscosity (damping)"),
-        (("stimuli", "damping", "vary"), "Varied quantity"),
-        (("blocks", "viscosity", "catch", "wrong_most"), "Most wrong catch trials"),
-        (("blocks", "viscosity", "setting_label"), "Neutral name of trials"),
-    ],
-)
-def test_a_field_has_the_name_of_the_field_of_study_and_a_sentence(
-    designer: Any, path: tuple[str, ...], words: str
-) -> None:
-    designer.controller.begin("template:viscosity-jnd", "thicker")
-    designer.go_to(*path[:2])
-    designer.place.form.focus(path)
-    row, foot = designer.form_row(*path), designer.place.form.foot
-    assert (row.words.text(), foot.title.text()) == (words, words)
-    assert foot.words.text().endswith(".")
 
 
 QUESTIONNAIRE = ("questionnaires", "liquid")
@@ -155,43 +111,6 @@ def test_a_row_that_stays_keeps_its_widget_caret_and_keyboard(qtbot: Any, design
     assert (line.cursorPosition(), designer.form_row("blocks", "fluids", "title")) == (2, title)
 
 
-def test_typing_on_after_a_rest_keeps_the_caret_where_the_key_is_new_in_the_file(qtbot: Any, designer: Any) -> None:
-    view = ("conditions", "thin", "view")
-    designer.change(("format = 1", "format = 2"))
-    designer.open("kitchen", *view[:2])
-    line = designer.field(*view).line
-    line.setFocus()
-    qtbot.keyClicks(designer.keyboard, "f")
-    qtbot.waitUntil(lambda: designer.value(*view) == "f")
-    assert designer.keyboard is line
-    assert designer.form_row(*view).remove.isVisible()
-    qtbot.keyClicks(designer.keyboard, "ront")
-    designer.keyboard.flush()
-    assert designer.value(*view) == "front"
-    designer.hit("Escape")
-    assert not designer.value(*view)
-
-
-@pytest.mark.parametrize("typed", ["12x", ""])
-def test_the_next_element_shows_nothing_of_the_one_before(qtbot: Any, designer: Any, typed: str) -> None:
-    thin, thick = (("liquids", name, "density_kg_m3") for name in ("thin", "thick"))
-    designer.open("kitchen", *thin[:2])
-    before = designer.text
-    row = designer.form_row(*thin)
-    row.field.line.setFocus()
-    if typed:
-        designer.fill(row.field.line, typed)
-        assert row.wrong.isVisible()
-    designer.go_to(*thick[:2])
-    assert designer.form_row(*thick) is row
-    assert (row.field.line.text(), row.field.refusal, row.field.line.property("state") or "") == ("1400", "", "")
-    row.field.line.setFocus()
-    designer.hit("Escape")
-    designer.go_to(*thin[:2])
-    assert row.field.line.text() == "1000"
-    assert designer.text == before
-
-
 def test_the_next_element_has_no_selected_entries_and_shows_the_field_with_the_keyboard(designer: Any) -> None:
     designer.open("kitchen", "blocks", "liquids", width=1100)
     entries = designer.field("blocks", "liquids", "conditions").list
@@ -206,31 +125,6 @@ def test_the_next_element_has_no_selected_entries_and_shows_the_field_with_the_k
     assert area.verticalScrollBar().maximum()
     assert designer.place.form.inside.isAncestorOf(designer.keyboard)
     assert area.viewport().rect().contains(designer.keyboard.mapTo(area.viewport(), designer.keyboard.rect().center()))
-
-
-def test_a_question_is_shown_whole_and_typed_as_one_paragraph(qtbot: Any, designer: Any) -> None:
-    designer.open("kitchen", *ITEMS, 0)
-    before = designer.text
-    (line,) = designer.field(*ITEMS, 0, "text").lines.values()
-    low = line.height()
-    line.setFocus()
-    line.selectAll()
-    QGuiApplication.clipboard().setText(
-        "Would you say\nthat this liquid\nbehaves as a liquid does " + 3 * "which you know "
-    )
-    qtbot.keyClick(line, Qt.Key.Key_V, Qt.KeyboardModifier.ControlModifier)
-    assert designer.text == before
-    qtbot.keyClick(line, Qt.Key.Key_Return)
-    assert "\n" not in line.words()
-    assert designer.value("questionnaires", "liquid", "items", 0, "text") == line.words()
-    qtbot.waitUntil(lambda: line.height() > low)
-    assert line.verticalScrollBar().maximum() == 0
-    line.selectAll()
-    qtbot.keyClick(line, Qt.Key.Key_X)
-    qtbot.keyClick(line, Qt.Key.Key_Escape)
-    assert designer.text != before
-    designer.editing.undo()
-    assert designer.text == before
 
 
 @pytest.mark.parametrize("row", [("scales", "agreement", "labels"), (*ITEMS, 0, "text")])

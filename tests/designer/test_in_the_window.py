@@ -39,30 +39,6 @@ def test_a_study_is_made_from_the_empty_one_by_names_and_saved(designer: Any, ki
     assert file.read_text() == designer.text
 
 
-def test_typing_into_the_file_reaches_the_form_and_a_fault_its_field(qtbot: Any, designer: Any) -> None:
-    designer.open("kitchen", "blocks", "liquids")
-    editor = designer.place.file.editor
-    line = next(at for at, text in enumerate(editor.words().split("\n")) if text.startswith("order = ")
-                and editor.shown.selected[0][0] < at)  # fmt: skip
-    editor.go_to(line)
-    editor.setFocus()
-    designer.key("End")
-    cursor = editor.textCursor()
-    cursor.movePosition(cursor.MoveOperation.StartOfBlock)
-    cursor.movePosition(cursor.MoveOperation.Right, n=len('order = "'))
-    editor.setTextCursor(cursor)
-    qtbot.keyClicks(editor, "x")
-    qtbot.waitUntil(lambda: not editor.pending)
-    row = designer.form_row("blocks", "liquids", "order")
-    assert row.wrong.isVisible()
-    assert "is not" in row.wrong.sentence.text()
-    designer.key("F8")
-    assert designer.place.problems.isVisible()
-    assert designer.place.form.isAncestorOf(designer.keyboard)
-    designer.key("ctrl+z")
-    assert not designer.form_row("blocks", "liquids", "order").wrong.isVisible()
-
-
 SCRIPT = """
 import sys, time
 from pathlib import Path

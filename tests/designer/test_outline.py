@@ -3,13 +3,13 @@
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt
-from PySide6.QtGui import QDropEvent, QGuiApplication, QKeyEvent, QMouseEvent
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 from shiboken6 import isValid
 
-from study_app.designer.document.steps import AddInstrument, MoveTo, SetValue
+from study_app.designer.document.steps import AddInstrument
 from study_app.designer.outline import ROW_ROLE
 from study_app.protocol.source.files import shipped
 from study_app.store.study_settings import begin_settings
@@ -84,32 +84,6 @@ def with_form(designer: Any) -> Any:
     return designer
 
 
-@pytest.mark.parametrize(
-    ("words", "steps"),
-    [
-        ("Before the first block", ["welcome", "nasa_tlx", "liquids", "reaching", "delays", "thanks"]),
-        ("After each trial of Delays", ["welcome", "liquids", "reaching", "delays", "thanks"]),
-        ("After each block", ["welcome", "liquids", "nasa_tlx", "reaching", "delays", "nasa_tlx", "thanks"]),
-        ("At the end", ["welcome", "liquids", "reaching", "delays", "nasa_tlx", "thanks"]),
-    ],
-)
-def test_a_questionnaire_is_asked_when_the_menu_says(with_form: Any, words: str, steps: list[str]) -> None:
-    head = with_form.place.form.head
-    assert head.used.whole == "not used"
-    assert head.ask.isVisible()
-    with_form.click_on(head.ask)
-    assert head.asks.isVisible()
-    action = next(one for one in head.asks.actions() if one.text().startswith(words))
-    assert action.text().partition("\t")[2]  # what differs is said
-    QTest.mouseClick(head.asks, LEFT, pos=head.asks.actionGeometry(action).center())
-    assert list(sequence(with_form)) == steps
-    asked = [name for name, block in with_form.value("blocks").items() if block.get("questionnaire") == "nasa_tlx"]
-    assert bool(asked) == ("trial" in words)
-    assert head.used.whole.startswith("used by")
-    assert len(with_form.steps) == 2
-    assert with_form.study.faults == ()
-
-
 def test_a_questionnaire_is_dragged_into_the_session(qtbot: Any, with_form: Any) -> None:
     tree, before = with_form.place.outline.tree, with_form.text
     start = place_of(with_form, *TLX)
@@ -134,133 +108,9 @@ def test_a_small_drag_of_a_questionnaire_in_its_block_adds_no_step(qtbot: Any, d
     assert sequence(designer) == before
 
 
-def test_the_outline_has_a_row_for_the_session_order_with_that_of_the_blocks(designer: Any) -> None:
-    designer.change(("format = 1", "format = 2"))
-    designer.open()
-    click_first = place_of(designer, "sequence")
-    QTest.mouseClick(designer.place.outline.tree.viewport(), LEFT, pos=click_first)
-    row = designer.place.outline.tree.currentIndex().data(ROW_ROLE)
-    assert (row.title, row.note) == ("Session order", "5 steps")
-    names = designer.field("sequence").names
-    names.activated.emit(next(at for at in range(names.count()) if names.itemText(at) == "delay"))
-    assert sequence(designer)[-1] == "delay"
-    designer.click_on(designer.field("study", "block_order").segments.buttons[1])
-    assert designer.value("study", "block_order") == "balanced"
-
-
 def _thing(designer: Any, at: int) -> tuple[str, str]:
     name = sequence(designer)[at]
     return next((section, name) for section in ("pages", "blocks") if name in designer.value(section))
-
-
-def test_several_selected_elements_move_are_copied_and_deleted_together(qtbot: Any, designer: Any) -> None:
-    designer.controller.begin("rek2024", "mine")
-    document, text = designer.study.document, designer.text
-    items = [item["id"] for item in document["questionnaires"]["liquid"]["items"]]
-    path = ("questionnaires", "liquid", "items")
-
-    def ids() -> list[str]:
-        return [item["id"] for item in designer.value("questionnaires", "liquid", "items")]
-
-    designer.editing.select((*path, 0))
-    designer.controller.show_outline()
-    click(qtbot, designer, *path, 0)
-    click(qtbot, designer, *path, 1, held=SHIFT)
-    assert designer.place.outline.selected == ((*path, 0), (*path, 1))
-    tree = designer.place.outline.tree
-    qtbot.keyClick(tree, Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier)
-    assert ids()[:3] == [items[2], items[0], items[1]]
-    assert designer.place.outline.selected == ((*path, 1), (*path, 2))
-    qtbot.keyClick(tree, Qt.Key.Key_D, CONTROL)
-    assert ids()[1:5] == [items[0], f"{items[0]}_2", items[1], f"{items[1]}_2"]
-    designer.editing.undo()
-    designer.editing.undo()
-    assert designer.text == text
-    designer.editing.select(("liquids", "honey"))
-    designer.controller.show_outline()
-    click(qtbot, designer, "liquids", "syrup", held=CONTROL)
-    qtbot.keyClick(tree, Qt.Key.Key_Delete)
-    prompt = designer.place.prompt
-    assert prompt is not None
-    assert "2 elements" in prompt.accessibleName()
-    prompt.all.click()
-    assert tree.hasFocus()
-    assert not {"honey", "syrup"} & set(designer.value("liquids"))
-    designer.editing.undo()
-    assert designer.text == text
-
-
-def test_entries_of_a_list_are_dragged_or_moved_by_keys(qtbot: Any, designer: Any) -> None:
-    designer.controller.begin("rek2024", "mine")
-    path = ("blocks", "liquids", "conditions")
-
-    def listed() -> tuple[str, ...]:
-        return designer.value("blocks", "liquids", "conditions")
-
-    designer.go_to(*path[:2])
-    first, second, third = listed()
-    field = designer.field(*path)
-    field.choose((0,))
-    at = QPointF(field.rows[1].geometry().bottomLeft())
-    field.list.dropEvent(QDropEvent(at, Qt.DropAction.MoveAction, QMimeData(), LEFT, Qt.KeyboardModifier.NoModifier))
-    assert listed() == (second, first, third)
-    QApplication.processEvents()
-    row = designer.field(*path).rows[1]
-    row.setFocus()
-    qtbot.keyClick(row, Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier)
-    assert listed() == (second, third, first)
-    row = designer.field(*path).rows[2]
-    row.setFocus()
-    qtbot.keyClick(row, Qt.Key.Key_Up, Qt.KeyboardModifier.AltModifier)
-    assert listed() == (second, first, third)
-    designer.field(*path).choose((0,))
-    row = designer.field(*path).rows[0]
-    row.setFocus()
-    qtbot.keyClick(row, Qt.Key.Key_C, CONTROL)
-    assert f"[conditions.{second}]" in QGuiApplication.clipboard().text()
-    row.setFocus()
-    qtbot.keyClick(row, Qt.Key.Key_V, CONTROL)
-    assert f"{second}_2" in designer.value("conditions")
-    designer.editing.undo()
-    assert designer.editing.selected == path[:2]
-
-
-def test_what_changes_by_itself_is_said_once(designer: Any, monkeypatch: Any) -> None:
-    said: list[str] = []
-    monkeypatch.setattr("study_app.designer.place.header.say", lambda _widget, words: said.append(words))
-    monkeypatch.setattr("study_app.designer.place.view.say", lambda _widget, words: said.append(words))
-    designer.open()
-    assert said == []
-    designer.editing.ask(MoveTo((("sequence", 1),), 3))
-    assert said[-1].endswith("now 3 of 5")
-    said.clear()
-    designer.editing.ask(SetValue(("device", "force_limit_n"), -1))
-    designer.editing.ask(SetValue(("device", "force_limit_n"), -2))
-    designer.saving.write_draft(at_once=True)
-    designer.saving.write_draft(at_once=True)
-    assert [words for words in said if words == "1 problem"] == ["1 problem"]
-    assert len([words for words in said if words.startswith("Draft kept")]) == 1
-
-
-def test_what_keys_do_in_the_outline_its_menu_does_too(designer: Any) -> None:
-    designer.open()
-    before = sequence(designer)
-    designer.editing.select(("pages", "welcome"))
-    outline = designer.place.outline
-
-    def choose(words: str) -> None:
-        next(action for action in outline.tree.actions() if action.text() == words).trigger()
-
-    choose("Move down")
-    assert sequence(designer) == (before[1], before[0], *before[2:])
-    designer.editing.select(("liquids", "thick"))
-    choose("Copy")
-    choose("Paste")
-    assert "thick_2" in designer.value("liquids")
-    choose("Delete")
-    assert "thick_2" not in designer.value("liquids")
-    choose("Rename")
-    assert designer.place.form.head.id.hasFocus()
 
 
 def type_id(qtbot: Any, designer: Any, path: tuple[str, str], name: str) -> None:
@@ -304,19 +154,6 @@ def test_a_field_that_is_clicked_thrice_after_an_id_was_typed_takes_what_is_type
     assert "thick" not in designer.value("liquids")
 
 
-@pytest.mark.parametrize("way", ["Enter", "double click"])
-def test_an_entry_opens_by_enter_and_a_double_click(qtbot: Any, designer: Any, way: str) -> None:
-    designer.open("kitchen", "blocks", "liquids")
-    field = designer.field("blocks", "liquids", "conditions")
-    qtbot.mouseClick(field.rows[1], LEFT)
-    assert designer.editing.selected == ("blocks", "liquids")
-    if way == "Enter":
-        qtbot.keyClick(field.rows[1], Qt.Key.Key_Return)
-    else:
-        qtbot.mouseDClick(field.rows[1], LEFT)
-    assert designer.editing.selected == ("conditions", field.row.value[1])
-
-
 def listed(designer: Any) -> list[str]:
     box = designer.place.header.study
     return [box.itemText(at) for at in range(box.count())]
@@ -357,26 +194,45 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
     )
 
 
-def test_keys_open_the_list_and_no_other_study(qtbot: Any, designer: Any) -> None:
-    add_study(designer, "zeta", "Zebra")
-    designer.open()
-    box, opened = designer.place.header.study, designer.editing.opened
-    qtbot.keyClick(box, Qt.Key.Key_Escape)
-    assert not box.view().isVisible()
-    altgr = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier
-    QApplication.sendEvent(box, QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Z, altgr, "z"))
-    assert designer.editing.opened is opened
-    qtbot.keyClick(box, Qt.Key.Key_Home, Qt.KeyboardModifier.ControlModifier)
-    assert designer.editing.opened is opened
-    moves = (Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Up, Qt.Key.Key_Down)
-    for key in (*moves, Qt.Key.Key_Return, Qt.Key.Key_Space, Qt.Key.Key_F4, Qt.Key.Key_Z):
-        box.setFocus()
-        qtbot.keyClick(box, key)
-        assert box.view().isVisible(), key
-        assert designer.editing.opened is opened
-        if key != Qt.Key.Key_Z:
-            box.hidePopup()
-    assert box.view().currentIndex().data() == "Zebra  ·  zeta.toml"
-    qtbot.keyClick(box.view(), Qt.Key.Key_Return)
+@pytest.fixture
+def small(designer: Any) -> Any:
+    """A study of many elements in a small window."""
+    designer.window.resize(1366, 768)
+    designer.controller.begin("rek2024", "mine")
     QApplication.processEvents()
-    assert designer.editing.opened.name == "zeta"
+    return designer
+
+
+def open_drawer(qtbot: Any, designer: Any) -> None:
+    designer.key("ctrl+1")
+    QApplication.processEvents()
+
+
+def index_of(designer: Any, *path: str | int) -> Any:
+    return next(one for one in designer.place.outline.indexes() if one.data(ROW_ROLE).path == path)
+
+
+def expanded(designer: Any) -> set[Any]:
+    tree = designer.place.outline.tree
+    return {one.data(ROW_ROLE).path for one in designer.place.outline.indexes() if tree.isExpanded(one)}
+
+
+def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: Any, small: Any) -> None:
+    outline, tree = small.place.outline, small.place.outline.tree
+    small.editing.select(("blocks", "liquids"))
+    for _ in range(2):
+        open_drawer(qtbot, small)
+        index = index_of(small, "blocks", "liquids")
+        before = expanded(small)
+        assert ("blocks", "liquids") in before
+        tree.scrollTo(index)
+        qtbot.mouseClick(tree.viewport(), LEFT, pos=tree.visualRect(index).center())
+        assert not outline.isVisible()
+        assert small.place.form.isAncestorOf(small.keyboard)
+        assert expanded(small) == before
+    open_drawer(qtbot, small)
+    index = index_of(small, "blocks", "liquids")
+    tree.scrollTo(index)
+    qtbot.mouseClick(tree.viewport(), LEFT, pos=QPoint(20, tree.visualRect(index).center().y()))
+    assert outline.isVisible(), "the sign before the title opens and closes, it does not choose"
+    assert ("blocks", "liquids") not in expanded(small)

@@ -277,6 +277,16 @@ def new_session(qtbot: Any) -> Any:
     return windows.dialog(NewSessionDialog, qtbot, Path())
 
 
+def used(folder: str, name: str) -> Callable[[Any], None]:
+    """Return an action: another program writes a file of a session, or of another study, meanwhile."""
+
+    def act(_dialog: Any) -> None:
+        Path(folder).mkdir(parents=True)
+        Path(folder, name).write_text('{"name": "otherstudy"}')
+
+    return act
+
+
 NEW_SESSION: Actions = {
     "no id": text("editors.participant.control", "P-7"),
     "an id of pilots": text("editors.participant.control", "test"),
@@ -290,6 +300,19 @@ NEW_SESSION: Actions = {
     "Falcon": in_turn(chosen("editors.device.control", "falcon"), clicked("editors.windowed.control")),
     "firmware gone": text("editors.firmware.control", "gone.bin"),
     "own folder": in_turn(text("editors.firmware.control", ""), text("editors.results.control", "mine")),
+    "folder of another study": in_turn(
+        used("other", "dataset_description.json"), text("editors.results.control", "other")
+    ),
+    "used by another program": in_turn(
+        used("rek2024/data/sub-P007/ses-01", "checksums.sha256"),
+        text("editors.results.control", "rek2024"),
+        chosen("editors.device.control", "mouse"),
+        lambda dialog: dialog.editors["session"].show_value(1),
+        text("editors.participant.control", "P007"),
+    ),
+    "next session number": clicked("ways.0"),
+    "another id": in_turn(lambda dialog: dialog.editors["session"].show_value(1), clicked("ways.1")),
+    "begun by Enter": lambda dialog: QTest.keyClick(dialog.editors["participant"].control, Qt.Key.Key_Return),
 }
 HELP: Actions = {
     "search": lambda place: QTest.keyClicks(place.words, "photodiode"),

@@ -352,6 +352,23 @@ def states(window: Any, shown: Actions, settled: Callable[[], None]) -> Iterator
         yield from recorder.record(name, lambda bring=bring: bring(window))
 
 
+def story(
+    window: QWidget, acts: Iterable[tuple[str, Callable[[], object]]], settled: Callable[[], None]
+) -> Iterator[str]:
+    """Yield what a window tells, then the signals and what it tells otherwise after each act in turn."""
+    heard = listen(window)
+    settled()
+    before = told(window)
+    yield from before
+    for name, act in acts:
+        heard.clear()
+        act()
+        settled()
+        after = told(window)
+        yield from [f"== {name}", *heard, *changed(before, after)]
+        before = after
+
+
 def part_of(window: Any, path: str) -> Any:
     """Return a part of a window by its attributes: "stop.fade_in"; also an element by its number or key."""
     for name in path.split("."):

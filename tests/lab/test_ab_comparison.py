@@ -18,26 +18,6 @@ def bench() -> Workbench:
     return Workbench(Setting("Water", water, water), Setting("Light oil", oil, oil))
 
 
-def test_an_edit_goes_to_the_felt_setting_alone() -> None:
-    edited = bench().switch().change("liquid.density_kg_m3", 900.0)
-    assert edited.b.scene.liquids[0].density_kg_m3 == 900.0
-    assert edited.a == bench().a
-    assert edited.changed_names("B") == ("liquid.density_kg_m3",)
-    assert edited.changed_names("A") == ()
-    assert (edited.a.title, edited.b.title) == ("Water", "Light oil, edited")
-
-
-def test_a_drag_is_one_step() -> None:
-    edited = bench()
-    for value in (1600.0, 1500.0, 1400.0):
-        edited = edited.change("wake.length", value, held=True)
-    edited = edited.change("wake.length", 1300.0)
-    assert edited.a.value("wake.length") == 1300.0
-    assert len(edited.past) == 1
-    assert edited.undo().a == bench().a
-    assert edited.undo().redo().a == edited.a
-
-
 def test_a_refused_edit_says_why_and_leaves_everything() -> None:
     with pytest.raises(StudyError, match="outrun"):
         bench().change("wake.length", 1701.0)

@@ -110,13 +110,3 @@ def test_a_linear_damper_has_its_damping_as_a_parameter() -> None:
     heavier = changed(damper, "drag.damping_nspm", 20.0)
     assert value_of(heavier, "drag.damping_nspm") == 20
     assert changed(heavier, "drag.law", "constant").liquids[0].drag == Drag()
-
-
-def test_sections_and_their_rows_come_in_this_order() -> None:
-    scene = SCENES["physical_liquids/honey"]
-    shown = {it.title: " ".join(row.name for row in it.parameters) for it in sections(scene)}
-    assert list(shown) == ["Liquid", "Added mass", "History", "Body", "Filter", "Effects", "Accuracy", "Region", "Hand"]
-    assert shown["Liquid"] == "liquid.density_kg_m3 liquid.viscosity_pa_s drag.law"
-    assert shown["Accuracy"] == "accuracy.relative accuracy.absolute_n motion.speed_mps motion.acceleration_mps2"
-    assert shown["Filter"] == "velocity.kind velocity.alpha knee.law knee.threshold_mps"
-    assert [it.title for it in sections(SCENES["rek2024/water"])][:4] == ["Liquid", "Wake", "Body", "Filter"]

@@ -10,8 +10,7 @@ import pytest
 from PySide6.QtWidgets import QMainWindow
 
 from study_app.app.lab_controller import LabController
-from study_app.errors import ServoFault
-from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices, Stays, force_n, is_let_go
+from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices, Stays, is_let_go
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
@@ -40,43 +39,10 @@ def test_entering_opens_and_feels_and_leaving_lets_go_of_everything(
     assert felt.view().workbench.a.name == "Honey"
 
 
-def test_a_servo_that_does_not_end_is_told_of_as_the_place_is_left(
-    felt: LabController, prices: Prices, qtbot: Any, monkeypatch: Any, caplog: Any
-) -> None:
-    live = felt.live
-    assert live is not None
-    qtbot.waitUntil(lambda: bool(prices.asked), timeout=SOON_MS)
-    stop = live.servo.stop
-
-    def stuck() -> None:
-        stop()
-        raise ServoFault("the servo is stuck: switch the device off")
-
-    monkeypatch.setattr(live.servo, "stop", stuck)
-    told: list[tuple[str, str]] = []
-    felt.place.message.connect(lambda *words: told.append(words))
-    felt.place.hide()
-    assert [sentence for _, sentence in told] == ["the servo is stuck: switch the device off."]
-    assert prices.closed
-    assert felt.live is None
-    caplog.clear()
-
-
 def test_closing_the_window_ends_in_zero_force(felt: LabController) -> None:
     live = felt.live
     felt.place.close()
     assert is_let_go(live)
-
-
-def test_the_force_stops_at_once_and_fades_in_again(felt: LabController, qtbot: Any) -> None:
-    felt.place.ask("stop")
-    qtbot.waitUntil(lambda: force_n(felt) == 0.0, timeout=SOON_MS)
-    assert not felt.view().force_on
-    felt.place.ask("switch")
-    felt.place.ask("switch")
-    assert not felt.view().force_on
-    felt.place.ask("fade in")
-    qtbot.waitUntil(lambda: force_n(felt) > 0.3, timeout=SOON_MS)
 
 
 def test_an_exception_in_a_slot_ends_in_zero_force_and_words(felt: LabController, qtbot: Any, caplog: Any) -> None:

@@ -68,21 +68,6 @@ def test_a_file_that_cannot_be_read_is_said_in_the_card(lab: LabController, qtbo
     assert lab.live is not None
 
 
-def test_a_value_that_the_setting_refuses_is_said_and_the_force_goes_on(
-    lab: LabController, qtbot: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    lab.place.ask("source", None, "other")
-    qtbot.waitUntil(lambda: lab.view().estimate.may_apply, timeout=OPENS_MS)
-    estimation = lab.estimation.estimation
-    assert estimation is not None
-    monkeypatch.setattr(type(estimation), "applied", lambda _self, bench: bench.change("body.drag_coefficient", -1.0))
-    lab.place.ask("apply")
-    assert "Not applied: " in lab.view().estimate.message
-    assert lab.live is not None
-    assert lab.live.servo.force_is_on
-    assert drag(lab) == pytest.approx(0.47)
-
-
 def test_no_price_is_no_reason_to_stop(make_lab: Callable[..., LabController], qtbot: Any) -> None:
     def nobody() -> Prices:
         raise OSError("no more processes")

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.operator.session_panels import Strip
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
-from study_app.session.pages import EndPage, PausePage, TaskPage, TroublePage
+from study_app.session.pages import EndPage, PausePage, TaskPage
 from study_app.session.transitions.events import Continue
 from tests.app.world import World, begin_trial, tick
 
@@ -40,51 +40,6 @@ def test_force_and_task_begin_when_the_tank_is_painted_and_not_while_a_page_asks
         world.samples = tick(world, at_s)
         bridge.draw_frame()
     assert bridge.runner.task.elapsed_s == 0.75
-
-
-def test_with_a_full_disk_the_force_stops_and_the_session_waits_and_loses_nothing(bridge, world, caplog):
-    begin_trial(bridge, world)
-    world.full = True
-    bridge.operator.ask("mark")
-    bridge.operator.ask("note", "dropped while the disk is full")
-    bridge.operator.ask("stop")
-    assert not world.force_is_on
-    assert isinstance(bridge.participant.page, TroublePage)
-    banner = bridge.operator.banner
-    assert "No space left" in banner.what.text()
-    assert "Free disk space" in banner.then.text()
-    assert bridge.operator.header.state.word == "Waiting for the disk"
-    assert bridge.operator.device.chip.word == "Ready"
-    assert "no space left" in caplog.text
-    world.full = False
-    world.now_s += 2.0
-    bridge.draw_frame()
-    assert isinstance(bridge.participant.page, PausePage)
-    assert not banner.isVisible()
-    assert ("note", {"kind": "mark", "text": ""}) in world.done
-    bridge.operator.ask("resume")
-    assert isinstance(bridge.participant.page, TaskPage)
-    assert world.force_is_on
-    assert "accepts data again" in caplog.text
-    caplog.clear()
-
-
-@pytest.mark.parametrize("answer", ["end", "close again"])
-def test_closing_the_operators_window_stops_the_force_and_asks_and_closing_it_again_leaves_the_session_unfinished(
-    bridge, world, qtbot, answer
-):
-    begin_trial(bridge, world)
-    bridge.operator.close()
-    assert not world.force_is_on
-    assert bridge.operator.isVisible()
-    assert "session_ended" not in world.events()
-    if answer == "end":
-        bridge.operator.question.accept()
-        assert world.done[-1][1]["status"] == "aborted"
-    with qtbot.waitSignal(bridge.done):
-        bridge.operator.close()
-    assert ("session_ended" in world.events()) == (answer == "end")
-    assert not world.force_is_on
 
 
 class SlowRecorder:

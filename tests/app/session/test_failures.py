@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from study_app.errors import StudyError
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.widgets.main_view import EscapeKey
-from study_app.session.pages import PausePage, TaskPage, TroublePage
+from study_app.session.pages import TaskPage, TroublePage
 from study_app.session.transitions.events import EndRequested
 from tests.app.world import begin_trial
 from tests.plug_in_packages import forget, install
@@ -264,26 +264,6 @@ def lost(make, world, device):
 
 def settled(bridge, qtbot):
     qtbot.waitUntil(lambda: not bridge.reconnection.under_way)
-
-
-def test_what_the_device_asks_for_is_shown_and_the_button_waits(lost, device, world, qtbot):
-    banner = lost.operator.banner
-    qtbot.mouseClick(banner.reconnect, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: device.calls == 1)
-    lost.operator.ask("reconnect")
-    lost.tell_of_device("Homing (red light): pull the grip out.")
-    assert banner.then.text() == "Homing (red light): pull the grip out."
-    assert not banner.reconnect.isEnabled()
-    device.go_on.set()
-    settled(lost, qtbot)
-    assert device.calls == 1
-    assert isinstance(lost.participant.page, PausePage)
-    assert not world.force_is_on
-    assert not banner.isVisible()
-    assert lost.view().state == "force off"
-    lost.operator.ask("resume")
-    assert isinstance(lost.participant.page, TaskPage)
-    assert world.force_is_on
 
 
 def test_a_session_that_ends_meanwhile_stays_ended(lost, device, world, qtbot):

@@ -3,10 +3,8 @@
 import itertools
 import json
 import os
-import random
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -46,27 +44,6 @@ def test_problems_are_those_of_check(old: str, new: str) -> None:
     assert read(source).problems == raised.value.problems
 
 
-def test_undo_and_redo_restore_text_and_selection() -> None:
-    opened = Document(DEMO, ("liquids", "thin"))
-    opened.undo()
-    opened.redo()
-    found = [(DEMO.text, ("liquids", "thin"))]
-    for words, edit, select in (
-        ("Change the title", Set(("study", "title"), "New"), ("study",)), ("Remove the limits", Unset(("limits",)), ()),
-    ):  # fmt: skip
-        opened.edit(words, edit, select=select)
-        found.append((opened.study.text, opened.selected))
-    for at in (1, 0):
-        opened.undo()
-        assert (opened.study.text, opened.selected) == found[at]
-    for at in (1, 2):
-        opened.redo()
-        assert (opened.study.text, opened.selected) == found[at]
-    opened.undo()
-    opened.edit("Other", Set(("study", "title"), "Other"))
-    assert ([step.words for step in opened.done], opened.undone) == (["Change the title", "Other"], [])
-
-
 def test_steps_of_one_key_join_until_the_keyboard_rests(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = 0.0
     monkeypatch.setattr("study_app.designer.document.document.time", SimpleNamespace(monotonic=lambda: now_s))
@@ -85,22 +62,6 @@ def test_a_step_that_changes_nothing_is_none() -> None:
     assert (same.done, same.selected) == ([], ("study",))
 
 
-def test_a_text_that_is_not_toml_keeps_its_last_document_and_is_typed_on() -> None:
-    broken = Document(DEMO)
-    broken.edit("Type", text=DEMO.text.replace("format = 1", "format = "))
-    assert not broken.study.is_toml
-    assert broken.study.document == DEMO.document
-    assert "not TOML" in broken.study.problems[0].message
-    with pytest.raises(Refused, match="correct its text first"):
-        broken.edit("Change", Set(("format",), 2))
-    assert len(broken.done) == 1
-    broken.edit("Type", text=DEMO.text)
-    assert broken.study.protocol == DEMO.protocol
-    broken.undo()
-    broken.undo()
-    assert broken.study.text == DEMO.text
-
-
 def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> None:
     (tmp_path / "thick.toml").write_text("[liquids.any]\ndensity_kg_m3 = 1400\n")
     own = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]'
@@ -115,11 +76,6 @@ def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> 
 def test_typed_refuses_half_a_character() -> None:
     with pytest.raises(Refused, match="half a character"):
         DEMO.typed(DEMO.text + "# \ud800")
-
-
-def test_read_refuses_what_is_not_utf_8() -> None:
-    with pytest.raises(Refused, match="line 2 is not UTF-8 text"):
-        read(b"a = 1\nb = '\xff'\n")
 
 
 BLOCK = ("blocks", "delays", "conditions")
@@ -145,32 +101,6 @@ def test_a_trial_has_the_document_and_the_faults_of_the_text() -> None:
         assert tried.faults == written.faults
         study = written
     assert study.faults
-
-
-def test_an_edit_that_makes_no_sense_is_refused_and_so_is_a_text_that_is_not_toml() -> None:
-    study = read((PROTOCOLS / "rek2024.toml").read_bytes(), PROTOCOLS)
-    with pytest.raises(Refused):
-        study.trial.edited(Unset(("liquids", "tar")))
-    with pytest.raises(Refused):
-        _ = study.typed("[")[0].trial
-
-
-KILLS = int(os.environ.get("LIQUID_STUDY_DRAFT_KILLS", "10"))
-AT_ONCE = 10
-
-
-def test_a_draft_is_found_again_until_it_is_discarded(tmp_path: Path) -> None:
-    file = tmp_path / "new.toml"
-    assert draft_of(file) is None
-    keep(file, Draft("a = 'é'\r\n", "abc", ("blocks", "a", 1)))
-    found = draft_of(file)
-    assert found is not None
-    assert (found.text, found.base, found.selected) == ("a = 'é'\r\n", "abc", ("blocks", "a", 1))
-    assert found.kept_at
-    assert draft_of(tmp_path / "other.toml") is None
-    discard(file)
-    discard(file)
-    assert draft_of(file) is None
 
 
 def test_files_with_a_draft_are_listed(tmp_path: Path) -> None:
@@ -238,56 +168,6 @@ def test_a_broken_draft_is_none(tmp_path: Path, content: bytes) -> None:
     assert draft_of(file) is None
 
 
-TYPING = """
-import sys, time
-from pathlib import Path
-from study_app.store.drafts import Keeper
-keeper, letters = Keeper(Path(sys.argv[1]), "base"), 0
-while True:
-    letters += 1
-    keeper.edited("x" * letters, ("study", "title"), time.monotonic())
-    print(letters, time.time(), flush=True)
-    keeper.write_if_due(time.monotonic())
-    time.sleep(0.005)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="needs SIGKILL")
-def test_a_kill_while_typing_loses_at_most_the_last_second(tmp_path: Path) -> None:
-    draw = random.Random(1)  # noqa: S311
-    drafts = 0
-    for start in range(0, KILLS, AT_ONCE):
-        files = [tmp_path / f"study_{number}.toml" for number in range(start, start + AT_ONCE)]
-        for file in files:
-            file.write_text("a = 1\n")
-        outs = [file.with_suffix(".out") for file in files]
-        typing = []
-        for file, out in zip(files, outs, strict=True):
-            with out.open("wb") as stdout:
-                typing.append(subprocess.Popen([sys.executable, "-c", TYPING, str(file)], stdout=stdout))
-        while not all(out.stat().st_size for out in outs):
-            time.sleep(0.01)
-        for process in typing:
-            time.sleep(draw.uniform(0.0, 0.3))
-            process.kill()
-            process.wait()
-        drafts += sum(_kept(file, out) for file, out in zip(files, outs, strict=True))
-    assert drafts >= KILLS // 2
-
-
-def _kept(file: Path, out: Path) -> bool:
-    """Check what is left of a study whose typing was killed; return whether there is a draft."""
-    assert file.read_text() == "a = 1\n"
-    times = [float(line.split()[1]) for line in out.read_text().splitlines() if len(line.split()) == 2]
-    draft = draft_of(file)
-    letters = 0 if draft is None else len(draft.text)
-    assert draft is None or draft.text == "x" * letters
-    lost = times[letters:]
-    assert not lost or lost[-1] - lost[0] <= 1.0, (letters, len(times))
-    return draft is not None
-
-
 TEXT = (PROTOCOLS / "demo.toml").read_text(encoding="utf-8")
 
 
@@ -349,15 +229,6 @@ def test_what_cannot_be_a_version_is_refused(version: str) -> None:
         check_version(version, [])
     with pytest.raises(Refused, match="was run with another content"):
         check_version("1.0", [Run("abc", "1.0", sessions=1)])
-
-
-def test_a_version_that_was_run_is_never_overwritten_with_other_content(tmp_path: Path) -> None:
-    opened = Document(read(TEXT.encode(), tmp_path), file=tmp_path / "study.toml")
-    own = content_hash(opened.source())
-    for harmless in (Run(own, "1.0", sessions=2), Run("other", "1.0", pilots=3), Run("other", "2.0", sessions=1)):
-        opened.save((harmless,))
-    with pytest.raises(Refused, match=r"version 1\.0 was run by 2 sessions with another content: .* version 1\.1$"):
-        opened.save((Run("other", "1.0", sessions=2),))
 
 
 @pytest.mark.parametrize(

@@ -160,7 +160,7 @@ def test_new_refuses_what_it_cannot_make(words: tuple[str, ...], sentence: str, 
 
 def test_copy_of_a_shipped_study_keeps_its_comments() -> None:
     original = load("rek2024")
-    text = (FOLDER.parents[3] / "protocols" / "rek2024.toml").read_text(encoding="utf-8")
+    text = (FOLDER.parents[2] / "protocols" / "rek2024.toml").read_text(encoding="utf-8")
     copied = copy_of(read(text.encode()), "ours")
     assert copied.protocol is not None
     assert copied.protocol.liquids == original.liquids

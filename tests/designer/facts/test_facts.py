@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
-from study_app.designer.document.elements import element_of, outline, used_by
+from study_app.designer.document.elements import outline, used_by
 from study_app.designer.document.fields import blocks_using
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set, Unset
@@ -33,13 +33,6 @@ from tests.designer.document.grown import PROTOCOLS
 
 def study_of(file: pathlib.Path) -> Study:
     return read(file.read_bytes(), file.parent)
-
-
-def test_questions_that_use_a_scale_are_counted_one_by_one() -> None:
-    study = study_of(shipped_file("rek2024"))
-    items = ("questionnaires", "liquid", "items")
-    study, _ = study.edited(*(Set((*items, at, "scale"), "agreement") for at in (0, 1)))
-    assert used_by(study.document, ("scales", "agreement")) == "used by 2 questions, 2 questionnaires"
 
 
 @pytest.mark.parametrize(
@@ -116,12 +109,6 @@ def study() -> Study:
     return read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
 
 
-def test_a_place_belongs_to_the_nearest_element(study: Study) -> None:
-    assert element_of(study, ("scene", "body", "radius_m")) == ("scene",)
-    assert element_of(study, ("sequence", 3)) == ("sequence",)
-    assert element_of(study, ()) == ("study",)
-
-
 ENDS = st.sampled_from(["\n", "\r\n"])
 
 
@@ -156,11 +143,6 @@ def test_the_selected_element_and_faulty_lines_are_marked(newline: str) -> None:
     assert lines[first] == "[blocks.liquids]"
     assert lines[last].startswith("questionnaire = ")
     assert [lines[line] for line in found.faulty] == ['order = "shufled"']
-
-
-def test_a_file_that_is_not_toml_is_shown_with_its_line() -> None:
-    found = file_text(read(b"format = 1\nbroken =\n"), "x.toml", ("study",))
-    assert (found.text, found.selected, found.faulty) == ("format = 1\nbroken =\n", (), (1,))
 
 
 FILES = [*(shipped_file(name) for name in shipped()), *(FOLDER / f"{name}.toml" for name in templates())]
@@ -296,8 +278,3 @@ def test_where_nothing_is_measured_the_cards_say_why(
     for card in (one, people):
         assert (card.number, card.note) == (UNKNOWN, ("bad", "warning", CLIPPED))
         assert card.more == f"{more} clipped: observers are simulated with what the limits leave"
-
-
-def test_nothing_is_said_of_the_texts_of_a_file_that_was_never_readable() -> None:
-    (session,) = view(Study("[study"), ("study",)).cards
-    assert [type(part) for part in session.parts] == [Figures]

@@ -87,48 +87,10 @@ def test_a_free_id_is_suggested(opened, results):
     assert "free" in made.verdict.text()
 
 
-def test_an_id_no_file_name_can_take_and_a_folder_of_another_study_are_refused(dialog, tmp_path):
-    for wrong in ("P-007", "P 7", "", "P_7", "Zoë", "x" * 33):
-        dialog.editors["participant"].control.setText(wrong)
-        assert not dialog.begin.isEnabled()
-        assert repr(wrong) in dialog.verdict.text()
-        assert "P007" in dialog.verdict.text()
-    dialog.editors["participant"].control.setText("P007")
-    other = tmp_path / "other"
-    other.mkdir()
-    (other / "dataset_description.json").write_text('{"name": "otherstudy"}')
-    dialog.editors["results"].control.setText(str(other))
-    assert not dialog.begin.isEnabled()
-    assert "otherstudy" in dialog.verdict.text()
-
-
 def test_a_falcon_by_its_serial_number_can_be_preferred_and_an_unknown_device_is_the_mouse(opened):
     assert opened(device="falcon:FT123").chosen().device == "falcon:FT123"
     assert opened(device="hammer").chosen().device == "mouse"
     assert opened(device="scripted").chosen().results.name == "rek2024-scripted"
-
-
-def test_a_used_id_is_refused_with_the_ways_to_go_on_until_one_is_taken(dialog, results, qtbot):
-    use(results, "P007")
-    dialog.editors["participant"].control.setText("P007")
-    settle(qtbot, dialog)
-    assert not dialog.begin.isEnabled()
-    for way in ("new session number (2)", "resume", "another id"):
-        assert way in dialog.verdict.text()
-    dialog.editors["session"].control.setValue(2)
-    assert dialog.begin.isEnabled()
-    dialog.editors["session"].control.setValue(1)
-    before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
-    another, new = dialog.ways
-    another.click()
-    assert (dialog.editors["participant"].control.text(), dialog.editors["session"].control.value()) == ("P007", 2)
-    assert dialog.begin.isEnabled()
-    dialog.editors["session"].control.setValue(1)
-    new.click()
-    assert (dialog.editors["participant"].control.text(), dialog.editors["session"].control.value()) == ("P008", 1)
-    assert dialog.begin.isEnabled()
-    assert not dialog.ways[0].isVisibleTo(dialog)
-    assert before == {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
 
 
 def test_a_study_whose_conditions_were_changed_since_is_refused_with_what_to_do(results, opened):
@@ -160,18 +122,6 @@ def test_begin_creates_nothing_by_itself_and_gives_what_was_chosen(dialog, resul
     assert (chosen.language, chosen.device, chosen.windowed, chosen.screen) == ("nl", "scripted", True, 1)
     assert chosen.results == results / "rek2024-scripted"
     assert files(results.parent) == []
-
-
-def test_enter_begins_only_what_can_begin(dialog, qtbot):
-    for participant, seed in (("P-9", "12"), ("test", "12"), ("P9", "")):
-        dialog.editors["participant"].control.setText(participant)
-        dialog.editors["seed"].control.setText(seed)
-        assert not dialog.begin.isEnabled()
-    with qtbot.assertNotEmitted(dialog.accepted):
-        qtbot.keyClick(dialog.editors["participant"].control, Qt.Key.Key_Return)
-    dialog.editors["seed"].control.setText("12")
-    with qtbot.waitSignal(dialog.accepted):
-        qtbot.keyClick(dialog.editors["participant"].control, Qt.Key.Key_Return)
 
 
 def test_a_session_begins_with_what_is_set_for_this_machine_unless_its_firmware_is_gone(tmp_path, monkeypatch, opened):

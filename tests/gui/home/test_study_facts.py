@@ -1,17 +1,16 @@
-"""What the home window says of protocols and sessions."""
+"""What the home window says of studies and sessions, compared with a reviewed text."""
 
 import json
-from dataclasses import replace
+import re
+from collections.abc import Iterator
 from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
 
 from study_app.designer import version_rows
-from study_app.errors import ProtocolError
 from study_app.gui.home.study_facts import (
     BrokenFacts,
-    StudyFacts,
     held,
     holds_liquids_alone,
     interrupted,
@@ -39,6 +38,8 @@ from study_app.store.journals import journal_events
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.study_settings import begin_settings
+from tests.golden import compare
+from tests.golden_values import value_lines
 from tests.journal_lines import event_of
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
@@ -82,38 +83,70 @@ def stop_at(results, participant, steps, *, screens=None, source="demo", then=()
     store.close()
 
 
-@pytest.mark.parametrize(
-    ("steps", "where", "answers"),
-    [
-        (0, "before “A first look”", 0),
-        (1, "in part 1, liquid setting 1 of 2", 0),
-        (2, "in part 1, liquid setting 2 of 2", 2),
-        (4, "in part 2, delay setting 1 of 2", 4),
-        (7, "after the last page", 8),
-    ],
-)
-def test_an_interrupted_session_is_told_by_where_it_stopped_and_what_is_on_disk(tmp_path, steps, where, answers):
-    stop_at(tmp_path, "P006", steps)
-    now = datetime.now().astimezone()
-    told = interrupted(sessions(tmp_path, {"demo": 8}), [study_facts("rek2024"), study_facts("demo")], now)
-    assert told.heading == f"P006, session 1 of demo stopped {where}"
-    assert f"{answers} of 8 answers are on disk" in told.line
-    assert told.source == "demo"
-    assert told.folder == tmp_path / "demo" / "data" / "sub-P006" / "ses-01"
+def told(folder: Path) -> Iterator[str]:
+    """Yield what is said of each session in a folder of results, of all together, and which ones each filter shows."""
+    found, now = sessions(folder, {"demo": 8}), datetime.now().astimezone()
+    for row in found:
+        chips = f"{status_chip(row)[2]}, {validity_chip(row)[2]}; {incidents(row)}"
+        yield f"{row.participant} {row.kind} {row.status}: {chips}; {row.answers} of {row.answers_of}; {row.excluded}"
+    for study in ("demo", "rek2024"):
+        yield f"{study}: {held(found, study)}"
+    yield from (f"{words}: {[one.participant for one in found if matching('', state)(one)]}" for state, words in
+                states_of(found))  # fmt: skip
+    offered = interrupted(found, [study_facts("rek2024"), study_facts("demo")], now)
+    if offered is not None:
+        yield f"go on with {offered.source}: {offered.heading}; {offered.line}"
+        assert offered.folder == folder / "demo" / "data" / f"sub-{offered.participant}" / "ses-01"
+    assert interrupted(found, [], now) is None
 
 
-def test_only_what_can_go_on_here_is_offered(tmp_path):
-    now = datetime.now().astimezone()
-    studies = [study_facts("demo")]
-    start(tmp_path, "P001", "completed")
-    stop_at(tmp_path, "P002", 2, screens=dict(REHEARSED_SCREENS))
-    assert interrupted(sessions(tmp_path, {}), studies, now) is None
-    stop_at(tmp_path, "P003", 2)
-    assert interrupted(sessions(tmp_path, {}), [], now) is None
-    assert interrupted(sessions(tmp_path, {}), studies, now).participant == "P003"
-    opening = open_alone(tmp_path / "demo" / "data" / "sub-P003" / "ses-01")
-    assert interrupted(sessions(tmp_path, {}), studies, now) is None
+def test_sessions_are_told_as_they_were_held(tmp_path, pytestconfig):
+    lines = []
+    for steps in (0, 1, 2, 4, 7):
+        stop_at(tmp_path / str(steps), "P006", steps)
+        lines += [f"== stopped after {steps} steps", *told(tmp_path / str(steps))]
+    for number, status in enumerate(("completed", None, "withdrawn", "completed", "completed"), 1):
+        start(tmp_path, f"P{number:03}", status)
+    start(tmp_path, "P010", "completed", pilot=True)
+    start(tmp_path / "rehearsed", "P011", "completed", pilot=True, simulated=True)
+    start(tmp_path / "rehearsed", "P012", "completed", simulated=True)
+    lines += ["== simulated", *told(tmp_path / "rehearsed")]
+    stop_at(tmp_path, "P013", 2, screens=dict(REHEARSED_SCREENS))
+    lost = {"trial": 1, "attempt": 1, "reason": "the disk is full"}
+    for participant, then in (
+        ("P020", [("recording_lost", lost), ("device_reconnected", {"device": "mouse", "described": {}})]),
+        ("P021", [("outlet_lost", {"outlet": "Serial port", "reason": "it was unplugged"})]),
+        ("P022", [("note", {"kind": "note", "text": '"event":"recording_lost",'})]),
+    ):
+        stop_at(tmp_path, participant, 3, then=then)
+    exclude(tmp_path / "demo", "P004", 1, by="AB", reason="fell asleep")
+    journal = tmp_path / "demo" / "data" / "sub-P005" / "ses-01" / "journal.jsonl"
+    first = journal.read_text().splitlines()[0]
+    journal.write_text(first.replace('"at":', '"once":').replace('"event":"session_started"', '"event":"tired"') + "\n")
+    holiday = tmp_path / "holiday" / "data" / "sub-x" / "ses-01"
+    holiday.mkdir(parents=True)
+    (holiday / "journal.jsonl").write_text("[]\nno journal\n")
+    lines += ["== all", *told(tmp_path)]
+    lines += [read_record(tmp_path / "demo" / "data" / "sub-P020" / "ses-01").about]
+    opening = open_alone(tmp_path / "demo" / "data" / "sub-P022" / "ses-01")
+    lines += ["== P022 is open in a program", *told(tmp_path)]
     opening.release()
+    (tmp_path / "demo" / "exclusions.csv").write_text("nonsense")
+    lines += ["== exclusions that cannot be read", *told(tmp_path)]
+    compare(Path(__file__).parent / "golden" / "sessions.txt", lines, pytestconfig, mask=re.compile(r"\d\d:\d\d"))
+
+
+def test_studies_state_extent_languages_needs_and_the_first_problem(tmp_path, pytestconfig):
+    lines = []
+    for name, text in {"grouped": STUDY + GROUPS, "cut": "format = 1\nsequence = [", "bare": "format = 1\n"}.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    assert sources()[-1] == "demo"
+    for source in ("rek2024", "viscosityjnd", *(str(tmp_path / f"{name}.toml") for name in ("grouped", "cut", "bare"))):
+        facts = study_facts(source)
+        names = ("problem",) if isinstance(facts, BrokenFacts) else ("extent", "duration", "languages", "needs")
+        lines += [f"== {Path(source).stem}", *value_lines({name: getattr(facts, name) for name in names})]
+    found = (line.replace(str(tmp_path), "FOLDER") for line in lines)
+    compare(Path(__file__).parent / "golden" / "studies.txt", found, pytestconfig)
 
 
 def test_a_session_of_a_study_whose_liquid_file_is_lost_is_offered(tmp_path):
@@ -133,122 +166,12 @@ def test_a_session_of_a_study_whose_liquid_file_is_lost_is_offered(tmp_path):
     assert interrupted(sessions(results, {}), [broken, study_facts("demo")], now) == whole
 
 
-def test_the_card_of_a_protocol_states_extent_languages_and_needs(tmp_path):
-    assert sources()[-1] == "demo"
-    facts = study_facts("rek2024")
-    assert isinstance(facts, StudyFacts)
-    assert (facts.extent, facts.languages) == ("2 parts, 10 settings, 62 answers", "Dutch, English")
-    assert "8 N" in facts.needs
-    levels = study_facts("viscosityjnd")
-    assert isinstance(levels, StudyFacts)
-    assert levels.extent.startswith("1 part, 220 trials, ")
-    assert levels.duration.startswith("about ")
-    (tmp_path / "grouped.toml").write_text(STUDY + GROUPS)
-    grouped = study_facts(str(tmp_path / "grouped.toml"))
-    assert isinstance(grouped, StudyFacts)
-    assert (grouped.extent, grouped.duration) == ("2 parts, 6 settings, 6 to 7 answers", "about 1 to 2 min")
-
-
-def test_a_broken_protocol_names_its_first_problem(tmp_path):
-    broken = tmp_path / "own.toml"
-    broken.write_text("format = 1\nsequence = [")
-    facts = study_facts(str(broken))
-    assert isinstance(facts, BrokenFacts)
-    assert "line 2" in facts.problem
-    broken.write_text("format = 1\n")
-    facts = study_facts(str(broken))
-    with pytest.raises(ProtocolError) as refused:
-        load(facts.source)
-    count = len(refused.value.problems)
-    assert count > 1
-    assert facts.problem.endswith(f". Open it in the designer to see all {count} problems.")
-
-
-def test_sessions_that_need_care_stand_first_then_the_newest(tmp_path):
-    start(tmp_path, "P001", "completed")
-    start(tmp_path, "P002")
-    start(tmp_path, "P003", "withdrawn")
-    found = sessions(tmp_path, {"demo": 8})
-    wanted = [("P002", "unfinished"), ("P003", "withdrawn"), ("P001", "completed")]
-    assert [(row.participant, row.status) for row in found] == wanted
-    assert (found[0].answers, found[0].answers_of) == (0, 8)
-    assert held(found, "demo") == "3 sessions, 1 complete"
-    assert held(found, "rek2024") == "no participant yet"
-
-
-def test_a_session_open_in_a_program_is_running_until_that_ends(tmp_path):
-    start(tmp_path, "P001")
-    opening = open_alone(sessions(tmp_path, {})[0].folder)
-    (running,) = sessions(tmp_path, {})
-    assert (running.status, status_chip(running)[2], running.needs_care) == ("running", "Running", False)
-    assert ("running", "Running") in states_of([running])
-    assert validity_chip(replace(running, validity="valid"))[2] == "Open"
-    assert status_chip(replace(running, status="moved")) == ("neutral", "ring", "Moved")
-    opening.release()
-    (stopped,) = sessions(tmp_path, {})
-    assert (stopped.status, status_chip(stopped)[2]) == ("unfinished", "Interrupted")
-
-
-def test_lost_recordings_and_a_reconnected_device_show_in_the_row(tmp_path):
-    lost = {"trial": 1, "attempt": 1, "reason": "the disk is full"}
-    device = {"device": "mouse", "described": {}}
-    stop_at(tmp_path, "P001", 3, then=[("recording_lost", lost), ("device_reconnected", device)])
-    outlet = {"outlet": "Serial port", "reason": "it was unplugged"}
-    stop_at(tmp_path, "P003", 3, then=[("outlet_lost", outlet)])
-    stop_at(tmp_path, "P002", 3, then=[("note", {"kind": "note", "text": '"event":"recording_lost",'})])
-    rows = {row.participant: row for row in sessions(tmp_path, {})}
-    assert validity_chip(rows["P001"])[2] == "Recording lost"
-    assert incidents(rows["P001"]) == "1 recording lost, device reconnected"
-    assert incidents(rows["P003"]) == "1 outlet failed"
-    assert ("lost", "Recording lost") in states_of(rows.values())
-    assert [row for row in rows.values() if matching("", "lost")(row)] == [rows["P001"]]
-    assert incidents(rows["P002"]) == ""
-    assert incidents(read_record(rows["P001"].folder).facts) in read_record(rows["P001"].folder).about
-
-
-@pytest.mark.parametrize("simulated", [False, True])
-def test_a_pilot_counts_as_one_also_where_its_first_steps_were_simulated(tmp_path, simulated):
-    start(tmp_path, "P001", "completed", simulated=simulated, pilot=True)
-    (found,) = sessions(tmp_path, {})
-    assert found.kind == "pilot"
-    assert held([found], "demo") == "no participant yet, 1 pilot"
-
-
-def test_a_session_that_is_left_out_says_why(tmp_path):
-    for participant in ("P001", "P002"):
-        start(tmp_path, participant, "completed")
-    exclude(tmp_path / "demo", "P001", 1, by="AB", reason="fell asleep")
-    found = sessions(tmp_path, {})
-    assert {row.participant: row.excluded for row in found} == {"P001": "fell asleep", "P002": None}
-    assert held(found, "demo") == "2 sessions, 2 complete, 1 excluded"
-    (tmp_path / "demo" / "exclusions.csv").write_text("nonsense")
-    assert [row.excluded for row in sessions(tmp_path, {})] == [None, None]
-
-
-def test_a_folder_that_holds_something_else_is_passed_over(tmp_path):
-    start(tmp_path, "P001", "completed")
-    (tmp_path / "holiday" / "data" / "sub-x" / "ses-01").mkdir(parents=True)
-    (tmp_path / "holiday" / "data" / "sub-x" / "ses-01" / "journal.jsonl").write_text("[]\nno journal\n")
-    assert [row.participant for row in sessions(tmp_path, {}) if row.study == "demo"] == ["P001"]
-
-
 def test_times_are_said_as_people_say_them():
     now = datetime(2024, 11, 20, 15, 0).astimezone()
     assert started_words(now, now) == "Today 15:00"
     assert started_words(now - timedelta(hours=20), now) == "Yesterday 19:00"
     assert started_words(datetime(2024, 11, 18, 9, 5).astimezone(), now) == "18 Nov 09:05"
     assert started_words(datetime(2023, 3, 1, 9, 5).astimezone(), now) == "1 Mar 2023 09:05"
-
-
-def test_a_session_whose_journal_tells_nothing_is_still_listed(tmp_path):
-    start(tmp_path, "P001", "completed")
-    start(tmp_path, "P002", "completed")
-    journal = tmp_path / "demo" / "data" / "sub-P001" / "ses-01" / "journal.jsonl"
-    first = journal.read_text().splitlines()[0]
-    journal.write_text(first.replace('"at":', '"once":').replace('"event":"session_started"', '"event":"tired"') + "\n")
-    found = sessions(tmp_path, {})
-    assert [(one.participant, one.status) for one in found] == [("P001", "damaged"), ("P002", "completed")]
-    assert found[0].answers == 0
 
 
 def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
@@ -76,6 +76,25 @@ def refused(place: Any) -> None:
     place.show_view(still_view(refused=("wake.length", "length 9000 exceeds scaling 2600: lower length")))
 
 
+def left_by_escape(place: Any) -> None:
+    """Press Esc in the field of a length that the model refuses."""
+    row = place.form.rows["wake.length"]
+    row.slider.setValue(row.slider.maximum())
+    place.show_view(still_view(refused=("wake.length", "too long")))
+    row.field.setFocus()
+    QTest.keyClick(row.field, "\x1b")
+
+
+def held_over_a_switch(place: Any) -> None:
+    """Call for the other side while a knob is held, and move it on there."""
+    place.show_view(still_view())
+    slider = place.form.rows["wake.length"].slider
+    QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=QPoint(30, 16))
+    place.show_view(still_view(workbench().switch()))
+    QTest.mouseMove(slider, QPoint(50, 16))
+    QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=QPoint(50, 16))
+
+
 FOUND_VALUES = EstimateShown(
     source="other",
     sources=(*SOURCES, *LSL),
@@ -92,6 +111,8 @@ LAB: Actions = {
     "measuring": of_lab(cost=(), errors=(), tick_ns=None, measuring=True),
     "not measured": of_lab(cost=(), errors=()),
     "refused": refused,
+    "Esc leaves what was refused": left_by_escape,
+    "a knob held over a switch": held_over_a_switch,
     "flow curves, blind": lambda place: place.show_view(still_view(blind(slime("ketchup", "honey")))),
     "flow curves": lambda place: place.show_view(still_view(slime("ketchup", "honey"), estimate=FOUND_VALUES)),
     "other force limit": lambda place: (
@@ -103,7 +124,8 @@ LAB: Actions = {
     ),
     "busy": lambda place: (of_lab(busy="Opening the Falcon")(place), shown_now(place)),
     "trouble": in_turn(clicked("note.cancel"), of_lab(trouble="No Falcon answers: check its cable.")),
-    "put away": clicked("note.dismiss"),
+    "put away": in_turn(clicked("note.dismiss"), of_lab(trouble="No Falcon answers: check its cable.", said="Saved")),
+    "another trouble": of_lab(trouble="The Falcon stopped."),
     "force off": of_lab(force_on=False, said="Saved as syrup.toml"),
     "path": in_turn(clicked("note.fade_in"), of_lab(path="zigzag", study="own.toml")),
     "undone": lambda place: place.show_view(still_view(workbench().undo())),

@@ -66,21 +66,6 @@ def test_what_the_model_refuses_stays_with_the_reason_until_it_is_mended(place: 
     assert (row.field.text(), row.field.state, row.refused) == ("9000", "changed", "")
 
 
-def test_escape_leaves_what_was_refused(place: Any, told: Any, still: LabView) -> None:
-    row = fields(place)["wake.length"]
-    row.slider.setValue(row.slider.maximum())
-    refused = ("wake.length", "too long")
-    place.show_view(dataclasses.replace(still, refused=refused))
-    assert (row.field.text(), row.slider.number) == ("100000", 100_000)
-    row.field.setFocus()
-    QTest.keyClick(row.field, Qt.Key.Key_Escape)
-    assert (row.field.text(), row.slider.number, row.refused) == ("1700", 1700, "")
-    place.show_view(dataclasses.replace(still, refused=refused, measuring=True))
-    assert row.refused == ""
-    place.show_view(dataclasses.replace(still, refused=(refused[0], refused[1])))
-    assert row.refused == "too long"
-
-
 def test_stop_force_speaks_at_the_press_and_is_never_disabled_hidden_or_moved(place: Any, still: LabView) -> None:
     place.show_view(still)
     said = heard(place, "stop")
@@ -134,17 +119,6 @@ def test_esc_held_stops_the_force_from_any_part_also_while_a_preset_is_being_sav
     assert place.dialog is None, "a dialog goes with the place"
     place.findChild(EscapeKey).held.emit()
     assert len(said) == 1, "Esc held elsewhere asks nothing of a lab that was left"
-
-
-def test_a_knob_held_while_the_other_side_is_called_for_changes_nothing_there(place: Any, still: LabView) -> None:
-    place.show_view(still)
-    slider = place.form.rows["wake.length"].slider
-    QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=QPoint(30, 16))
-    place.show_view(dataclasses.replace(still, workbench=still.workbench.switch()))
-    said = heard(place, "change")
-    QTest.mouseMove(slider, QPoint(50, 16))
-    QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=QPoint(50, 16))
-    assert said == []
 
 
 def test_the_keyboard_stays_in_a_switch_that_takes_parameters_away(place: Any, told: Any, still: LabView) -> None:

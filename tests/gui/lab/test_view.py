@@ -109,14 +109,3 @@ def test_escape_and_leaving_give_the_pointer_back(place: Any, still: LabView) ->
     assert place.tank.pointer.held
     place.hide()
     assert not place.tank.pointer.held
-
-
-def test_a_trouble_that_was_put_away_stays_away_until_another_comes(place: Any, still: LabView) -> None:
-    trouble = dataclasses.replace(still, trouble="No Falcon answers.")
-    place.show_view(trouble)
-    assert place.note.isVisible()
-    place.note.dismiss.click()
-    place.show_view(dataclasses.replace(trouble, said="Saved as syrup.toml"))
-    assert not place.note.isVisible()
-    place.show_view(dataclasses.replace(trouble, trouble="The Falcon stopped."))
-    assert place.note.isVisible()

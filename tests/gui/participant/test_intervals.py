@@ -129,26 +129,6 @@ def steps(seen: Participant) -> list[int]:
     return [event.steps for event in seen.events if isinstance(event, Stepped)]
 
 
-@pytest.mark.slow
-def test_controls_are_shown_where_a_level_is_set_and_tell_neither_number_nor_end(opened: Participant) -> None:
-    for page in (interval(), interval(resting=True)):
-        opened.show(page)
-        assert opened.page.controls.isHidden()
-    opened.show(interval(adjusts=True))
-    controls = opened.page.controls
-    assert not controls.isHidden()
-    assert opened.page.accessibleName() == f"Second of 2. {QUESTION}"
-    before = [one.text() for one in controls.findChildren(QAbstractButton)]
-    opened.press(*[KEY.Key_Right] * 60)
-    assert [one.text() for one in controls.findChildren(QAbstractButton)] == before
-    assert all(one.isEnabled() for one in controls.findChildren(QAbstractButton))
-    assert not controls.findChildren(QLabel)
-    said = [one.accessibleName() + one.accessibleDescription() for one in controls.findChildren(QWidget)]
-    assert not any(character.isdigit() for text in (*said, *before) for character in text)
-    opened.show(task_page())
-    assert opened.page.controls is None
-
-
 def test_a_key_that_is_held_steps_eight_times_a_second_and_stops_with_it(opened: Participant, qtbot: Any) -> None:
     setting(opened)
     QTest.keyPress(opened.window, KEY.Key_Right)

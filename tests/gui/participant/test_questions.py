@@ -200,12 +200,6 @@ def test_an_answer_taken_back_is_no_answer_and_text_keeps_to_its_length(opening:
     assert "\x07" not in text
 
 
-def test_words_and_answer_stand_apart(opening: Opening) -> None:
-    field = opening(alone(4), FULL).question(1)
-    answer = field.grid.itemAtPosition(0, field.ANSWER).geometry()
-    assert answer.left() - field.statement.geometry().right() > 20 * field.scale
-
-
 TLX = tuple(
     SliderView(
         f"scale{n}", n, "How much of it was required, and how easy or demanding was it, taken as a whole? " * 2, True,

@@ -4,14 +4,14 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint
 from PySide6.QtGui import QAccessible, QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
 from tests.gui.participant.driver import KEY, Participant, name_of, tap, told_of
-from tests.gui.small import DUTCH_LABELS, LABELS, STATEMENTS, questionnaire
+from tests.gui.small import DUTCH_LABELS, LABELS, questionnaire
 
 pytestmark = pytest.mark.slow
 
@@ -66,22 +66,6 @@ def test_all_is_answered_in_one_way_alone_and_told_in_order(
     assert times == sorted(times)
 
 
-def test_tab_goes_from_row_to_row_to_the_button_and_back_and_backspace_changes_nothing(seen: Participant) -> None:
-    seen.press(KEY.Key_6, KEY.Key_5, KEY.Key_Backspace)
-    assert seen.focus is seen.question(2)
-    seen.press(KEY.Key_Backspace, KEY.Key_Backspace)
-    assert seen.focus is seen.question(1)
-    assert values(seen) == [6, 5]
-    order = []
-    for _ in range(10):
-        order.append(seen.focus)
-        seen.press(KEY.Key_Tab)
-    assert order == [*seen.page.fields, seen.page.button]
-    seen.question(9).setFocus()
-    QTest.keyClick(seen.focus, KEY.Key_Tab, Qt.KeyboardModifier.ShiftModifier)
-    assert seen.focus is seen.question(8)
-
-
 def test_the_column_that_is_pointed_at_is_labelled_beside_ends_and_middle(
     seen: Participant, opening: Opening, finger: QPointingDevice
 ) -> None:
@@ -123,13 +107,6 @@ def test_a_small_window_shows_five_a_page_and_asks_page_by_page(opening: Opening
     seen.window.resize(*FULL)
     assert visible(seen) == [*range(1, 10)]
     assert seen.page.tabs == []
-
-
-@pytest.mark.parametrize(("many", "begins"), [(2, 256), (9, 120)])
-def test_few_statements_begin_a_third_down_the_page(opening: Opening, many: int, begins: int) -> None:
-    seen = opening(questionnaire(STATEMENTS[:many]), FULL)
-    labels = seen.page.questions.itemAt(0).widget()
-    assert labels.mapTo(seen.page, QPoint()).y() == pytest.approx(begins, abs=20)
 
 
 def test_what_is_pointed_at_chosen_and_missing_is_announced(seen: Participant, monkeypatch: pytest.MonkeyPatch) -> None:

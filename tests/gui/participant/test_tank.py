@@ -14,9 +14,8 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.participant.tank.frame import changes
 from study_app.gui.participant.tank.layers import PATCH, OnsetPatch
 from study_app.gui.participant.tank_widget import TankWidget
-from study_app.session.pages import Interval
 from tests.gui.drawn import shown
-from tests.gui.small import explore, follow, follow_view, task_page, view
+from tests.gui.small import follow, follow_view, task_page, view
 
 Make = Callable[..., TankWidget]
 WORKSPACE_M = (0.1, 0.06, 0.06)
@@ -88,14 +87,6 @@ def test_what_changed_lies_inside_the_region_painted_anew(made: Make, page: Any,
     assert len(differs) > 0
 
 
-def test_the_count_of_reached_targets_is_drawn_where_it_is_kept(tank: TankWidget) -> None:
-    tank.show_view(view(reached=5))
-    before, count = shown(tank), tank.things["count"]
-    tank.show_view(view(reached=6))
-    differs = np.argwhere((before != shown(tank)).any(axis=2))
-    assert any(count.place.contains(QPoint(int(x), int(y))) for y, x in differs)
-
-
 def test_painted_comes_once_a_view_before_anything_else_is_done(tank: TankWidget, qtbot: Any) -> None:
     qtbot.waitExposed(tank)
     told: list[int] = []
@@ -124,51 +115,6 @@ def test_a_view_that_nobody_can_see_is_told_of_when_it_is_seen(tank: TankWidget,
     with qtbot.waitSignal(tank.painted, timeout=1000):
         tank.show()
     assert told == [1, 3]
-
-
-def test_an_exploration_may_be_left_after_its_least_time_and_no_other_task(made: Make) -> None:
-    tank = made(task_page(explore()))
-    assert not tank.may_leave
-    tank.show_view(view(lit=None, elapsed_s=29.9))
-    assert not tank.may_leave
-    early = shown(tank)
-    tank.show_view(view(lit=None, elapsed_s=30.0))
-    assert tank.may_leave
-    assert (early != shown(tank)).any()  # the hint under the tank
-    for page, seen in ((task_page(), view(elapsed_s=1000)), (task_page(follow()), follow_view(elapsed_s=4.1))):
-        other = made(page)
-        other.show_view(seen)
-        assert not other.may_leave
-
-
-def test_a_hidden_ball_is_not_drawn_and_nothing_tells_where_it_is(swing: TankWidget) -> None:
-    swing.show_view(follow_view(ball=(0.03, 0.01, 0)))
-    with_ball = shown(swing)
-    swing.show_view(follow_view(ball=(0.03, 0.01, 0), ball_hidden=True))
-    hidden = shown(swing)
-    assert (with_ball != hidden).any()
-    assert {"ball", "shadow", "plumb"}.isdisjoint(swing.things)
-    assert "target 0" in swing.things
-    swing.show_view(follow_view(ball=(-0.03, -0.01, 0.01), ball_hidden=True))
-    assert (hidden == shown(swing)).all()
-
-
-def interval(*, resting: bool, number: int = 2) -> Any:
-    announced = "Next: the second" if resting else "Second of 2"
-    return task_page(follow(), interval=Interval(number, 2, resting, announced))
-
-
-def test_the_ball_stays_drawn_from_an_interval_to_its_rest_and_is_no_frame_of_it(made: Make) -> None:
-    tank = made(interval(resting=False, number=1))
-    told: list[int] = []
-    tank.painted.connect(told.append)
-    QApplication.processEvents()
-    tank.show_view(follow_view(0.02, (0.02, 0.0, 0.0), elapsed_s=3.9, sample_ns=7, ball_hidden=True))
-    tank.turn_to(interval(resting=True))
-    assert tank.ball is not None
-    assert tank.targets[0].middle.x() == pytest.approx(tank.width() / 2, abs=1)
-    assert not tank.time_is_up
-    assert told == [7]
 
 
 def onsets(speeds_mps: list[float], step_ns: int = 10_000_000) -> list[bool]:

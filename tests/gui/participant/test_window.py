@@ -269,18 +269,6 @@ def test_time_is_up_is_told_before_the_questions_unless_a_pause_comes(opened: Pa
     assert opened.window.page == PausePage(force_off=False)
 
 
-def test_short_escape_pauses_a_page_but_no_pause_and_no_end(opened: Participant) -> None:
-    for page in (PausePage(force_off=False), TroublePage("a", "b"), EndPage("a", "b")):
-        opened.show(page)
-        opened.press(KEY.Key_Escape)
-    assert opened.events == []
-    for page in (text_page(), task_page(), questionnaire()):
-        opened.show(page)
-        opened.press(KEY.Key_Escape)
-        assert opened.told == [PauseRequested(opened.told[0].at_s, "participant")]
-        opened.events.clear()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("follows", [(), (questionnaire(), text_page())], ids=["stays", "changes"])
 def test_escape_held_stops_the_force_and_does_not_pause_as_well_though_the_page_changes(

@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor
 
 from study_app.gui.participant.tank.layers import PATCH
 from study_app.gui.participant.tank_widget import TankWidget
-from study_app.gui.settings.display_test import FIRST_MS, GREYS, GreyRamp, LineField, lines
+from study_app.gui.settings.display_test import GREYS, GreyRamp, LineField, lines
 from study_app.protocol.wording.languages import words
 from tests.gui.small import task_page
 from tests.gui.windows import display_test
@@ -24,25 +24,6 @@ def clock():
 @pytest.fixture
 def test_page(qtbot, clock):
     return display_test(qtbot, now_ns=lambda: clock.now)
-
-
-def corner(widget):
-    return widget.grab().toImage().pixelColor(widget.width() - 3, widget.height() - 3)
-
-
-def test_the_patch_toggles_when_its_time_has_come_and_is_painted(test_page, clock):
-    clock.now = round(1e6 * FIRST_MS) - 1
-    test_page.frame()
-    assert (test_page.lit, corner(test_page)) == (False, BLACK)
-    clock.now += 1
-    test_page.frame()
-    assert (test_page.lit, corner(test_page)) == (True, WHITE)
-    clock.now += round(1e6 * FIRST_MS) - 1
-    test_page.frame()
-    assert test_page.toggles == 1, "the interval begins anew with each toggle"
-    clock.now += 1
-    test_page.frame()
-    assert (test_page.toggles, corner(test_page)) == (2, BLACK)
 
 
 def test_the_patch_is_where_and_as_large_as_in_the_tank(test_page, qtbot):

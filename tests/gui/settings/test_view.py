@@ -28,14 +28,6 @@ def test_numbers_come_on_every_screen_and_go_with_the_place(real_place, qtbot):
     assert real_place.numbers == []
 
 
-def test_the_square_of_a_photodiode_is_off_unless_asked_for(real_place, qtbot):
-    square = real_place.editors["photodiode"].control
-    assert not square.isChecked()
-    with qtbot.waitSignal(real_place.changed) as heard:
-        qtbot.mouseClick(square, Qt.MouseButton.LeftButton)
-    assert heard.args == [{"photodiode": True}]
-
-
 def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
     qtbot.mouseClick(real_place.screens.test, Qt.MouseButton.LeftButton)
     test = real_place.test

@@ -1,6 +1,5 @@
 """A session in its windows sends its events to a port and to the Lab Streaming Layer, and goes on without them."""
 
-import json
 import os
 import threading
 
@@ -86,15 +85,3 @@ def test_a_port_that_is_unplugged_stops_no_session_and_is_said_once(short_demo, 
     assert any(text.startswith(f"Serial port: serial:{name} failed") for (text,) in shown[1:])
     assert sum(one["event"] == "responses" for one in lines_written) == 4
     assert verify(results).sound
-
-
-@pytest.mark.nightly
-def test_a_port_that_is_not_there_is_said_before_and_the_session_runs(short_demo, results):
-    workstation.save(MachineSettings(triggers="serial:/nowhere/ttyUSB7"))
-    code, lines = attended(short_demo, results)
-    assert code == 0
-    assert any(line.startswith("warning  Serial port     not available; serial:/nowhere/ttyUSB7") for line in lines)
-    receipt = receipt_of(results)
-    assert receipt["status"] == "completed"
-    assert json.dumps(receipt["outlets"]).startswith('{"Serial port": {"failed": "serial:/nowhere/ttyUSB7 cannot be')
-    assert [one["outlet"] for one in events(results) if one["event"] == "outlet_lost"] == ["Serial port"]

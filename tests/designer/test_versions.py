@@ -1,0 +1,178 @@
+"""Versions and copies of a study in several programs and places: none is lost, each leads to what changed."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication
+
+from study_app.app.main_controller import MainController
+from study_app.designer.document.steps import SetValue
+from study_app.designer.place.controller import DesignerController
+from study_app.gui.sessions.session_facts import SessionFacts
+from study_app.protocol.source.files import protocol_hash, shipped_file
+from study_app.store.study_versions import kept_content, kept_versions
+from tests.designer.support.designer import Designer
+from tests.designer.support.runs import run
+
+pytestmark = pytest.mark.slow
+REPETITIONS = ("blocks", "liquids", "repetitions")
+
+
+def lines(designer: Any) -> list[str]:
+    """The lines of the difference that is shown, without its context."""
+    shown = designer.controller.changes.difference.toPlainText().splitlines()
+    return [line.partition("  #")[0].rstrip() for line in shown if line[:1] in {"-", "+"}]
+
+
+def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
+    designer.open("kitchen", "device")
+    designer.editing.ask(SetValue(("device", "force_limit_n"), 3.0))
+    designer.saving.leave()
+    text = designer.text
+    another = DesignerController(designer.results)
+    another.enter()
+    (button,) = another.place.nothing.drafts
+    assert "kitchen" in button.text()
+    button.click()
+    assert another.editing.opened.study.text == text
+    assert another.editing.selected == ("device",)
+    another.place.deleteLater()
+
+
+def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_path: Path) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    liquid = shipped_file("demo").read_text().split("[liquids.thick]")[1].split("\n\n")[0]
+    (elsewhere / "syrup.toml").write_text(f"[liquids.syrup]{liquid}\n")
+    text = designer.file.read_text().replace(f"[liquids.thick]{liquid}", '[liquids.thick]\nfile = "syrup.toml"')
+    text = text.replace("format = 1", "format = 2", 1)
+    for name in ("thin", "thick"):
+        text = text.replace(f"[conditions.{name}]\n", f'[conditions.{name}]\nview = "sea/waves.mp4"\n')
+    (elsewhere / "sea").mkdir()
+    (elsewhere / "sea" / "waves.mp4").write_bytes(b"copied, not decoded")
+    (elsewhere / "kitchen.toml").write_text(text)
+    designer.open(str(elsewhere / "kitchen.toml"))
+    assert designer.study.faults == ()
+    designer.controller.begin(str(elsewhere / "kitchen.toml"), "mine")
+    designer.saving.save()
+    assert designer.editing.opened.file.exists()
+    assert (designer.file.parent / "syrup.toml").read_bytes() == (elsewhere / "syrup.toml").read_bytes()
+    assert (designer.file.parent / "sea" / "waves.mp4").read_bytes() == b"copied, not decoded"
+    designer.open()
+    again = DesignerController(designer.results)
+    again.open("mine")
+    assert again.editing.opened is not None
+    assert again.editing.opened.study.faults == ()
+    assert kept_content(protocol_hash(again.editing.opened.source())) is not None
+    again.place.deleteLater()
+
+
+OTHER = """
+import sys
+from pathlib import Path
+from PySide6.QtTest import QTest
+from study_app.designer.place.controller import DesignerController
+from study_app.gui.application import application_here
+from study_app.designer.document.steps import SetText
+application = application_here()
+designer = DesignerController(Path(sys.argv[1]))
+designer.open("kitchen")
+designer.editing.ask(SetText(("pages", "welcome", "title"), "en", sys.argv[2]))
+if sys.argv[3] == "save":
+    designer.saving.save()
+else:
+    designer.saving.leave()
+"""
+
+
+@pytest.mark.nightly
+def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
+    def other(words: str, then: str) -> None:
+        command = [sys.executable, "-c", OTHER, str(designer.results), words, then]
+        subprocess.run(command, check=True, env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
+
+    designer.open()
+    designer.editing.ask(SetValue(REPETITIONS, 3))
+    other("Saved elsewhere", "save")
+    assert "Saved elsewhere" in designer.file.read_text()
+    designer.saving.save()
+    assert "Saved elsewhere" in designer.file.read_text()
+    assert designer.place.banner.words.text().startswith("Another program changed this file")
+    designer.saving.answer_banner("keep")
+    designer.saving.save()
+    assert "repetitions = 3" in designer.file.read_text()
+    kept = [kept_content(one.hash) or b"" for one in kept_versions(designer.file)]
+    assert any(b"Saved elsewhere" in content for content in kept)
+
+    designer.editing.ask(SetValue(REPETITIONS, 4))
+    other("Typed elsewhere", "leave")
+    designer.saving.leave()
+    assert designer.place.banner.words.text().startswith("Another window of the program edits this study, too")
+    next(iter(designer.place.banner.buttons.values())).click()
+    QApplication.processEvents()
+    assert any("Typed elsewhere" in line for line in lines(designer))
+
+
+@pytest.mark.parametrize(("kind", "key"), [("pilot", "pilot"), ("rehearsal", "simulated")])
+def test_changes_begin_with_the_last_session_where_no_participant_was_run(
+    designer: Any, qtbot: Any, kind: str, key: str
+) -> None:
+    source = designer.file.read_bytes()
+    early = source.replace(b"max_s = 30 ", b"max_s = 40 ")
+    assert early != source
+    run(designer, "P001", source, study=f"kitchen-{kind}-1", **{key: True})
+    run(designer, "P001", early, study=f"kitchen-{kind}-2", started_at="2026-11-19T12:00:00+00:00", **{key: True})
+    designer.open()
+    qtbot.waitUntil(lambda: bool(designer.controller.runs.known))
+    designer.editing.ask(SetValue(REPETITIONS, 3))
+    designer.place.show_tab("changes")
+    changes = designer.controller.changes
+    assert changes.version.itemText(0) == "The file, without the edits"
+    assert changes.chosen == protocol_hash(source)
+
+
+def test_the_version_of_a_session_in_results_leads_to_what_changed(
+    qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    designer = Designer(tmp_path)
+    source = designer.file.read_bytes()
+    folder = run(designer, "P001", source, study="elsewhere")
+    designer.file.write_bytes(source.replace(b"repetitions = 1", b"repetitions = 3", 1))
+    designer.window.close()
+    visit = MainController(designer.results)
+    visit.window.show()
+    visit.window.place("results")
+    assert visit.results_controller is not None
+    card = visit.results_controller.place.sessions
+    facts = SessionFacts(
+        "P001", 1, "kitchen", datetime.now().astimezone(), "completed", "valid", 8, 8, False, False, folder
+    )
+    card.show_sessions([facts, replace(facts, participant="P002", folder=folder.parent)])
+    table = card.rows.table
+    words = [[str(table.model().index(row, column).data()) for column in range(4)] for row in range(2)]
+    assert [row[3] for row in words] == ["1.0", ""]
+    card.rows.table.selectRow(1)
+    assert not card.version.isEnabled()
+    card.rows.table.selectRow(0)
+    assert card.version.isEnabled()
+    table.clicked.emit(table.model().index(0, 3))
+    assert visit.window.here == "designer"
+    qtbot.waitUntil(lambda: visit.designer is not None and visit.designer.place.isVisible(), timeout=20_000)
+    assert visit.designer is not None
+    changes = visit.designer.changes
+    assert changes.chosen == protocol_hash(source)
+    assert changes.version.currentText().startswith("1.0: 1 session")
+    assert visit.designer.place.pane.tab == "changes"
+    visit.window.close()
+    visit.end()
+    visit.window.deleteLater()
+    designer.window.deleteLater()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

@@ -1,0 +1,188 @@
+"""Home: cards, sessions, and the ways into a session, while studies, drafts and files come, change and go."""
+
+import re
+import threading
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QEvent, QSize, Qt
+from PySide6.QtWidgets import QApplication, QFileDialog
+
+from study_app.gui.home import view
+from study_app.gui.widgets.background import wait_for_jobs
+from study_app.protocol.source.files import source_bytes
+from study_app.store.drafts import Draft, discard, keep
+from study_app.store.study_settings import begin_settings
+from tests.gui.home.home_window import hold, open_home
+from tests.gui.transcript import compare, story
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def workspace(monkeypatch, tmp_path):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+
+
+def own_study(folder, title="Own"):
+    """Write a study into a workspace, and return its file."""
+    file = folder / "protocols" / "own.toml"
+    file.parent.mkdir(exist_ok=True)
+    text = source_bytes("demo").decode().replace('name = "demo"', 'name = "own"')
+    file.write_text(text.replace('"A first look"', f'"{title}"'), encoding="utf-8")
+    return file
+
+
+def changes_of_studies(home, folder, chooses):
+    """Yield what happens to studies and drafts, and what is pressed then."""
+    file, fresh = folder / "protocols" / "own.toml", folder / "protocols" / "fresh.toml"
+
+    def come_back(act):
+        def comes_back():
+            act()
+            home.enter()
+
+        return comes_back
+
+    def pen(name):
+        pens = {Path(card.facts.source).stem: card.pen for card in home.grid.cards}
+        return f"press {pens[name].text()} of {name}", pens[name].click
+
+    yield "a study is added", come_back(lambda: own_study(folder))
+    yield "it is edited", come_back(lambda: own_study(folder, "Own, edited"))
+    cards = home.grid.cards
+    yield "nothing has changed", home.enter
+    assert home.grid.cards is cards
+    yield "it has the title of another one", come_back(lambda: own_study(folder, "A first look"))
+    yield "it is damaged", come_back(lambda: file.write_text("format = 1\n"))
+    yield pen("own")
+    yield "it is deleted", come_back(file.unlink)
+    text = own_study(folder).read_text(encoding="utf-8")
+    fresh_text = 'format = 2\n[study]\nname = "fresh"\ntitle = "Fresh"\n'
+    yield "the program was killed", come_back(lambda: keep(file, Draft(text.replace('"Own"', '"Else"', 1), "")))
+    begin_settings(fresh, "demo")
+    yield "a study was never saved", come_back(lambda: keep(fresh, Draft(fresh_text, "")))
+    for name in ("fresh", "own", "demo"):
+        yield pen(name)
+    yield "press New study", home.new_study.click
+    yield "the draft is that of the file", come_back(lambda: keep(file, Draft(text, "")))
+    elsewhere = folder / "elsewhere.toml"
+    elsewhere.write_text(text.replace('name = "own"', 'name = "elsewhere"'), encoding="utf-8")
+    for chosen in (elsewhere, folder / "broken.toml"):
+        chosen.write_text(chosen.read_text(encoding="utf-8") if chosen.exists() else "format = 1\n", encoding="utf-8")
+        chooses.setattr(QFileDialog, "getOpenFileName", lambda *_, chosen=chosen: (str(chosen), ""))
+        yield f"open {chosen.name}", home.open_protocol.click
+
+
+def sessions_come(home, folder, _chooses):
+    """Yield sessions that are held, and which kind is shown."""
+    for name, participant, study, simulated in (
+        ("sample-demo", "P003", "demo", True),
+        ("demo-rehearsal-1", "P002", "demo", True),
+        ("slime", "P001", "slime", False),
+        ("rek2024", "P004", "rek2024", False),
+    ):
+        hold(folder / "results" / name, participant, study=study, simulated=simulated)
+        yield f"{participant} of {study} in {name}", home.enter
+    for at in range(home.sessions.kind.count()):
+        yield f"show kind {at}", lambda at=at: home.sessions.kind.setCurrentIndex(at)
+
+
+@pytest.mark.parametrize("acts", [changes_of_studies, sessions_come], ids=lambda one: one.__name__)
+def test_home_follows_what_happens(qtbot, tmp_path, monkeypatch, pytestconfig, acts):
+    home = open_home(qtbot, tmp_path / "results")
+
+    def settled():
+        for _ in range(2):  # a folder that was looked at may be read
+            wait_for_jobs(60)
+            QApplication.processEvents()
+        qtbot.waitUntil(lambda: not home.reading)
+
+    lines = (
+        re.sub(r"\d\d:\d\d", "HH:MM", line.replace(str(tmp_path), "FOLDER"))
+        for line in story(home.main, acts(home, tmp_path, monkeypatch), settled)
+    )
+    compare(f"home, {acts.__name__}", lines, pytestconfig)
+
+
+def test_studies_that_cannot_be_read_are_named_and_the_sessions_stay(qtbot, results, monkeypatch):
+    monkeypatch.setattr(view, "read_studies", lambda _opened: 1 // 0)
+    monkeypatch.setattr(threading, "excepthook", lambda _what: None)
+    home = open_home(qtbot, results)
+    assert home.main.notice.windowTitle() == "The studies could not be read"
+    assert home.below.isVisible()
+    assert len(home.sessions.shown) == 1
+    home.main.notice.accept()
+    monkeypatch.undo()
+    QApplication.sendEvent(home, QEvent(QEvent.Type.WindowActivate))
+    assert not home.reading, "each activation would say it again"
+    home.enter()
+    qtbot.waitUntil(lambda: len(home.grid.cards) > 1)
+
+
+@pytest.mark.parametrize("after", ["saved", "never saved"])
+def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot, tmp_path, after):
+    text = own_study(tmp_path, "Zest").read_text(encoding="utf-8")
+    for name in "abcdefgh":
+        made = text.replace('name = "own"', f'name = "{name}"').replace("Zest", f"Study {name}")
+        (tmp_path / "protocols" / f"{name}.toml").write_text(made, encoding="utf-8")
+    file = tmp_path / "protocols" / ("own.toml" if after == "saved" else "fresh.toml")
+    keep(file, Draft(text.replace("Zest", "Else"), ""))
+    home = open_home(qtbot, tmp_path / "results")
+    home.main.resize(1366, 768)
+    home.main.activateWindow()
+    qtbot.waitUntil(home.main.isActiveWindow)
+    count, bar = len(home.grid.cards), home.cards_area.verticalScrollBar()
+    pen = home.grid.cards[0].pen
+    assert pen.text() == "Continue"
+    qtbot.mouseClick(pen, Qt.MouseButton.LeftButton)
+    discard(file)
+    home.enter()
+    qtbot.waitUntil(lambda: not any(card.facts.draft for card in home.grid.cards))
+    QApplication.processEvents()
+    now = home.main.focusWidget()
+    (held,) = (card for card in home.grid.cards if card.isAncestorOf(now))
+    assert now is held.pen
+    assert home.cards_area.viewport().rect().contains(held.mapTo(home.cards_area.viewport(), held.rect().center()))
+    if after == "saved":
+        assert (held.facts.title, bar.value() > 0) == ("Zest", True)
+    else:
+        assert (len(home.grid.cards), held, bar.value()) == (count - 1, home.grid.cards[0], 0)
+
+
+def test_where_only_samples_exist_sessions_are_one_line_until_they_are_asked_for(qtbot, tmp_path):
+    hold(tmp_path / "sample-demo", "P001", simulated=True)
+    home = open_home(qtbot, tmp_path)
+    card = home.sessions
+    qtbot.waitUntil(card.kind.isVisible)
+    assert card.height() < 80, "one line, for no row is shown"
+    qtbot.waitUntil(lambda: home.device.y() == home.lab.y() > 0)  # below it, side by side
+    assert "1 sample session" in card.nothing.text()
+    card.show_kind("sample")
+    qtbot.waitUntil(lambda: card.height() >= 200)
+    assert card.rows.table.isVisible()
+    qtbot.waitUntil(lambda: home.device.y() < home.lab.y())
+
+
+@pytest.mark.parametrize("size", [(1024, 640), (1366, 768), (1600, 1000)])
+@pytest.mark.parametrize("held", [True, False])
+def test_no_scroll_bar_stands_in_a_scroll_area(qtbot, tmp_path, size, held):
+    if held:
+        hold(tmp_path / "demo", "P001")
+    home = open_home(qtbot, tmp_path, QSize(*size))
+    bars = [area.verticalScrollBar() for area in (home.area, home.cards_area)]
+    qtbot.waitUntil(lambda: sum(bar.maximum() > 0 for bar in bars) == 1)
+
+
+def test_a_session_is_opened_by_the_keyboard_a_double_click_and_a_button(home, qtbot):
+    table, asked = home.sessions.rows.table, []
+    home.sessions.open_asked.connect(lambda facts: asked.append(facts.participant))
+    assert not home.sessions.details.isEnabled()
+    table.setFocus()
+    qtbot.keyClick(table, Qt.Key.Key_Down)
+    qtbot.keyClick(table, Qt.Key.Key_Return)
+    middle = table.visualRect(table.model().index(0, 1)).center()
+    qtbot.mouseClick(table.viewport(), Qt.MouseButton.LeftButton, pos=middle)
+    qtbot.mouseDClick(table.viewport(), Qt.MouseButton.LeftButton, pos=middle)
+    qtbot.mouseClick(home.sessions.details, Qt.MouseButton.LeftButton)
+    assert asked == ["P001"] * 3
