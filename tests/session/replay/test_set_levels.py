@@ -1,13 +1,11 @@
 """Levels that a participant set follow from the steps, every force from the recording; whoever changes one is found."""
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from study_app import __version__
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
 from study_app.store.blinded.blinding import opened, read_key, whole_protocol
@@ -19,7 +17,7 @@ from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.journal_lines import event_from, raw
 from tests.protocol.trials.matching import ALONE, DELAY, text_of
-from tests.store.forging import Lines, change, cut
+from tests.store.forging import cut
 
 pytestmark = [pytest.mark.slow, needs_servo]
 
@@ -60,72 +58,6 @@ def session_of(study: Path) -> Path:
 
 def lines_of(session: Path) -> list[dict[str, Any]]:
     return raw(opened(journal.read(session / "journal.jsonl"), read_key(session.parents[2])))
-
-
-def test_settings_follow_every_force_is_computed_again_and_the_study_is_sound(study: Path) -> None:
-    session = session_of(study)
-    found = reproduced(session)
-    assert (found.differences, found.followed) == ([], ["matching: 3 of 3 levels follow from the answers"])
-    proved = replay(session)
-    assert (proved.differences, proved.missing, proved.uncompared) == ((), (), ())
-    assert proved.recordings == 6
-    checked = verify(study, None)
-    assert (checked.errors, checked.warnings) == ((), ())
-
-
-def other_setting(lines: Lines) -> None:
-    next(line for line in lines if line.get("setting") is not None and line["trial"] == 2)["setting"] *= 1.01
-
-
-def other_step(lines: Lines) -> None:
-    next(line for line in lines if line["event"] == "stepped" and line["trial"] == 2)["steps"] += 1
-
-
-def other_answer(lines: Lines) -> None:
-    for line in lines:
-        if line["event"] == "choice" and line["trial"] == 2:
-            line["value"] += 1
-        elif line["event"] == "responses" and line["trial"] == 2:
-            line["items"][0]["value"] += 1
-
-
-def no_answer(lines: Lines) -> None:
-    next(line for line in lines if line["event"] == "responses" and line["trial"] == 3)["items"] = []
-
-
-def other_start(lines: Lines) -> None:
-    next(line for line in lines if line["event"] == "trial_started" and line["trial"] == 2)["level"] *= 1.001
-
-
-@pytest.mark.parametrize(
-    ("edit", "named"),
-    [
-        (other_setting, "trial 2, attempt 1: the interval ended at another setting than follows from its steps"),
-        (other_step, "trial 2, attempt 1: the interval ended at another setting than follows from its steps"),
-        (other_answer, "trial 2, attempt 1: the answer is not the sum of its steps"),
-        (no_answer, "trial 3, attempt 1: the answer is not the sum of its steps"),
-        (other_start, "trial 2, attempt 1: another level"),
-    ],
-)
-def test_what_was_changed_with_the_key_at_hand_is_found(
-    session: Path, edit: Callable[[Lines], None], named: str
-) -> None:
-    change(session, edit)
-    found = reproduced(session)
-    assert any(named in line for line in found.differences), found.differences
-    assert found.followed == ["matching: 2 of 3 levels follow from the answers"]
-    path = session / "receipt.json"
-    path.write_text(path.read_text().replace(f'"liquid-study": "{__version__}"', '"liquid-study": "0.2.0"'))
-    assert "liquid-study 0.2.0 ran the session and may choose levels by other rules" in reproduced(session).followed[-1]
-
-
-def test_a_step_that_took_effect_at_another_scene_is_found_by_replay(session: Path) -> None:
-    def later(lines: Lines) -> None:
-        made = [line for line in lines if line["event"] == "stepped" and line["trial"] == 1]
-        made[0]["steps"], made[1]["steps"] = made[1]["steps"] + 9, made[0]["steps"] - 9
-
-    change(session, later)
-    assert any("trial 1, attempt 1, interval 2" in line for line in replay(session).differences)
 
 
 @pytest.mark.parametrize(

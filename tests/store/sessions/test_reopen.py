@@ -2,9 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Callable
 from datetime import datetime, timedelta
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,10 +19,9 @@ from study_app.store.recorder import recording_files
 from study_app.store.recordings import read_samples, write_frames
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import check_can_go_on
 from tests.journal_lines import event_of
-from tests.store.conftest import SOURCE, Attend, FullDisk, Make, Start, Tables
-from tests.store.sessions.conftest import Again, every_byte
+from tests.store.conftest import FullDisk, Make, Start
+from tests.store.sessions.conftest import Again
 from tests.store.test_recorder import Disk
 
 
@@ -132,30 +129,6 @@ def test_the_receipt_tells_what_it_goes_on_with(start: Start, again: Again) -> N
     assert after["resumed"][1]["clock"] == {"origin_ns": resumed.clock.origin_ns, "origin_at": resumed.clock.at(0)}
 
 
-def test_a_torn_line_is_cut_off_counted_and_kept(start: Start, again: Again) -> None:
-    tails = (b'{"n":3,"event":"choi', b"\0" * 4096, b'{"n":3}', b"\xff")
-    with start() as store:
-        store.append(journal_events.Note(kind="note", text="kept"))
-    for number, tail in enumerate(tails, start=3):
-        whole = store.folder.journal.read_bytes()
-        store.folder.journal.write_bytes(whole + tail)
-        again().close()
-        lines = journal.read(store.folder.journal)
-        assert store.folder.journal.read_bytes().startswith(whole + b'{"n":%d,"event":"session_resumed"' % number)
-        assert lines[-1].torn_bytes == len(tail)
-    kept = sorted(store.folder.path.glob("journal-torn-*"))
-    assert tuple(path.read_bytes() for path in kept) == tails
-
-
-def test_a_study_killed_before_it_was_described_is_described(tmp_path: Path, start: Start, again: Again) -> None:
-    start().close()
-    (description,) = tmp_path.rglob("dataset_description.json")
-    told = description.read_bytes()
-    description.unlink()
-    again().close()
-    assert description.read_bytes() == told
-
-
 def test_a_disk_without_space_for_the_line_changes_nothing_and_it_can_be_tried_again(
     start: Start, again: Again, files_up_to: FullDisk
 ) -> None:
@@ -214,85 +187,3 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
         recorder.start(3, 2, 1000.0)
         recorder.append(samples_of(50))
     assert (resumed.lines[-1].event, resumed.lines[-1].attempt) == ("recorded", 2)
-
-
-def changed(tables: dict[str, Any], path: str, value: Any) -> Protocol:
-    *above, last = path.split(".")
-    place = tables
-    for name in above:
-        place = place[name]
-    place[last] = value
-    return Protocol.model_validate(tables)
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "told"),
-    [
-        ("pages.consent.body", "Stay.", 'pages.consent.body: "You may stop at any time." before, "Stay." now'),
-        ("tasks.feel.max_s", 10, "tasks.feel.max_s: 9 before, 10 now"),
-        ("sequence", ["consent", "liquids", "delays"], "sequence: "),
-        ("liquids.quagmire.density_kg_m3", 2929.2, "Differences: conditions differ"),
-        ("conditions.see_tardy.delay_ms", 292.9, "Differences: conditions differ"),
-        ("blocks.liquids.conditions", ["feel_mildew", "feel_quagmire"], "Differences: conditions differ"),
-    ],
-)
-def test_another_protocol_is_refused_and_the_difference_shown_but_nothing_of_conditions(
-    tmp_path: Path, start: Start, again: Again, tables_of_study: Tables, path: str, value: Any, told: str
-) -> None:
-    start().close()
-    before = every_byte(tmp_path)
-    with pytest.raises(StoreError) as refusal:
-        again(protocol=changed(tables_of_study(), path, value), source=SOURCE + b"# changed")
-    said = str(refusal.value)
-    assert said.endswith(told) if "conditions differ" in told else told in said
-    assert ("conditions differ" in said) == ("conditions differ" in told)
-    assert "\n" not in said
-    assert every_byte(tmp_path) == before
-
-
-def lose(name: str) -> Callable[[SessionStore], None]:
-    return lambda store: (store.folder.path / name).unlink()
-
-
-def end_it(store: SessionStore) -> None:
-    store.append(journal_events.SessionEnded(status="withdrawn", reason=""))
-
-
-def damage_the_end(store: SessionStore) -> None:
-    first, *rest = store.folder.journal.read_bytes().splitlines(keepends=True)
-    store.folder.journal.write_bytes(first + b"".join(b"#" + line[1:] for line in rest))
-
-
-def tear_the_first_line(store: SessionStore) -> None:
-    store.folder.journal.write_bytes(store.folder.journal.read_bytes()[:40])
-
-
-@pytest.mark.parametrize(
-    ("done", "sentence"),
-    [
-        (end_it, r"is finished \(withdrawn\) and cannot be resumed; use a new session number"),
-        (lose("receipt.json"), r"receipt\.json"),
-        (lose("../../../blinding/key.sealed"), r"key\.sealed"),
-        (lose("journal.jsonl"), r"journal\.jsonl"),
-        (damage_the_end, "line 2: damaged"),
-        (tear_the_first_line, r"journal\.jsonl has no line: .* use a new session number"),
-        (None, "is open in another program"),
-        (SessionStore.close, "Differences: only comments, order or notation"),
-    ],
-)
-def test_what_cannot_go_on_is_refused_untouched_by_looking_and_by_opening(
-    tmp_path: Path, start: Start, again: Again, protocol: Protocol, done: Attend | None, sentence: str
-) -> None:
-    with start() as store:
-        for text in ("one", "two"):
-            store.append(journal_events.Note(kind="note", text=text))
-        if done is not None:
-            done(store)
-            store.close()
-        before = every_byte(tmp_path)
-        source = SOURCE + b"# changed" if done is SessionStore.close else SOURCE
-        for look in (lambda: check_can_go_on(store.folder.path, protocol, source), lambda: again(source=source)):
-            with pytest.raises(StoreError, match=sentence):
-                look()
-            assert every_byte(tmp_path) == before
-    assert done is None or not is_open(store.folder.path)

@@ -17,7 +17,8 @@ from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude, exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
-from study_app.store.sessions.recovery import check_can_go_on, rebuild
+from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.sessions.recovery import check_can_go_on, rebuild, reopen
 from study_app.store.tables.study_files import write_participants
 from study_app.store.verification.verify_study import verify
 from tests.golden import CHANGING
@@ -26,8 +27,11 @@ from tests.store.conftest import SOURCE, attended, begun, choose, made_samples, 
 from tests.store.forging import Lines, cover_up, forge
 from tests.transcripts import Files, value_of
 
-MASK = re.compile(CHANGING.pattern + r"|\b(?:[a-z0-9]{4}-){2}[a-z0-9]{4}(?:-[a-z0-9]{2})?\b|line \d+ column .*?\)")
-"""Dates, versions, hashes, fingerprints, and places in receipts, which are as long as versions are."""
+MASK = re.compile(
+    CHANGING.pattern + r"|\b(?:[a-z0-9]{4}-){2}[a-z0-9]{4}(?:-[a-z0-9]{2})?\b|line \d+ column .*?\)"
+    r"|process \d+ on [^,]+|open-[0-9a-f]{8}"
+)
+"""Dates, versions, hashes, fingerprints, programs, and places in receipts, which are as long as versions are."""
 P007 = "data/sub-P007/ses-01"
 NAMES = {
     "SESSION": P007,
@@ -93,6 +97,18 @@ def left(folder: Path) -> Path:
 STARTS: dict[str, Callable[[Path], Path]] = {one.__name__: one for one in (recorded, answered, left)}
 
 
+def _changed(changes: dict[str, Any]) -> Protocol:
+    """Return the study with other values; a name's parts are joined by two underscores."""
+    tables: dict[str, Any] = study_tables()
+    for name, value in changes.items():
+        *above, last = name.split("__")
+        place = tables
+        for part in above:
+            place = place[part]
+        place[last] = value
+    return Protocol.model_validate(tables)
+
+
 class Changed(Files):
     """A copy of a study, and a command for whatever may happen to its files."""
 
@@ -112,8 +128,20 @@ class Changed(Files):
         done = rebuild(self.study / session)
         yield f"rebuilt {[path.name for path in done.rewritten]}, torn {done.torn_bytes}"
 
-    def go_on(self) -> None:
-        check_can_go_on(self.study / P007, Protocol.model_validate(study_tables()), SOURCE)
+    def go_on(self, comment: bytes = b"", **changes: Any) -> Iterator[str]:
+        """Look whether the session can go on, with a study of other values."""
+        check_can_go_on(self.study / P007, _changed(changes), SOURCE + comment)
+        yield "it can go on"
+
+    def reopen(self, comment: bytes = b"", **changes: Any) -> Iterator[str]:
+        """Let it go on, and leave it; tell what that says that the journal does not tell yet."""
+        given: dict[str, Any] = {"operator": "CD", "device": {"name": "mouse"}, "screens": {}}
+        with reopen(self.study / P007, _changed(changes), SOURCE + comment, **given) as store:
+            yield from (f"{line.event} {getattr(line, 'torn_bytes', '')}" for line in store.lines[-1:])
+
+    def open(self) -> None:
+        """Let another program have the session open."""
+        self.opening = open_alone(self.study / P007)
 
     def unblind(self) -> Iterator[str]:
         yield from (f"left: {one}" for one in unblind(self.study, "AB", "done").left)

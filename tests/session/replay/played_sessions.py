@@ -1,0 +1,162 @@
+"""Sessions that are changed in transcripts, and what replaying and reproducing them says."""
+
+import ast
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from study_app.errors import StoreError
+from study_app.session.replay import replay
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.folders import StudyFolder
+from study_app.store.verification.reproduction import reproduced
+from tests.faults.support import short
+from tests.protocol import edited_studies
+from tests.protocol.trials.matching import text_of
+from tests.session.pairs import short_text
+from tests.session.replay.recorded_sessions import rewrite, troubled
+from tests.store.forging import Lines, change, forge, nothing
+from tests.transcripts import Files, value_of
+
+NAMES = {"RECEIPT": "receipt.json", "FIRST": "recordings/trial-001.parquet", "SECOND": "recordings/trial-002.parquet"}
+
+
+def _rehearsed(text: str, seed: int) -> Callable[[Path], object]:
+    def make(folder: Path) -> object:
+        (folder / "study.toml").write_text(text, encoding="utf-8")
+        return rehearse(folder / "study.toml", participants=1, seed=seed, results=folder / "study")
+
+    return make
+
+
+STARTS: dict[str, Callable[[Path], object]] = {
+    "short": lambda folder: rehearse(short.write(folder), participants=1, seed=1, results=folder / "study"),
+    "troubled": lambda folder: troubled(folder / "study"),
+    "levels": _rehearsed(short_text(), 2),
+    "matching": _rehearsed(text_of(("repetitions = 4", "repetitions = 3")), 2),
+    "clipped": _rehearsed(edited_studies.text_of("clipped"), 1),
+}
+
+
+class Recorded(Files):
+    """A copy of a session, and a command for whatever may happen to it."""
+
+    def __init__(self, study: Path) -> None:
+        self.study = study
+        (session,) = StudyFolder(study).sessions()
+        super().__init__(session.path)
+
+    def replay(self) -> Iterator[str]:
+        found = replay(self.root)
+        yield f"{found.recordings} recordings, {'proved' if found.proved else 'not proved'}"
+        for kind in ("differences", "missing", "uncompared"):
+            yield from (f"{kind}: {one}" for one in getattr(found, kind))
+
+    def reproduce(self) -> Iterator[str]:
+        found = reproduced(self.root)
+        yield from (f"differs: {one}" for one in found.differences)
+        yield from (f"followed: {one}" for one in found.followed)
+
+    def nudge(self, recording: str, column: str, amount: float, first: int, last: int | None = None) -> None:
+        """Add an amount to rows of a column of a recording."""
+        rows = slice(first, last)
+        rewrite(
+            self.root / recording, lambda columns: columns[column].__setitem__(rows, columns[column][rows] + amount)
+        )
+
+    def receipt(self, *gone: str, **changes: Any) -> None:
+        """Change fields of the receipt, or take some away."""
+        held = json.loads((self.root / "receipt.json").read_text()) | changes
+        told = {name: value for name, value in held.items() if name not in gone}
+        self.write("receipt.json", json.dumps(told).encode())
+
+    def velocity(self, **estimator: Any) -> None:
+        """Let the receipt name another estimator of the velocity."""
+        held = json.loads((self.root / "receipt.json").read_text())
+        held["protocol"]["scene"]["velocity"] = estimator
+        self.write("receipt.json", json.dumps(held).encode())
+
+    def no_recording(self, trial: int, reason: str = "") -> None:
+        """Let the journal say that a recording was lost, or nothing."""
+        told = (
+            {"event": "recording_lost", "reason": reason} if reason else {"event": "note", "kind": "mark", "text": ""}
+        )
+
+        def lose(lines: Lines) -> None:
+            for number, line in enumerate(lines):
+                if line["event"] == "recorded" and line["trial"] == trial:
+                    lines[number] = {name: line[name] for name in ("n", "t_s", "at", "trial", "attempt")} | told
+
+        forge(self.root / "journal.jsonl", lose)
+
+    def known(self, event: str, trial: int, at: int = 0, /, **fields: Any) -> None:
+        """Change a line as one who has the key; ``"*2"`` and ``"+1"`` are of the number that is there."""
+
+        def edit(lines: Lines) -> None:
+            line = [line for line in lines if line["event"] == event and line["trial"] == trial][at]
+            for name, value in fields.items():
+                match str(value)[0]:
+                    case "*":
+                        line[name] *= ast.literal_eval(value[1:])
+                    case "+":
+                        line[name] += ast.literal_eval(value[1:])
+                    case _:
+                        line[name] = value
+
+        change(self.root, edit)
+
+    def answer(self, trial: int, value: Any, *, chosen: bool = True) -> None:
+        """Change an answer as one who has the key, and the choice before it."""
+
+        def edit(lines: Lines) -> None:
+            for line in (line for line in lines if line.get("trial") == trial):
+                if line["event"] == "choice" and chosen:
+                    line["value"] = value
+                if line["event"] == "responses":
+                    line["items"] = [] if value is None else [line["items"][0] | {"value": value}]
+
+        change(self.root, edit)
+
+    def pass_over(self, trial: int) -> None:
+        """Put a line that says that a trial was passed over in the place of its lines."""
+
+        def edit(lines: Lines) -> None:
+            first, *rest = [line for line in lines if line.get("trial") == trial]
+            told = {"event": "passed_over", "trial": trial, "reason": "track_ended"}
+            lines[lines.index(first)] = {name: first[name] for name in ("n", "t_s", "at")} | told
+            for line in rest:
+                lines.remove(line)
+
+        change(self.root, edit)
+
+    def tamper(self, event: str) -> None:
+        """Change a sealed text."""
+
+        def edit(lines: Lines) -> None:
+            line = next(line for line in lines if line["event"] == event)
+            line["sealed"] = "0000" + line["sealed"][4:]
+
+        change(self.root, nothing, edit)
+
+    def key(self, name: str, to: str) -> None:
+        (self.study / "blinding" / name).rename(self.study / "blinding" / to)
+
+
+def player(made: Callable[[str], Path], folder: Path) -> Callable[[str, list[str]], Iterator[str]]:
+    """Return what plays transcripts of copies of sessions in a folder."""
+
+    def play(start: str, lines: list[str]) -> Iterator[str]:
+        shutil.rmtree(folder / "study", ignore_errors=True)
+        recorded: Any = Recorded(Path(shutil.copytree(made(start) / "study", folder / "study")))
+        for line in lines:
+            yield line
+            name = line.partition("(")[0]
+            try:
+                told = list(value_of(line, {**NAMES, name: getattr(recorded, name)}) or ())
+            except StoreError as error:
+                told = [f"refused: {error}"]
+            yield from (f"> {one.replace(str(folder), 'FOLDER')}" for one in told)
+
+    return play
