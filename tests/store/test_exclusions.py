@@ -2,7 +2,6 @@ import codecs
 import json
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -10,7 +9,6 @@ from study_app.errors import StoreError
 from study_app.store.blinded import unblinding
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
-from study_app.store.sessions.folder_lock import is_open
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import FullDisk, Start
 
@@ -40,39 +38,6 @@ def test_a_session_and_a_trial_are_left_out_with_their_reasons(folder: Path) -> 
         "P008,1,n/a,rule 3,withdrew,2026-03-02T09:30:00.000+01:00\n"
         'P007,1,2,AB,"\'=1+1, it rang",2026-03-02T09:30:00.000+01:00\n'
     )
-
-
-@pytest.mark.parametrize(
-    ("given", "sentence"),
-    [
-        ({"participant": "P009"}, "has no session 1 of participant P009; participants: P007, P008"),
-        ({"session": 2}, "has no session 2 of participant P007; sessions of that participant: 1"),
-        ({"trial": 9}, "participant P007, session 1 has no trial 9: it has 1, 2, 3, 4, 5"),
-        ({"participant": "P008", "trial": 1}, "participant P008, session 1 has no trial 1: it has none"),
-        ({"by": " "}, "--by is empty"),
-        ({"reason": ""}, "--reason is empty"),
-    ],
-)
-def test_what_cannot_be_left_out_is_refused_untouched(folder: Path, given: dict[str, Any], sentence: str) -> None:
-    arguments: dict[str, Any] = {"participant": "P007", "session": 1, "by": "AB", "reason": "tired"}
-    with pytest.raises(StoreError) as refusal:
-        exclude(folder, **(arguments | given))
-    assert sentence in str(refusal.value)
-    assert "\n" not in str(refusal.value)
-    assert not (folder / "exclusions.csv").exists()
-    assert not is_open(folder)
-
-
-def test_what_is_left_out_already_is_refused(folder: Path) -> None:
-    exclude(folder, "P007", 1, trial=2, by="AB", reason="the phone rang", now=NOW)
-    with pytest.raises(
-        StoreError, match=r"session 1, trial 2 is already excluded, since 2026-03-02.*\(the phone rang\)"
-    ):
-        exclude(folder, "P007", 1, trial=2, by="CD", reason="again")
-    exclude(folder, "P007", 1, by="AB", reason="all of it")
-    with pytest.raises(StoreError, match=r"trial 3 is already excluded.*\(all of it\)"):
-        exclude(folder, "P007", 1, trial=3, by="CD", reason="again")
-    assert len(exclusions(folder)) == 2
 
 
 def test_a_rule_excludes_no_session_that_a_person_included_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -135,17 +100,6 @@ def test_a_reason_is_kept_as_it_can_be_read(folder: Path) -> None:
     assert [(row.participant, row.rule_or_person) for row in reversals(folder)] == [("P007", "catch")]
     assert unblind(folder, "CD", "to analyse").left == ()
     assert verify(folder).sound
-
-
-def test_what_is_not_left_out_cannot_be_taken_back(folder: Path) -> None:
-    exclude(folder, "P007", 1, trial=2, by="AB", reason="the phone rang", now=NOW)
-    before = (folder / "exclusions.csv").read_bytes()
-    with pytest.raises(StoreError, match=r"participant P007, session 1 is not excluded; excluded: .*trial 2"):
-        include(folder, "P007", 1, by="CD", reason="wrong")
-    with pytest.raises(StoreError, match="--reason is empty"):
-        include(folder, "P007", 1, trial=2, by="CD", reason=" ")
-    assert (folder / "exclusions.csv").read_bytes() == before
-    assert not (folder / "exclusions_reversed.jsonl").exists()
 
 
 def test_a_list_with_an_endless_cell_is_named(folder: Path) -> None:

@@ -13,18 +13,9 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.store.blinded import blinding
-from study_app.store.blinded.blinding import (
-    check_conditions,
-    open_or_draw_key,
-    reveal,
-    revealed_key,
-    reveals,
-    unreadable_reveals,
-)
-from study_app.store.blinded.unblinding import unblind
-from study_app.store.verification.verify_study import verify
+from study_app.store.blinded.blinding import check_conditions, open_or_draw_key
 from tests.protocol.trials.level_studies import study
-from tests.store.conftest import Start, Tables
+from tests.store.conftest import Tables
 
 
 def sealed(folder: Path) -> Path:
@@ -126,33 +117,6 @@ def test_a_rehearsals_key_follows_from_its_seed_and_does_not_mix_with_a_real_one
         open_or_draw_key(tmp_path / "real", protocol, stream(1, "blinding").random)
 
 
-@pytest.mark.parametrize(
-    ("place", "value"),
-    [
-        ("liquids.mildew.density_kg_m3", 1200),
-        ("conditions.see_tardy.delay_ms", 139),
-        ("blocks.liquids.conditions", ["feel_mildew", "feel_quagmire"]),
-        ("blocks.liquids.code_prefix", "Q"),
-    ],
-)
-def test_a_protocol_with_other_conditions_is_refused_without_naming_them(
-    tmp_path: Path, protocol: Protocol, tables_of_study: Tables, place: str, value: Any
-) -> None:
-    key = open_or_draw_key(tmp_path, protocol)
-    tables = tables_of_study()
-    tables["pages"]["consent"]["body"] = "Other words."
-    assert open_or_draw_key(tmp_path, Protocol.model_validate(tables)) == key
-    of, name, last = place.split(".")
-    tables[of][name][last] = value
-    with pytest.raises(StoreError, match="was sealed for other conditions than those of this protocol") as refusal:
-        open_or_draw_key(tmp_path, Protocol.model_validate(tables))
-    with pytest.raises(StoreError, match="undo that change") as early:
-        check_conditions(tmp_path, Protocol.model_validate(tables))
-    assert str(early.value) == str(refusal.value)
-    message = str(refusal.value).replace(str(tmp_path), "")  # whose name holds any number
-    assert not any(word in message for word in ("mildew", "tardy", "139", "1200"))
-
-
 def test_a_block_with_another_of_the_studys_methods_has_other_conditions(tmp_path: Path) -> None:
     many = '\n[methods.many]\nkind = "constant"\nlevels = [0.1, 0.8]\nrepetitions = 8\n'
     open_or_draw_key(tmp_path, study(more=many))
@@ -170,86 +134,3 @@ def test_an_unreadable_key_and_one_of_a_later_format_are_errors(tmp_path: Path, 
         sealed(tmp_path).write_bytes(content)
         with pytest.raises(StoreError, match=sentence):
             open_or_draw_key(tmp_path, protocol)
-
-
-def test_a_tampered_key_is_found_by_receipts_and_journals_and_a_lost_one_is_not_drawn_anew(
-    start: Start, tmp_path: Path
-) -> None:
-    with start("P001") as store:
-        store.finish("completed")
-    folder = tmp_path / "study"
-    content = content_of(folder)
-    codes = content["codes"]["liquids"]
-    codes["L1"], codes["L2"] = codes["L2"], codes["L1"]
-    sealed(folder).write_bytes(base64.encodebytes(json.dumps(content).encode()))
-    for _ in range(2):
-        for attempt in (lambda: start("P002"), lambda: reveal(folder, "AB", "analysis")):
-            with pytest.raises(StoreError, match=r"is not the key that .*sub-P001.* ran under"):
-                attempt()
-        store.folder.receipt.write_bytes(b"?")  # then the journal tells
-    sealed(folder).unlink()
-    with pytest.raises(StoreError, match=r"key\.sealed is missing, though 1 sessions ran under it"):
-        start("P002")
-    assert not sealed(folder).exists()
-    assert not (folder / "data" / "sub-P002").exists()
-    assert reveals(folder) == ()
-
-
-def test_a_damaged_receipt_stops_no_session_but_its_own(start: Start, tmp_path: Path) -> None:
-    contents = (b"", b"{}", b'{"key_hash', b"\xff\xfe", None)
-    for number, content in enumerate(contents, start=1):
-        with start(f"P{number:03d}") as store:
-            pass
-        if content is None:
-            store.folder.receipt.unlink()
-        else:
-            store.folder.receipt.write_bytes(content)
-    start("P009").finish("completed")
-    assert set(unblind(tmp_path / "study", by="AK", reason="done").codes) == {"practice", "liquids", "delays"}
-    assert [error.place for error in verify(tmp_path / "study").errors] == [
-        f"data/sub-P{number:03d}/ses-01/receipt.json" for number in range(1, 6)
-    ]
-
-
-def test_a_reveal_is_recorded_before_it_tells(start: Start, tmp_path: Path) -> None:
-    store = start("P001")
-    store.finish("completed")
-    folder = tmp_path / "study"
-    assert revealed_key(folder) is None
-    codes = reveal(folder, " Dr. Ørsted ", 'end of data, "n = 1"\n')
-    assert codes == store.key.codes
-    assert revealed_key(folder) == store.key
-    reveal(folder, "CD", "again")
-    first, second = reveals(folder)
-    assert (first["by"], first["reason"], first["key_hash"]) == ("Dr. Ørsted", 'end of data, "n = 1"', store.key.hash)
-    assert first["at"] <= second["at"]
-    assert (folder / "blinding" / "reveals.jsonl").read_bytes().count(b"\n") == 2
-
-
-def test_a_reveal_needs_a_name_a_reason_and_its_record(start: Start, tmp_path: Path) -> None:
-    start("P001").finish("completed")
-    folder = tmp_path / "study"
-    path = folder / "blinding" / "reveals.jsonl"
-    for by, reason, named in (("", "done", "--by"), ("AB", " \n", "--reason")):
-        with pytest.raises(StoreError, match=f"{named} is empty"):
-            reveal(folder, by, reason)
-    assert not path.exists()
-    path.mkdir()
-    with pytest.raises(StoreError, match=r"reveals\.jsonl cannot be"):
-        reveal(folder, "AB", "analysis")
-    with pytest.raises(StoreError, match=r"is not a study folder \(it has no key\.sealed\): name one"):
-        reveal(tmp_path, "AB", "analysis")
-
-
-def test_a_line_that_is_no_reveal_is_told_and_the_others_count(start: Start, tmp_path: Path) -> None:
-    start("P001").finish("completed")
-    folder, wrong = tmp_path / "study", (b"5", b"null", b'"by AB"', b"[1]", b"xat: 2026")
-    (folder / "blinding" / "reveals.jsonl").write_bytes(b"\n".join(wrong) + b"\n")
-    assert revealed_key(folder) is None
-    unblind(folder, "AB", "done")
-    assert unreadable_reveals(folder) == tuple((number, False) for number in range(1, 6))
-    assert [one["by"] for one in reveals(folder)] == ["AB"]
-    assert [str(one) for one in verify(folder).errors] == [
-        f"blinding/reveals.jsonl: line {number} is not a reveal: it was changed; restore it from a copy"
-        for number in range(1, 6)
-    ]

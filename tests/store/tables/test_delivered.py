@@ -1,5 +1,9 @@
 """Which limits an interval breaks, by its samples: level, clipping, pace, and the difference of two delays."""
 
+from collections.abc import Iterator
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +14,9 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.presentation import Presentation
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.store.delivered import delay_error_ms, delivered, delivered_error, judged, missed, undelivered
+from study_app.store.delivered import delivered, delivered_error, judged, missed, undelivered
+from tests.golden import compare
+from tests.transcripts import played, value_of
 
 STUDY = """\
 format = 2
@@ -39,15 +45,13 @@ stimulus = "damping"
 design = "2ifc"
 method = "constant"
 """
+SLOW = (
+    STUDY.replace("[tasks.follow]", '[conditions.late]\nliquid = "damper"\nforce_delay_ms = 100\n[tasks.follow]')
+    .replace("[stimuli.damping]", '[stimuli.damping]\ncondition = "late"')
+    .replace("= 8 }", "= 2 }")
+)
 DAMPING = Stimulated("damper", "damping_nspm", 8.0)
-VISCOSITY = Stimulated("damper", "viscosity_pa_s", 4.0)
 DELAY = Stimulated("damper", "delay_ms", 50.0)
-FORCE_DELAY = Stimulated("damper", "force_delay_ms", 50.0)
-
-
-@pytest.fixture(scope="module")
-def protocol() -> Protocol:
-    return parse(STUDY.encode(), "delivered.toml")
 
 
 def samples(b_nspm: float = 8.0, *, pace: float = 1.0, lasts_s: float = 4.0) -> Any:
@@ -61,56 +65,62 @@ def samples(b_nspm: float = 8.0, *, pace: float = 1.0, lasts_s: float = 4.0) -> 
     return found
 
 
-def reasons(protocol: Protocol, found: Any, presented: Stimulated = DAMPING, task: str = "follow") -> list[str]:
-    done = protocol.tasks[task]
-    return [*undelivered(protocol.limits, presented, done, delivered(protocol, presented, done, judged(found)))]
+def late(delay: int, b_nspm: float = 8.0) -> Any:
+    """Return the interval with a force that is sent so many ticks late."""
+    found = samples(b_nspm)
+    found["device_force_n"][delay:] = found["force_n"][: len(found) - delay]
+    found["device_force_n"][:delay] = 0
+    return found
 
 
-@pytest.mark.parametrize(
-    ("b_nspm", "broken"),
-    [(8.0, []), (8.15, []), (7.85, []), (8.17, ["level_error_percent"]), (7.83, ["level_error_percent"])],
-)
-def test_a_damping_is_judged_by_its_limit(protocol: Protocol, b_nspm: float, broken: list[str]) -> None:
-    assert reasons(protocol, samples(b_nspm)) == broken
+class Interval:
+    """An interval, what may happen to its samples, and what is found of it."""
+
+    def __init__(self, protocol: Protocol, delay: int = 0, task: str = "follow", **made: Any) -> None:
+        self.protocol, self.task, self.found = protocol, task, samples(**made)
+        if delay:
+            self.found = late(delay, made.get("b_nspm", 8.0))
+
+    def weaken(self, share: float, until: int | None = None) -> None:
+        self.found["device_force_n"][:until] *= share
+
+    def clip(self, at: int) -> None:
+        self.found["limiters"][at] = LIMITER_NORM
+
+    def refuse(self, first: int, last: int) -> None:
+        """Refuse positions, which are far off."""
+        self.found["position_m"][first:last] = 1.0
+        self.found["limiters"][first:last] = LIMITER_GLITCH
+
+    def take_back(self) -> None:
+        self.found["limiters"] = 0
+
+    def lose(self, first: int, last: int) -> None:
+        self.found = np.delete(self.found, range(first, last))
+
+    def find(self, vary: str, value: float, condition: str = "damper") -> str:
+        """Tell what was delivered of a level, and which limits that breaks."""
+        presented, task = Stimulated(condition, vary, value), self.protocol.tasks[self.task]
+        found = delivered(self.protocol, presented, task, judged(self.found))
+        told = ", ".join(f"{name} {round(one, 4) + 0.0:g}" for name, one in asdict(found).items() if isinstance(one, float))
+        return f"{told}; broken: {[*undelivered(self.protocol.limits, presented, task, found)]}"
 
 
-@pytest.mark.parametrize(("share", "broken"), [(1.0, []), (0.985, []), (0.97, ["level_error_percent"])])
-def test_another_number_is_judged_by_the_share_of_its_force(
-    protocol: Protocol, share: float, broken: list[str]
-) -> None:
-    found = samples()
-    found["device_force_n"] *= share
-    assert reasons(protocol, found, VISCOSITY) == broken
-    assert reasons(protocol, found, DELAY) == []
+def play(start: str, lines: list[str]) -> Iterator[str]:
+    """Yield what happens to samples of an interval, and what is found."""
+    protocol = parse((SLOW if start.startswith("slow") else STUDY).encode(), "delivered.toml")
+    interval: Any = value_of(f"made({start.partition(':')[2]})", {"made": partial(Interval, protocol)})
+    for line in lines:
+        yield line
+        name = line.partition("(")[0]
+        told = value_of(line, {name: getattr(interval, name)})
+        yield from [f"> {told}"] if told else []
 
 
-@pytest.mark.parametrize(("pace", "broken"), [(0.62, []), (1.38, []), (0.58, True), (1.42, True)])
-def test_the_pace_is_judged_where_there_is_one(protocol: Protocol, pace: float, broken: object) -> None:
-    assert reasons(protocol, samples(pace=pace)) == (["pace_error_percent"] if broken else [])
-    assert reasons(protocol, samples(pace=pace), task="stir") == []
-
-
-@pytest.mark.parametrize(
-    ("task", "at_s", "broken"),
-    [("follow", 0.9, []), ("follow", 1.1, ["force_limit_n"]), ("stir", 0.4, []), ("stir", 0.6, ["force_limit_n"])],
-)
-def test_clipping_counts_after_the_lead_or_the_fade(
-    protocol: Protocol, task: str, at_s: float, broken: list[str]
-) -> None:
-    found = samples()
-    found["limiters"][round(1000 * at_s)] = LIMITER_NORM
-    assert reasons(protocol, found, task=task) == broken
-    assert reasons(protocol, found, DELAY, task) == []
-
-
-def test_the_fade_and_refused_positions_are_not_judged(protocol: Protocol) -> None:
-    found = samples()
-    found["device_force_n"][:1000] = 0
-    found["position_m"][2000:2003] = 1.0
-    found["limiters"][2000:2003] = LIMITER_GLITCH
-    assert reasons(protocol, found) == []
-    found["limiters"] = 0
-    assert "level_error_percent" in reasons(protocol, found)
+def test_what_is_found_of_an_interval(pytestconfig: pytest.Config) -> None:
+    """100 ms late, a damper of 8 N·s/m would measure as 6.5 at 1 Hz, were its motion not taken as late."""
+    file = Path(__file__).parent / "golden" / "delivered.txt"
+    compare(file, played(file, play), pytestconfig, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -125,62 +135,11 @@ def test_the_fade_and_refused_positions_are_not_judged(protocol: Protocol) -> No
     ],
 )
 def test_delays_are_judged_by_the_difference_of_their_errors(
-    protocol: Protocol, errors_ms: list[float | None], holds: tuple[bool, ...], broken: list[str]
+    errors_ms: list[float | None], holds: tuple[bool, ...], broken: list[str]
 ) -> None:
-    assert [*missed(protocol.limits, Presentation(10.0, 50.0, 0, (DELAY, DELAY)), holds, errors_ms, 1000.0)] == broken
-    assert [*missed(protocol.limits, Presentation(0.1, 8.0, 0, (DAMPING, DAMPING)), holds, errors_ms, 1000.0)] == []
-
-
-def late(delay: int, b_nspm: float = 8.0) -> Any:
-    """Return the interval with a force that is sent so many ticks late."""
-    found = samples(b_nspm)
-    found["device_force_n"][delay:] = found["force_n"][: len(found) - delay]
-    found["device_force_n"][:delay] = 0
-    return found
-
-
-@pytest.mark.parametrize("delay", [0, 15, 250])
-@pytest.mark.parametrize("task", ["follow", "stir"])
-def test_the_delay_of_a_force_is_measured(protocol: Protocol, delay: int, task: str) -> None:
-    presented = Stimulated("damper", "force_delay_ms", float(min(delay, 200)))
-    found = delivered(protocol, presented, protocol.tasks[task], judged(late(delay)))
-    assert found.value_delivered == pytest.approx(delay, abs=0.05)
-    assert found.force_share == pytest.approx(1.0, abs=1e-4)  # of the force that belongs to it
-    assert delay_error_ms(presented, found.columns) == pytest.approx(delay - presented.value, abs=0.05)
-    assert reasons(protocol, late(delay), presented, task) == []
-
-
-def test_a_lost_sample_does_not_shift_the_delay_of_a_force(protocol: Protocol) -> None:
-    found = late(30)
-    found["limiters"][2100] = LIMITER_GLITCH
-    found["position_m"][2100] = 1.0
-    whole = np.delete(found, range(2500, 2510))
-    measured = delivered(protocol, FORCE_DELAY, protocol.tasks["follow"], judged(whole))
-    assert measured.value_delivered == pytest.approx(30, abs=0.2)
-
-
-def test_a_damping_is_measured_by_the_motion_that_its_late_force_belongs_to(protocol: Protocol) -> None:
-    """100 ms late, a damper of 8 N·s/m would measure as 6.5 at 1 Hz."""
-    slow = parse(
-        STUDY.replace("[tasks.follow]", '[conditions.late]\nliquid = "damper"\nforce_delay_ms = 100\n[tasks.follow]')
-        .replace("[stimuli.damping]", '[stimuli.damping]\ncondition = "late"')
-        .replace("= 8 }", "= 2 }")
-        .encode(),
-        "late.toml",
-    )
-    presented = Stimulated("late", "damping_nspm", 2.0)
-    found = delivered(slow, presented, slow.tasks["follow"], judged(late(100, 2.0)))
-    assert found.value_delivered == pytest.approx(2.0, rel=1e-3)
-    assert found.force_share == pytest.approx(1.0, rel=1e-4)
-
-
-def test_jitter_and_loss_are_taken_as_requested_and_clipping_still_counts(protocol: Protocol) -> None:
-    presented = Stimulated("damper", "force_loss", 0.3)
-    found = late(3)
-    assert delivered(protocol, presented, protocol.tasks["follow"], judged(found)).value_delivered == 0.3
-    assert reasons(protocol, found, presented) == []
-    found["limiters"][2000] = LIMITER_NORM
-    assert reasons(protocol, found, presented) == ["force_limit_n"]
+    limits = parse(STUDY.encode(), "delivered.toml").limits
+    assert [*missed(limits, Presentation(10.0, 50.0, 0, (DELAY, DELAY)), holds, errors_ms, 1000.0)] == broken
+    assert [*missed(limits, Presentation(0.1, 8.0, 0, (DAMPING, DAMPING)), holds, errors_ms, 1000.0)] == []
 
 
 def error(found: Any, fade_s: float = 0.3, b_nspm: float = 8.0) -> float | None:

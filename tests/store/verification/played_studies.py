@@ -1,10 +1,12 @@
 """Studies that are changed in transcripts, and what `verify` and others say of them."""
 
+import base64
 import hashlib
 import json
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +22,14 @@ from study_app.store.journals import journal_events
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.sessions.recovery import check_can_go_on, rebuild, reopen
 from study_app.store.tables.study_files import write_participants
+from study_app.store.verification.proofs import proof_text
 from study_app.store.verification.verify_study import verify
+from study_app.store.withdrawals import Tombstone, add_tombstone, describe_session, withdraw
 from tests.golden import CHANGING
 from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, attended, begun, choose, made_samples, study_tables, summary_of_trial
 from tests.store.forging import Lines, cover_up, forge
+from tests.studies import rehearsed
 from tests.transcripts import Files, value_of
 
 MASK = re.compile(
@@ -94,7 +99,17 @@ def left(folder: Path) -> Path:
     return folder
 
 
-STARTS: dict[str, Callable[[Path], Path]] = {one.__name__: one for one in (recorded, answered, left)}
+def proved(folder: Path) -> Path:
+    """Rehearse three sessions, one of which is withdrawn, exclude a trial, and open the key."""
+    study = rehearsed(folder.parent)
+    exclude(study, "P002", 1, trial=2, by="AK", reason="the phone rang")
+    withdraw(study, "P003", by="AK", reason="asked by letter")
+    unblind(study, "AK", "closed")
+    (study.parent / "kept.txt").write_text(proof_text(StudyFolder(study)))
+    return study
+
+
+STARTS: dict[str, Callable[[Path], Path]] = {one.__name__: one for one in (recorded, answered, left, proved)}
 
 
 def _changed(changes: dict[str, Any]) -> Protocol:
@@ -114,8 +129,18 @@ class Changed(Files):
 
     def __init__(self, made: Path, folder: Path) -> None:
         self.study = Path(shutil.copytree(made, folder / "study"))
-        self.kept = Path(shutil.copy(made / "fingerprints.txt", folder / "kept.txt"))
+        kept = made.parent / "kept.txt"
+        self.kept = Path(shutil.copy(kept if kept.exists() else made / "fingerprints.txt", folder / "kept.txt"))
+        self.session = P007
         super().__init__(self.study)
+
+    def at(self, session: str) -> None:
+        """Change this session from now on."""
+        self.session = session
+
+    @property
+    def journal(self) -> Path:
+        return self.study / self.session / "journal.jsonl"
 
     def verify(self, *, kept: bool = False) -> Iterator[str]:
         """Tell what is found, with fingerprints that were kept elsewhere if that is asked for."""
@@ -143,6 +168,22 @@ class Changed(Files):
         """Let another program have the session open."""
         self.opening = open_alone(self.study / P007)
 
+    def key_for(self, **changes: Any) -> Iterator[str]:
+        """Ask for the study's key with a study of other values, as a session that begins does."""
+        for ask in (blinding.open_or_draw_key, blinding.check_conditions):
+            ask(self.study, _changed(changes))
+        yield "the key is this study's"
+
+    def swap_codes(self, block: str) -> None:
+        """Let two codes of a block stand for each other's conditions."""
+        content = json.loads(base64.b64decode((self.study / NAMES["KEY"]).read_bytes()))
+        (one, first), (two, second) = content["codes"][block].items()
+        content["codes"][block] = {one: second, two: first}
+        self.write(NAMES["KEY"], base64.encodebytes(json.dumps(content).encode()))
+
+    def begin(self, participant: str) -> None:
+        begun(self.study, participant).finish("completed")
+
     def unblind(self) -> Iterator[str]:
         yield from (f"left: {one}" for one in unblind(self.study, "AB", "done").left)
 
@@ -158,8 +199,21 @@ class Changed(Files):
         rows = (self.study / NAMES["PARTICIPANTS"]).read_text("utf-8").splitlines()
         yield from (row[:40] for row in rows)
 
-    def reveal(self) -> None:
-        blinding.reveal(self.study, "AB", "done")
+    def reveal(self, by: str = "AB", reason: str = "done") -> None:
+        blinding.reveal(self.study, by, reason)
+
+    def reveals(self) -> Iterator[str]:
+        """Tell who opened the key, and why."""
+        yield from (f"{one['by']}: {one['reason']}" for one in blinding.reveals(self.study))
+
+    def seal_changed(self) -> None:
+        """Change a digit of a sealed text."""
+
+        def change(lines: Lines) -> None:
+            line = next(line for line in lines if "sealed" in line)
+            line["sealed"] = f"{line['sealed'][:100]}{'1' if line['sealed'][100] == '0' else '0'}{line['sealed'][101:]}"
+
+        forge(self.journal, change)
 
     def key_is_open(self) -> Iterator[str]:
         yield str(blinding.revealed_key(self.study) is not None)
@@ -182,7 +236,7 @@ class Changed(Files):
 
     def receipt(self, *gone: str, **changes: Any) -> None:
         """Change fields of the receipt, or take some away."""
-        path = self.study / NAMES["RECEIPT"]
+        path = self.study / self.session / "receipt.json"
         held = receipt.read(path) | changes
         receipt.write(path, {name: value for name, value in held.items() if name not in gone})
 
@@ -197,23 +251,52 @@ class Changed(Files):
         def change(lines: Lines) -> None:
             [line for line in lines if line["event"] == event][at].update(fields)
 
-        forge(self.study / NAMES["JOURNAL"], change)
+        forge(self.journal, change)
+
+    def move(self, at: str) -> None:
+        """Let every line but the first be of another moment."""
+        forge(self.journal, lambda lines: [line.update(at=at) for line in lines[1:]])
+
+    def exchange(self, other: str) -> None:
+        """Give each of two participants the answers of the other."""
+        paths = self.journal, self.study / other / "journal.jsonl"
+        held = [[json.loads(line) for line in path.read_text().splitlines()] for path in paths]
+        values = [[line["value"] for line in lines if line["event"] == "choice"] for lines in held]
+
+        def give(lines: Lines, told: list[int]) -> None:
+            rest, given = iter(told), {}
+            for line in lines:
+                if line["event"] == "choice":
+                    line["value"] = given[line["trial"], line["item"]] = next(rest)
+                for item in line["items"] if line["event"] == "responses" else ():
+                    item["value"] = given[line["trial"], item["item"]]
+
+        for path, told in zip(paths, reversed(values), strict=True):
+            forge(path, partial(give, told=told))
+
+    def false_withdrawal(self, participant: str) -> None:
+        """Say of a participant who was deleted that they withdrew."""
+        folder = StudyFolder(self.study)
+        erased = tuple(describe_session(one) for one in folder.sessions() if one.participant == participant)
+        self.delete(f"data/sub-{participant}")
+        self.cover_up()
+        add_tombstone(folder, Tombstone(participant, "2026-03-02T09:30:00+01:00", "AK", "asked", erased))
 
     def drop(self, event: str, at: int = 0) -> None:
         def change(lines: Lines) -> None:
             lines.remove([line for line in lines if line["event"] == event][at])
 
-        forge(self.study / NAMES["JOURNAL"], change)
+        forge(self.journal, change)
 
     def add(self, **fields: Any) -> None:
         """Add a line to the journal like the last one, but for some fields."""
-        forge(self.study / NAMES["JOURNAL"], lambda lines: lines.append(lines[-1] | fields))
+        forge(self.journal, lambda lines: lines.append(lines[-1] | fields))
 
     def half(self) -> None:
         def change(lines: Lines) -> None:
             del lines[len(lines) // 2 :]
 
-        forge(self.study / NAMES["JOURNAL"], change)
+        forge(self.journal, change)
 
     def invert(self, *events: str) -> None:
         """Change every answer in lines of these events."""
@@ -223,11 +306,11 @@ class Changed(Files):
                 for answer in line.get("items", [line]):
                     answer["value"] = 8 - answer["value"]
 
-        forge(self.study / NAMES["JOURNAL"], change)
+        forge(self.journal, change)
 
     def unchained(self) -> None:
         """Make of the journal one of format 1, whose lines do not follow from one another."""
-        forge(self.study / NAMES["JOURNAL"], lambda lines: lines[0].pop("format"), chained=False)
+        forge(self.journal, lambda lines: lines[0].pop("format"), chained=False)
 
     def late_chain(self) -> None:
         """Let the chain begin with the second line."""
@@ -242,7 +325,7 @@ class Changed(Files):
 
     def receipt_hash(self) -> None:
         """Let the journal name the receipt as it is."""
-        self.edit("session_started", receipt_hash=receipt.digest(receipt.read(self.study / NAMES["RECEIPT"])))
+        self.edit("session_started", receipt_hash=receipt.digest(receipt.read(self.journal.with_name("receipt.json"))))
 
     def cover_up(self) -> None:
         """Compute tables, checksums and fingerprints anew."""
