@@ -1,6 +1,7 @@
 """A small study whose conditions can be recognised anywhere, and a session that answers it."""
 
 import itertools
+import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from datetime import datetime, timedelta, timezone
@@ -18,8 +19,7 @@ from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from tests.journal_lines import event_of
-
-SEVEN = ("Completely disagree", "Mostly", "Somewhat", "Neutral", "Somewhat agree", "Mostly agree", "Completely agree")
+from tests.protocol.edited_studies import text_of
 
 AWKWARD = 'comma, "quote",\nnew line\r\n\ttab 🌊 \u2028\x85 =SUM(A1)' + "é" * 10_000
 
@@ -35,52 +35,7 @@ FullDisk = Callable[[int], AbstractContextManager[None]]
 
 def study_tables(**changes: Any) -> dict[str, Any]:
     """A protocol file's tables; ids and numbers of the conditions occur nowhere else by chance."""
-    block = {"title": "Settings", "setting_label": "Setting", "task": "feel", "order": "shuffled"}
-    items = [{"id": name, "text": f"I think it is {name}.", "short": name} for name in ("wet", "calm", "near")]
-    tables: dict[str, Any] = {
-        "format": 1,
-        "study": {"name": "brackish", "title": "Brackish", "version": "1.0", "languages": ["en"]},
-        "device": {"workspace_mm": [100, 60, 60]},
-        "liquids": {
-            "quagmire": {"density_kg_m3": 1013.7},
-            "mildew": {
-                "density_kg_m3": 1391.3,
-                "effects": ["drag", "wake"],
-                "wake": {"length": 1717, "scaling": 1931, "decay": 0.99917},
-            },
-            "spare": {"density_kg_m3": 777.1},
-        },
-        "conditions": {
-            "feel_quagmire": {"liquid": "quagmire"},
-            "feel_mildew": {"liquid": "mildew"},
-            "see_prompt": {"liquid": "quagmire", "delay_ms": 0},
-            "see_tardy": {"liquid": "quagmire", "delay_ms": 137},
-            "learn": {"liquid": "spare"},
-        },
-        "tasks": {"feel": {"kind": "explore", "min_s": 0, "max_s": 9, "instruction": "Move the ball."}},
-        "scales": {"agreement": {"labels": {"en": SEVEN}, "cannot_judge": "Cannot judge"}},
-        "questionnaires": {"form": {"intro": "Agree?", "scale": "agreement", "item_order": "shuffled", "items": items}},
-        "pages": {"consent": {"kind": "consent", "title": "Consent", "body": "You may stop at any time."}},
-        "blocks": {
-            "practice": {**block, "phase": "practice", "order": "fixed", "conditions": ["learn"]},
-            "liquids": {
-                **block,
-                "part": 1,
-                "code_prefix": "L",
-                "conditions": ["feel_quagmire", "feel_mildew"],
-                "questionnaire": "form",
-            },
-            "delays": {
-                **block,
-                "part": 2,
-                "code_prefix": "D",
-                "conditions": ["see_prompt", "see_tardy"],
-                "questionnaire": "form",
-            },
-        },
-        "sequence": ["consent", "practice", "liquids", "delays"],
-    }
-    return tables | changes
+    return tomllib.loads(text_of("brackish")) | changes
 
 
 @pytest.fixture(autouse=True)

@@ -21,51 +21,11 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
+from tests.protocol.edited_studies import text_of
 
 pytestmark = [pytest.mark.slow, needs_servo]
 
-STUDY = """\
-format = 2
-study.name = "late"
-sequence = ["pairs", "named"]
-[scene]
-fade_s = 0.3
-[liquids.damper]
-drag = { law = "linear", damping_nspm = 4 }
-[liquids.water]
-density_kg_m3 = 1000
-effects = ["drag", "wake"]
-wake = { length = 1700, scaling = 1700, exponent = 0.75 }
-[conditions.damper]
-liquid = "damper"
-force_jitter_ms = 4
-force_loss = 0.1
-[conditions.water]
-liquid = "water"
-force_delay_ms = 15
-force_loss = 0.2
-[conditions.prompt]
-liquid = "water"
-[tasks.stir]
-kind = "follow"
-cycles = 1
-[stimuli.delay]
-condition = "damper"
-vary = "force_delay_ms"
-levels = [20, 80]
-[methods.few]
-kind = "constant"
-levels = 2
-repetitions = 1
-[blocks.pairs]
-stimulus = "delay"
-method = "few"
-[blocks.named]
-conditions = ["water", "prompt"]
-standard = "prompt"
-design = "2ifc"
-repetitions = 1
-"""
+STUDY = text_of("late_forces")
 
 
 @pytest.fixture(scope="module")

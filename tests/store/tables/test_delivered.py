@@ -16,35 +16,10 @@ from study_app.protocol.trials.presentation import Presentation
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store.delivered import delivered, delivered_error, judged, missed, undelivered
 from tests.golden import compare
+from tests.protocol.edited_studies import text_of
 from tests.transcripts import played, value_of
 
-STUDY = """\
-format = 2
-study.name = "delivered"
-scene.fade_s = 0.3
-[liquids.damper]
-drag = { law = "linear", damping_nspm = 8 }
-[tasks.follow]
-kind = "follow"
-[tasks.stir]
-kind = "explore"
-min_s = 1
-max_s = 4
-instruction = "Stir."
-[stimuli.damping]
-vary = "damping_nspm"
-levels = [0.02, 0.6]
-[blocks.thicker]
-task = "follow"
-stimulus = "damping"
-design = "2ifc"
-method = "constant"
-[blocks.stirred]
-task = "stir"
-stimulus = "damping"
-design = "2ifc"
-method = "constant"
-"""
+STUDY = text_of("delivered")
 SLOW = (
     STUDY.replace("[tasks.follow]", '[conditions.late]\nliquid = "damper"\nforce_delay_ms = 100\n[tasks.follow]')
     .replace("[stimuli.damping]", '[stimuli.damping]\ncondition = "late"')
@@ -102,7 +77,9 @@ class Interval:
         """Tell what was delivered of a level, and which limits that breaks."""
         presented, task = Stimulated(condition, vary, value), self.protocol.tasks[self.task]
         found = delivered(self.protocol, presented, task, judged(self.found))
-        told = ", ".join(f"{name} {round(one, 4) + 0.0:g}" for name, one in asdict(found).items() if isinstance(one, float))
+        told = ", ".join(
+            f"{name} {round(one, 4) + 0.0:g}" for name, one in asdict(found).items() if isinstance(one, float)
+        )
         return f"{told}; broken: {[*undelivered(self.protocol.limits, presented, task, found)]}"
 
 
