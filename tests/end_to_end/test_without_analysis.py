@@ -55,39 +55,6 @@ def visit_all(visit):
 sys.exit(home(Path(sys.argv[1]), then=visit_all))
 """
 
-SESSION = """
-import sys
-from pathlib import Path
-from PySide6.QtCore import QEventLoop, QTimer
-from study_app.app.session.timing import collecting_here
-from study_app.app.session.live_session import LiveSession
-from study_app.gui.application import application_here
-from study_app.gui.theme.theme import LIGHT
-from study_app.session.start import NewSession
-
-application_here()
-live = LiveSession(NewSession("demo", "P001", 1, 1, "", "en", "scripted", True, None, Path(sys.argv[1])), LIGHT)
-loop = QEventLoop()
-live.over.connect(loop.quit)
-timer = QTimer(interval=20)
-
-def look():
-    if live.bridge is not None and live.bridge.participant.isVisible():
-        print("windows opened")
-        timer.stop()
-        QTimer.singleShot(1500, live.bridge.leave_now)
-
-timer.timeout.connect(look)
-timer.start()
-with collecting_here():
-    QTimer.singleShot(0, live.open)
-    loop.exec()
-    live.wait()
-if live.error:
-    raise live.error
-sys.exit(live.code)
-"""
-
 
 @pytest.fixture
 def environment(tmp_path: Path) -> dict[str, str]:
@@ -123,15 +90,6 @@ def test_a_study_is_rehearsed_verified_and_replayed_without_them(environment: di
         assert failed.startswith("liquid-study: this needs ")
         assert failed.count("\n") == 1
         assert "pip install 'liquid-study[analysis]'" in failed
-
-
-@pytest.mark.nightly
-@needs_servo
-def test_a_session_opens_its_windows_without_them(environment: dict[str, str], tmp_path: Path) -> None:
-    command = [sys.executable, "-c", SESSION, str(tmp_path / "results")]
-    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout) == (0, "windows opened\n"), done.stderr
-    assert (tmp_path / "results" / "data" / "sub-P001" / "ses-01" / "journal.jsonl").is_file()
 
 
 @pytest.mark.nightly

@@ -2,8 +2,6 @@
 
 import csv
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -17,22 +15,10 @@ from study_app.store.journals import journal
 from study_app.store.verification.verify_study import verify
 from tests.benchmarks.sessions import disk
 from tests.faults.support.worlds import StoredWorld
+from tests.platforms import files_up_to
 from tests.session import small
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files as POSIX systems can")
-
-
-@contextmanager
-def no_file_longer_than(size: int) -> Iterator[None]:
-    """Let the system refuse to make any file of this process longer, in the middle of a write if need be."""
-    import resource
-
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def finish(world: StoredWorld) -> None:
@@ -57,7 +43,7 @@ def test_a_disk_that_fills_up_is_waited_for_and_nothing_is_lost_or_doubled(
         each.start()
         each.until(phase)
     path = world.store.folder.journal
-    with no_file_longer_than(path.stat().st_size + room):
+    with files_up_to(path.stat().st_size + room):
         world.runner.post(Note(world.clock(), "note", "as long as a line of the journal is wont to be"))
         assert isinstance(world.pages[-1], TroublePage)
         assert "journal" in (world.runner.stalled or "")
@@ -82,7 +68,7 @@ def test_a_session_whose_last_line_meets_a_full_disk_is_finished_when_there_is_r
     world.start()
     while not (world.state.phase is Phase.READING and world.state.page_id == "thanks"):
         world.step()
-    with no_file_longer_than(world.store.folder.journal.stat().st_size + 100):
+    with files_up_to(world.store.folder.journal.stat().st_size + 100):
         world.step()  # page_left, and no room for the end
         assert world.runner.stalled
     world.run(RETRY_S + 0.1)
@@ -94,7 +80,7 @@ def test_a_session_whose_last_line_meets_a_full_disk_is_finished_when_there_is_r
 
 @pytest.mark.slow
 def test_a_disk_that_is_full_at_the_start_refuses_the_session_and_keeps_its_id_free(tmp_path: Path) -> None:
-    with no_file_longer_than(200), pytest.raises(StoreError, match="cannot be written"):
+    with files_up_to(200), pytest.raises(StoreError, match="cannot be written"):
         StoredWorld(tmp_path / "study")
     world = StoredWorld(tmp_path / "study")
     world.start()

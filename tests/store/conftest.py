@@ -2,8 +2,8 @@
 
 import itertools
 import tomllib
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from tests.journal_lines import event_of
+from tests.platforms import files_up_to
 from tests.protocol.edited_studies import text_of
 
 AWKWARD = 'comma, "quote",\nnew line\r\n\ttab 🌊 \u2028\x85 =SUM(A1)' + "é" * 10_000
@@ -101,21 +102,9 @@ def start(tmp_path: Path, protocol: Protocol, clock: SessionClock) -> Start:
     return begin_one
 
 
-@pytest.fixture
-def files_up_to() -> FullDisk:
-    """Let the system refuse to write any file beyond so many bytes, as a full disk does."""
-    resource = pytest.importorskip("resource", reason="sizes of files are limited through the resource module")
-
-    @contextmanager
-    def limited(size: int) -> Iterator[None]:
-        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-        try:
-            yield
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-    return limited
+@pytest.fixture(name="files_up_to")
+def _files_up_to() -> FullDisk:
+    return files_up_to
 
 
 def choose(store: SessionStore, trial: int, items: list[dict[str, Any]]) -> None:

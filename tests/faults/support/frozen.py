@@ -1,16 +1,14 @@
 """Holds a session in windows that stands still within a trial: run as a program.
 
-It is held as `run` holds it, by a scripted hand in real time. What stands still is, by the second argument: the
-process, stopped when the liquid is felt ("felt") or right after the trial's first frame ("frame"), until whoever
-started it sends SIGCONT; or right after the first frame the window alone ("window"), for `WINDOW_S`, which is beyond
-the trial's end. Then the operator resumes what the program paused, and ends the session after that trial.
+It is held as `run` holds it, by a scripted hand in real time. The process is stopped when the liquid is felt, until
+whoever started it sends SIGCONT. Then the operator resumes what the program paused, and ends the session after that
+trial.
 """
 
 import os
 import re
 import signal
 import sys
-import time
 from pathlib import Path
 
 from study_app import app
@@ -21,45 +19,24 @@ from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session import start
 from study_app.session.pages import PausePage, QuestionnairePage, TaskPage, TextPage
-from study_app.session.trial import RunningTrial
 from tests.faults.support import short
 from tests.faults.support.watched_program import Person
 
 LONGEST_S = "2"
-WINDOW_S = 5.0
 
 
-def stand_still_after_the_first_frame(how: str, stopped: list[int]) -> None:
-    """Let the first frame of the first trial be the last one for a while, and add to ``stopped`` then."""
-    show = RunningTrial.frame
-
-    def frame(trial: RunningTrial, painted_ns: int, sample_ns: int) -> None:
-        show(trial, painted_ns, sample_ns)
-        if stopped:
-            return
-        stopped.append(1)
-        if how == "frame":
-            os.kill(os.getpid(), signal.SIGSTOP)
-        else:
-            time.sleep(WINDOW_S)
-
-    RunningTrial.frame = frame  # type: ignore[method-assign]
-
-
-def main(folder: str, how: str) -> int:
+def main(folder: str) -> int:
     machines: list[Rig] = []
     open_rig = live_session.open_rig
     live_session.open_rig = lambda *a, **k: machines.append(open_rig(*a, **k)) or machines[-1]
     start.MEASURED_S = 0.1
     stopped: list[int] = []
-    if how != "felt":
-        stand_still_after_the_first_frame(how, stopped)
 
     def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         if isinstance(participant.page, PausePage):
             operator.ask("resume")
             return True
-        if how == "felt" and not stopped and isinstance(participant.page, TaskPage):
+        if not stopped and isinstance(participant.page, TaskPage):
             newest = machines[0].servo.telemetry.latest()
             if newest is not None and newest["scene"] > 0:  # the liquid is felt
                 stopped.append(int(newest["scene"]))

@@ -162,15 +162,6 @@ def session(results: Path) -> Path:
     return StudyFolder(results).sessions()[0].path
 
 
-def copied(results: Path, to: Path) -> Path:
-    for path in results.rglob("*"):
-        if path.is_file():
-            there = to / path.relative_to(results)
-            there.parent.mkdir(parents=True, exist_ok=True)
-            there.write_bytes(path.read_bytes())
-    return session(to)
-
-
 def rewrite(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
     """Change the columns of a recording and keep its checks, as a mistake or a forger would."""
     facts = parquet.read_metadata(parquet_of(path)).metadata[b"liquid_study"]

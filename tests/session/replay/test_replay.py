@@ -36,6 +36,13 @@ from tests.store.forging import secret_of
 pytestmark = [needs_servo, pytest.mark.slow]
 
 
+@pytest.fixture(scope="module")
+def rehearsed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("replay")
+    rehearse(short.write(folder), participants=1, seed=1, results=folder / "results")
+    return folder / "results"
+
+
 class LightDevice(ScriptedDevice):
     """A device whose light handle and force limit permit less force than those of `ScriptedDevice`."""
 

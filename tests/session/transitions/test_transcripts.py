@@ -4,7 +4,26 @@ from pathlib import Path
 
 import pytest
 
+from study_app.errors import SessionError
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.session.pages import EndPage, TroublePage
+from study_app.session.transitions.events import (
+    ForceStopped,
+    Rest,
+    StopForce,
+    StopTrial,
+    Write,
+    WriteCompleted,
+    WriteFailed,
+    WriteRetried,
+)
+from study_app.session.transitions.moves import STOPPABLE
+from study_app.session.transitions.state import FINAL, Phase
+from study_app.session.transitions.table import advance, open_session
 from tests.golden import compare
+from tests.session import small
+from tests.session.transitions.states import LEFT, shown, state_in
 from tests.session.transitions.transcribed import FOLDER, play
 from tests.transcripts import played
 
@@ -12,3 +31,35 @@ from tests.transcripts import played
 @pytest.mark.parametrize("file", sorted(FOLDER.glob("*.txt")), ids=lambda file: file.stem)
 def test_events_command_what_they_did(file: Path, pytestconfig: pytest.Config) -> None:
     compare(file, played(file, play), pytestconfig)
+
+
+@pytest.mark.parametrize("phase", [phase for phase in Phase if phase is not Phase.STALLED])
+def test_a_disk_that_takes_nothing_stops_the_force_and_keeps_what_is_left_from_every_phase(phase: Phase) -> None:
+    before = state_in(phase)
+    stalled, commands = advance(before, WriteFailed(9.0, "disk full", (LEFT,)))
+    assert commands[:3] == (StopForce(), StopTrial(), Rest())
+    assert isinstance(shown(commands), EndPage if phase in FINAL else TroublePage)
+    assert (stalled.phase, stalled.over) == (Phase.STALLED, phase in FINAL)
+    assert advance(stalled, WriteRetried(9.0)) == (stalled, (LEFT,))
+    after, commands = advance(stalled, WriteCompleted(10.0))
+    if phase in STOPPABLE:
+        assert (after, commands) == advance(before, ForceStopped(10.0, "program"))
+    else:
+        assert (after, commands) == (before, ())
+
+
+def test_a_language_that_the_study_is_not_written_in_is_refused(protocol: Protocol) -> None:
+    with pytest.raises(SessionError, match="written in en"):
+        open_session(protocol, build_schedule(protocol, "P001", 1), {}, "nl")
+
+
+def test_nothing_that_is_printed_names_a_condition_a_liquid_or_a_delay() -> None:
+    state, printed = small.opened(), []
+    while state.phase not in FINAL:
+        state, commands = advance(state, small.next_event(state, 1.0))
+        page = shown(commands)
+        printed.append(f"{state!r} {commands!r} {page!r} {page}")
+        printed += [str(command.line.fields()) for command in commands if isinstance(command, Write)]
+    text = " ".join(printed)
+    words = ["is_thin", "is_thick", "on_time", "is_late", "0.137", "137", "1013", "1450"]
+    assert [word for word in words if word in text] == []

@@ -65,7 +65,7 @@ class Lines:
 
     def rows(self) -> Iterator[str]:
         made = SessionRows(self._lines)
-        for name, table in (("trial", made.trials), ("response", made.responses)):
+        for name, table in (("trial", made.trials), ("interval", made.intervals), ("response", made.responses)):
             for row in table:
                 told = {column: value for column, value in row.items() if value is not None and column not in OF_ALL}
                 yield f"{name} {told}"
