@@ -82,9 +82,12 @@ class Files:
                 shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
 
     def rename(self, name: str, to: str) -> None:
+        (self.root / to).parent.mkdir(parents=True, exist_ok=True)
         (self.root / name).rename(self.root / to)
 
     def link(self, name: str, to: str) -> None:
+        """Put a link in the place of a file, if there is one."""
+        (self.root / name).unlink(missing_ok=True)
         (self.root / name).symlink_to(self.root / to)
 
     def folder(self, name: str) -> None:

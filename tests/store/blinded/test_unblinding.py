@@ -112,40 +112,6 @@ def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
     assert tables_in(folder) == held
 
 
-@pytest.mark.slow
-def test_what_is_not_the_journals_is_left_and_named(tmp_path: Path, start: Start, attend: Attend) -> None:
-    """A changed table, a session that runs, a damaged journal: the others are opened, and these are after rebuild."""
-    stores = {name: start(name) for name in ("P001", "P002", "P003", "P004")}
-    for name, store in stores.items():
-        attend(store)
-        if name != "P002":
-            store.finish("completed")
-    folder = tmp_path / "study"
-    changed = stores["P001"].folder.table("brackish", "trials")
-    changed.write_bytes(changed.read_bytes().replace(b"complete", b"timeout", 1))
-    damaged = stores["P003"].folder.journal
-    whole = damaged.read_bytes()
-    damaged.write_bytes(whole.replace(b'"trial_started"', b'"trial_sta\xffted"', 1))
-    left = unblind(folder, "AB", "done").left
-    assert len(left) == 3
-    assert "P001" in left[0]
-    assert "differs from the journal, so it was not changed: rebuild it with liquid-study rebuild " in left[0]
-    assert "is open in another program" in left[1]
-    assert "damaged" in left[2]
-    assert not SEALED & names(changed)
-    assert names(stores["P004"].folder.table("brackish", "trials")) == set(header(TRIALS))
-    damaged.write_bytes(whole)
-    stores["P002"].append(
-        journal_events.Note(kind="note", text="the tables of a session that runs follow with its next page")
-    )
-    stores["P002"].write_tables()
-    assert names(stores["P002"].folder.table("brackish", "trials")) == set(header(TRIALS))
-    stores["P002"].finish("completed")
-    for name in ("P001", "P003"):
-        rebuild(stores[name].folder.path)
-    assert sound(folder)
-
-
 def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start: Start, attend: Attend) -> None:
     """Sealed before and after the key was opened: the tables have everything once it was."""
     with start() as store:

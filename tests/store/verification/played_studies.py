@@ -166,7 +166,7 @@ class Changed(Files):
 
     def open(self) -> None:
         """Let another program have the session open."""
-        self.opening = open_alone(self.study / P007)
+        self.opening = open_alone(self.study / self.session)
 
     def key_for(self, **changes: Any) -> Iterator[str]:
         """Ask for the study's key with a study of other values, as a session that begins does."""
@@ -351,6 +351,6 @@ def player(made: dict[str, Path], folder: Path) -> Callable[[str, list[str]], It
             except StoreError as error:
                 yield f"> refused: {MASK.sub('*', str(error).replace(str(folder), 'FOLDER'))}"
         for path in folder.iterdir():
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
+            shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
 
     return play

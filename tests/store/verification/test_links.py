@@ -20,8 +20,6 @@ from tests.faults.support.killer import forked
 from tests.platforms import needs_fork
 from tests.store.conftest import Start
 
-OWN = ("journal.jsonl", "receipt.json", "key.sealed")
-
 
 @pytest.fixture
 def finished(finished: Start) -> SessionStore:
@@ -33,40 +31,6 @@ def read(path: Path) -> object:
     if path.name == "key.sealed":
         return blinding.read_key(path.parents[1])
     return journal.read(path) if path.suffix == ".jsonl" else receipt.read(path)
-
-
-def own(store: SessionStore, name: str) -> Path:
-    return store.place.study_folder.key if name == "key.sealed" else store.folder.path / name
-
-
-@pytest.mark.parametrize("name", OWN)
-def test_a_link_within_the_studys_folder_is_followed_and_none_out_of_it(
-    tmp_path: Path, finished: SessionStore, name: str
-) -> None:
-    """As in a data set whose files lie in an annex."""
-    path, annexed, elsewhere = own(finished, name), tmp_path / "study" / ".git" / name, tmp_path / "elsewhere"
-    annexed.parent.mkdir()
-    path.rename(annexed)
-    path.symlink_to(annexed)
-    assert read(path)
-    path.unlink()
-    annexed.rename(elsewhere)
-    path.symlink_to(elsewhere)
-    with pytest.raises(StoreError, match=r"leads by a link out of .*study.*: replace the link by the file itself"):
-        read(path)
-    assert not verify(tmp_path / "study").sound
-
-
-@pytest.mark.parametrize("name", OWN)
-@pytest.mark.parametrize("target", ["/dev/zero", "itself"])
-def test_a_device_without_an_end_and_a_loop_of_links_are_refused(
-    finished: SessionStore, name: str, target: str
-) -> None:
-    path = own(finished, name)
-    path.unlink()
-    path.symlink_to(path.name if target == "itself" else target)
-    with pytest.raises(StoreError, match=f"{name} (leads by a link out of|cannot be read)"):
-        read(path)
 
 
 def test_a_study_that_is_called_by_a_path_is_not_exported(tmp_path: Path, finished: SessionStore) -> None:
