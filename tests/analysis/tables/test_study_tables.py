@@ -1,16 +1,19 @@
 """Results that are refused: missing, changed, torn, foreign, under another key."""
 
+import csv
 import json
+import re
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.errors import StoreError
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
-from study_app.store.tables.columns import TRIALS
-from study_app.store.tables.csv_files import csv_bytes, read_table
+from study_app.store.tables.columns import RESPONSES, TRIALS
+from study_app.store.tables.csv_files import csv_bytes, problems, read_table
 from tests.analysis.conftest import Results, make_results
 from tests.analysis.tables.differing_answers import by_condition, refusal
 from tests.store.earlier import TRIALS_HEADER
@@ -142,26 +145,51 @@ def test_the_folder_above_the_studies_names_them(rek: Results) -> None:
     [
         (",immersive,2,4,", ",immersive,2,8,", "column response: '8' is not a whole number from 1 to 7 or n/a"),
         (",immersive,2,4,", ",immersive,2,good,", "column response: 'good'"),
+        (",immersive,2,4,", ",immersive,2, 4,", "column response: ' 4'"),
+        (",immersive,2,4,", ",immersive,2,4_0,", "column response: '4_0'"),
+        (",immersive,2,4,", f",immersive,{'9' * 20},4,", f"column number: '{'9' * 20}' is not a whole number"),
+        (",12.25,", ",-5,", "column first_choice_s: '-5' is not a number of at least 0 or n/a"),
+        (",12.25,", ",nan,", "column first_choice_s: 'nan' is not"),
+        (",12.25,", ",1e999,", "column first_choice_s: '1e999' is not"),
+        ("2026-01-05T", "٢٠٢٦-01-05T", "column answered_at: '٢٠٢٦-01-05T10:00:00.000+01:00' is not a time with zone"),
+        ("2026-01-05T10:00:00.000+01:00", "yesterday", "column answered_at: 'yesterday' is not a time with zone"),
+        (",false,false,2,", ",maybe,false,2,", "column simulated: 'maybe' is not true or false"),
+        (",false,false,2,", ",False,false,2,", "column simulated: 'False' is not true or false"),
+        (",main,", ",mian,", "column phase: 'mian' is not one of main, practice, baseline"),
         (",immersive,2,4,", ",immersive,", "cells, not"),
+        (",immersive,2,4,", ",immersive,2,4,,", "cells, not"),
+        (",immersive,2,4,", "\n,immersive,2,4,", "cells, not"),
+        (",immersive,2,4,", ',"immersive"x,2,4,', "is not CSV in UTF-8"),
         (",immersive,2,4,", ",imersive,2,4,", "knows no statement 'imersive'"),
         (",L1,immersive,", ",L9,immersive,", "setting 'L9'"),
         (",L1,immersive,", ",L1,feels_liquid,", "stands there twice"),
         ("study,participant", "study,person", "does not begin with the columns"),
         ("rek2024,P001,1,", "rek2024,P007,1,", "column participant: 'P007' instead of 'P001'"),
         ("rek2024,P001,1,", "other,P001,1,", "column study: 'other' instead of 'rek2024'"),
-        (",false,false,2,", ",maybe,false,2,", "column simulated: 'maybe' is not true or false"),
-        (",main,", ",mian,", "column phase: 'mian' is not one of main, practice, baseline"),
     ],
 )
 def test_a_changed_table_is_refused_with_file_row_and_value(real: Results, old: str, new: str, says: str) -> None:
     real.add("P001", lambda *_: 4)
     path = real.responses("P001")
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     assert old in text
-    path.write_text(text.replace(old, new, 1))
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
     message = refusal(real.folder)
     assert says in message
     assert str(path) in message
+    found = re.search(r"(row \d+), column (\w+: '.*?' is .*?);", message)
+    if found:  # `verify` refuses the same cell in the same row
+        assert list(problems(path.read_bytes(), RESPONSES)) == [", ".join(found.groups())]
+
+
+def test_quotes_change_nothing(real: Results) -> None:
+    real.add("P001", by_condition)
+    path, before = real.responses("P001"), load_study(real.folder).responses
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    with path.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_ALL).writerows(rows)
+    pd.testing.assert_frame_equal(load_study(real.folder).responses, before)
 
 
 def test_a_table_of_an_earlier_version_is_read_as_if_its_later_columns_held_nothing(rek: Results) -> None:
