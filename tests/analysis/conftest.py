@@ -20,71 +20,8 @@ from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.tables.columns import RESPONSES, TRIALS
 from study_app.store.tables.csv_files import Column, csv_bytes
 
-SMALL = """
-format = 1
-sequence = ["try", "feel"]
-[study]
-name = "small"
-title = { nl = "A small study (nl)", en = "A small study" }
-version = "2"
-languages = ["nl", "en"]
-[device]
-workspace_mm = [100, 60, 60]
-[liquids.zembla]
-density_kg_m3 = 1013.7
-effects = ["drag"]
-[liquids.quorn]
-density_kg_m3 = 877.3
-effects = ["drag"]
-[liquids.mud]
-density_kg_m3 = 1500
-effects = ["drag"]
-[conditions.learn]
-liquid = "mud"
-[conditions.heavyzembla]
-liquid = "zembla"
-[conditions.lightquorn]
-liquid = "quorn"
-[tasks.explore]
-kind = "explore"
-min_s = 1
-max_s = 2
-instruction = { nl = "Feel it. (nl)", en = "Feel it." }
-[scales.agreement]
-labels.nl = ["zeer oneens", "oneens", "beetje oneens", "neutraal", "beetje eens", "eens", "zeer eens"]
-labels.en = ["a", "b", "c", "d", "e", "f", "g"]
-cannot_judge = { nl = "Weet niet", en = "Cannot judge" }
-[questionnaires.felt]
-intro = { nl = "How was it? (nl)", en = "How was it?" }
-scale = "agreement"
-[[questionnaires.felt.items]]
-id = "smooth"
-text = { nl = "Het voelt glad.", en = "It feels smooth, \\"really\\"." }
-short = { nl = "Glad", en = "Smooth" }
-[[questionnaires.felt.items]]
-id = "warm"
-text = { nl = "It feels warm. (nl)", en = "It feels warm." }
-short = { nl = "Warm (nl)", en = "Warm" }
-required = false
-[blocks.try]
-phase = "practice"
-title = { nl = "Practice (nl)", en = "Practice" }
-setting_label = { nl = "Practice (nl)", en = "Practice" }
-conditions = ["learn"]
-task = "explore"
-questionnaire = "felt"
-[blocks.feel]
-part = 1
-title = { nl = "Feeling (nl)", en = "Feeling" }
-setting_label = { nl = "Liquid setting (nl)", en = "Liquid setting" }
-code_prefix = "L"
-conditions = ["heavyzembla", "lightquorn"]
-order = "shuffled"
-repetitions = 2
-task = "explore"
-questionnaire = "felt"
-"""
-
+SMALL = (Path(__file__).parent / "small.toml").read_text(encoding="utf-8")
+"""A study with repetitions, an optional item, an answer off the scale and questions in practice."""
 SAMPLE = StudyFolder(Path(__file__).resolve().parents[2] / "results" / "sample-rek2024")
 """Rehearsed, and shipped sealed."""
 CANNOT_JUDGE = "cannot judge"

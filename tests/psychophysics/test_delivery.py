@@ -12,7 +12,7 @@ from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.model.motion import Motion as Path
 from study_app.haptics.model.scene import ForceLink, Liquid, Scene, Velocity
 from study_app.haptics.runtime.offline import samples_along
-from study_app.psychophysics.delivery import EARLIER, at, damping, difference, lag, motion, share
+from study_app.psychophysics.delivery import EARLIER, at, damping, lag, motion
 from tests.compiled import needs_servo
 
 RATE_HZ = 1000.0
@@ -78,35 +78,6 @@ def test_a_hand_that_hardly_moves_has_no_damping() -> None:
     for amplitude_m, rests in ((1e-5, True), (5e-5, False)):
         moved = motion(*swing(amplitude_m=amplitude_m), 1 / RATE_HZ)
         assert (damping(-8.0 * moved.velocity_mps, moved) is None) == rests
-
-
-def test_a_motion_lacks_the_first_and_the_last_20_ms_alone() -> None:
-    t_s, position_m = swing()
-    moved = motion(t_s, position_m, 1 / RATE_HZ)
-    assert moved.times_s == pytest.approx(t_s[20:-20])
-    assert motion(*swing(lasts_s=3.04), 1 / RATE_HZ).rms_speed_mps == pytest.approx(2 * np.pi * 0.02 / 2**0.5, rel=1e-4)
-
-
-def test_a_motion_is_judged_from_a_time_on() -> None:
-    moved = motion(*swing(), 1 / RATE_HZ)
-    assert moved.after(0.5, 1.0).times_s == pytest.approx(np.arange(500, 1001) / RATE_HZ)
-    later = moved.after(moved.times_s[700])
-    assert later.times_s == pytest.approx(moved.times_s[700:], abs=0)
-    assert later.velocity_mps == pytest.approx(moved.velocity_mps[700:], abs=0)
-    assert later.acceleration_mps2 == pytest.approx(moved.acceleration_mps2[700:], abs=0)
-
-
-def test_the_share_sent_is_a_regression_on_the_model_force() -> None:
-    model_n = np.random.default_rng(2).normal(size=(100, 3))
-    assert share(0.9 * model_n, model_n) == pytest.approx(0.9)
-    assert share(model_n, 0 * model_n) is None
-
-
-def test_what_comparison_and_standard_share_cancels() -> None:
-    assert difference([6.0, 6.5], [False, True]) == pytest.approx(0.5)
-    assert difference([6.0, 9.0, 6.0], [True, False, True]) == pytest.approx(-3.0)
-    assert difference([6.0, None], [False, True]) is None
-    assert difference([6.0, 7.0], [True, True]) is None
 
 
 @needs_servo

@@ -169,19 +169,6 @@ def test_a_groups_interval_is_students_over_errors_and_people(participants, tria
     assert 100 * one.of_group(participants, trials) == pytest.approx(percent, abs=1.5)
 
 
-def test_standards_average_the_errors_but_not_the_people():
-    one, four = (Expected("log", 60, standards, (0.3,), 0.12, 0.2) for standards in (1, 4))
-    errors = 0.12**2 * np.array([1, 0.25]) + math.log10(1.2) ** 2
-    halves = np.log10([1 + one.of_group(20), 1 + four.of_group(20)])
-    assert halves == pytest.approx(student.ppf(0.975, 19) * np.sqrt(errors / 20))
-
-
-def test_linear_spacing_gives_a_share_of_the_threshold():
-    one = Expected("linear", 60, 1, (8.0,), 4.0, 50.0)
-    half = student.ppf(0.975, 9) * math.sqrt((4.0**2 + (50 * math.log(1.2)) ** 2) / 10)
-    assert one.of_group(10) == pytest.approx(half / 50)
-
-
 def test_the_fewest_participants_and_trials_for_a_precision():
     one = Expected("log", 20, 1, (0.5,), 0.2, 0.2)
     people = one.participants_for(0.15)
@@ -191,54 +178,6 @@ def test_the_fewest_participants_and_trials_for_a_precision():
     assert one.trials_for(0.05, 10) is None  # people differ by more
     assert one.participants_for(0.001) is None
     assert one.of_group(1) == math.inf
-
-
-def staircase(down_after=2, step_up=0.2, ratio=0.5, low=-1.0, high=1.0, begin=1.0):
-    return Staircase(down_after, step_up, ratio, low, high, begin)
-
-
-def climb(one, successes):
-    answers = []
-    for outcome in successes:
-        answers.append((one.next(answers), outcome))
-    return answers
-
-
-def test_the_level_falls_after_successes_in_a_row_and_rises_after_each_failure():
-    one = staircase()
-    answers = climb(one, [True, True, True, True, True, False, True, True])
-    assert [level for level, _ in answers] == pytest.approx([1.0, 1.0, 0.9, 0.9, 0.8, 0.8, 1.0, 1.0])
-    assert one.next(answers) == pytest.approx(0.9)
-
-
-def test_levels_stay_within_the_domain():
-    one = staircase(down_after=1, step_up=1.5, ratio=1.0)
-    assert [level for level, _ in climb(one, [False, True, True, True])] == [1.0, 1.0, -0.5, -1.0]
-
-
-def test_the_next_level_starts_from_the_level_that_was_presented():
-    assert staircase().next([(0.37, False)]) == pytest.approx(0.57)
-
-
-def test_reversals_are_the_levels_at_which_the_direction_changed():
-    one = staircase(down_after=1, step_up=0.2, ratio=1.0)
-    answers = climb(one, [True, True, False, False, True, False])
-    assert [level for level, _ in answers] == pytest.approx([1.0, 0.8, 0.6, 0.8, 1.0, 0.8])
-    assert one.reversals(answers) == pytest.approx([0.6, 1.0, 0.8])
-
-
-def test_a_reversal_counts_across_successes_that_are_too_few_for_a_step():
-    one = staircase(down_after=2, begin=0.0)
-    answers = climb(one, [True, True, True, False, True, True])  # down, nothing, up, nothing, down
-    assert one.reversals(answers) == pytest.approx([answers[3][0], answers[5][0]])
-
-
-def test_the_mean_leaves_out_the_first_two_reversals_and_those_at_an_end_of_the_domain():
-    one = staircase(down_after=1, step_up=0.2, ratio=1.0)
-    answers = climb(one, [True, False] * 3)  # reversals 0.8, 1.0, 0.8, 1.0, 0.8: those at 1.0 lie at the end
-    assert one.reversals(answers) == pytest.approx([0.8, 1.0, 0.8, 1.0, 0.8])
-    assert one.mean_of_reversals(answers, 8) == pytest.approx(0.8)
-    assert one.mean_of_reversals(answers[:-2], 8) is None
 
 
 def test_percentages_are_those_of_garcia_perez():
@@ -263,7 +202,7 @@ def test_percent_correct_at_the_mean_of_reversals_in_the_long_run(down_after, ra
     """By the step up in standard deviations of the observer: equal steps depend on it, weighted ones hardly."""
     draw = np.random.default_rng(down_after)
     for step_up, percent in zip((0.25, 0.5, 1.0, 2.0), reached, strict=True):
-        one = staircase(down_after, step_up, ratio, low=-50.0, high=50.0, begin=0.5)
+        one = Staircase(down_after, step_up, ratio, -50.0, 50.0, 0.5)
         u, run, before, reversals = 0.5, 0, 0, []
         for chance in draw.random(40_000):  # the rule itself, since `next` looks at all answers each time
             success = chance < 0.5 + 0.5 * ndtr(u)

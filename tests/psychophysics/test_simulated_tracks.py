@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from study_app.psychophysics.adaptive import (
-    Answers,
     Observers,
     Search,
     Staircase,
@@ -50,11 +49,6 @@ def test_search_tracks_choose_the_levels_that_the_search_chooses_one_by_one(lear
             counts[0 if success else 1, place] += 1
 
 
-def test_search_tracks_begin_at_the_given_level():
-    found = search_tracks(search(), observers(), draws(3), begin=14)
-    assert (found.levels[:, 0] == LEVELS[14]).all()
-
-
 def test_search_tracks_end_when_the_interval_is_narrow_enough():
     one, most = search(), 0.9
     found = search_tracks(one, observers(), draws(80), stop=(most, 10))
@@ -95,10 +89,3 @@ def test_constant_tracks_are_answered_with_the_probability_of_the_level():
     assert (successes + failures == 4000).all()
     expected = observers(2).probability(np.array(LEVELS)[:, None]).T
     assert np.abs(successes / 4000 - expected).max() < 4 * math.sqrt(0.25 / 4000)
-
-
-def test_answers_are_counted_at_the_nearest_level_and_not_after_the_end():
-    found = Answers(np.array([[-1.0, -0.42, math.nan], [-0.9, -0.9, 5.0]]), np.array([[1, 0, 0], [1, 0, 1]], bool))
-    successes, failures = found.counts((-1.0, -0.8, -0.4))
-    assert successes.tolist() == [[1, 0, 0], [1, 0, 1]]
-    assert failures.tolist() == [[0, 0, 1], [1, 0, 0]]

@@ -14,101 +14,11 @@ from study_app.psychophysics.families import success
 from tests.protocol.trials import matching
 from tests.protocol.trials.level_studies import FIVE_POINTS, SHORT, text_of
 
-MORE = """
-[stimuli.around]
-condition = "oil"
-vary = "viscosity_pa_s"
-level = "value"
-standards = [2]
-levels = [0.5, 8]
-
-[designs.numbered]
-kind = "estimation"
-modulus = { level = 2, number = 10 }
-
-[methods.five]
-kind = "constant"
-levels = [0.5, 2, 8]
-repetitions = 2
-
-[blocks.detect]
-task = "stir"
-stimulus = "viscosity"
-standards = [1]
-design = "yesno"
-method = "few"
-
-[blocks.rate]
-task = "stir"
-stimulus = "value"
-design = "rated"
-method = "five"
-
-[blocks.number]
-task = "stir"
-stimulus = "value"
-design = "numbered"
-method = "five"
-
-[blocks.equal]
-task = "stir"
-stimulus = "around"
-design = "2ifc"
-method = "five"
-
-[blocks.odd]
-task = "stir"
-stimulus = "around"
-design = "oddity"
-method = "five"
-
-[blocks.pairs]
-task = "stir"
-design = "2ifc"
-conditions = ["oil", "other", "late"]
-standard = "oil"
-repetitions = 4
-
-[[analysis.published]]
-block = "number"
-measure = "exponent"
-value = 0.44
-low = 0.42
-high = 0.46
-source = "Stevens & Guirao 1964"
-"""
+MORE, ADAPTIVE = (
+    "\n" + (Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8") for name in ("more", "adaptive")
+)
+"""Blocks of every reply, and of adaptive methods, that are put after a study of levels."""
 SEQUENCE = ('sequence = ["viscosity"]', 'sequence = ["viscosity", "detect", "rate", "number", "equal", "odd", "pairs"]')
-ADAPTIVE = """
-[methods.steps]
-kind = "updown"
-tracks = 2
-trials = 24
-step_up = 2
-
-[methods.quest]
-kind = "questplus"
-trials = 9
-
-[blocks.staircase]
-stimulus = "damping"
-design = "2ifc"
-method = "steps"
-
-[blocks.quest]
-stimulus = "damping"
-standards = [8]
-design = "3ifc"
-method = "quest"
-
-[[analysis.published]]
-block = "staircase"
-measure = "weber"
-value = 0.1917
-percent = 71
-n = 10
-source = "Jones et al. 1997"
-"""
-
 STIMULUS = Stimulus(vary="damping_nspm", levels=(0.02, 0.6), standards=(8.0,))
 LEVELS = STIMULUS.spaced(9)
 NAMES = ["participant", "session", "trial", "block", "standard", "level", "level_delivered", "analysed", "success"]

@@ -1,7 +1,6 @@
 """Exponents of magnitude estimation: slopes of mean ln answers on ln levels, in report, table and R."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -36,17 +35,6 @@ def test_planted_exponents_are_found_whatever_unit_a_participant_chose() -> None
     assert (group.low, group.high) == (pytest.approx(0.52 - half), pytest.approx(0.52 + half))
 
 
-def test_the_slope_is_over_delivered_levels() -> None:
-    frame = rows({"P001": 0.5}, {"P001": 1.0})
-    frame.loc[frame["level"] == 8.0, "level_delivered"] = [6.0, 10.0]  # on average 8
-    frame.loc[frame["level"] == 2.0, "level_delivered"] = pd.NA  # not measured: as requested
-    _, one = estimated_exponents(block("estimation"), frame)
-    assert one.exponent == pytest.approx(0.5, abs=1e-12)
-    frame["level_delivered"] = frame["level_delivered"] ** 2
-    _, one = estimated_exponents(block("estimation"), frame)
-    assert one.exponent != pytest.approx(0.5, abs=0.01)
-
-
 def test_choices_modulus_trials_and_a_single_level_have_no_exponent() -> None:
     frame = rows({"P001": 0.5}, {"P001": 1.0})
     assert list(estimated_exponents(block("2ifc"), frame)) == []
@@ -75,17 +63,3 @@ def test_planted_exponents_are_found_for_fractions_and_for_differences(weber: bo
     assert (group.participant, group.n, group.exponent) == (None, 3, pytest.approx(0.6))
     low, high = stats.ttest_1samp([1.0, 0.0, 0.8], 0.0).confidence_interval(0.95)
     assert (group.low, group.high) == pytest.approx((low, high))
-
-
-def test_one_standard_and_values_have_no_exponent() -> None:
-    one = [threshold for threshold in observers(1.0, 1.0) if threshold.standard == 4.0]
-    assert list(weber_exponents(one, "weber")) == []
-    assert list(weber_exponents(observers(1.0), "value")) == []
-    detection = [replace(threshold, standard=0.0) for threshold in one]
-    assert list(weber_exponents([*one, *detection], "difference")) == []
-
-
-def test_the_exponent_of_one_participant_has_no_interval() -> None:
-    group, own = weber_exponents(observers(1.0), "weber")
-    assert (group.n, group.low, group.high) == (1, None, None)
-    assert own.participant == "P001"

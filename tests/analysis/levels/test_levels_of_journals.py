@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import pytest
 
 from study_app.analysis.export.export import export
-from study_app.analysis.figures.study_figures import plot
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from study_app.store.blinded.blinding import opened, read_key, whole_protocol
@@ -125,23 +124,3 @@ def test_the_report_of_a_sealed_study_shows_counts_and_times_by_code_and_no_leve
             told = words.in_text(path.read_text(encoding="utf-8"))
             assert [word for word in told if word != "other"] == [], path.name  # a condition, and an English word
     assert "viscosity_pa_s" not in page
-
-
-def test_figures_name_quantities(reported_levels: Path) -> None:
-    drawn = {path.stem: path.read_text(encoding="utf-8") for path in reported_levels.glob("*.svg")}
-    for name, words in (
-        ("levels-viscosity", "Weber fraction of viscosity<"),
-        ("levels-viscosity", "standard 2 Pa·s<"),
-        ("levels-number", "Viscosity [Pa·s]<"),
-        ("levels-pairs", "Condition<"),
-        ("question-viscosity-choice_2ifc", "Viscosity: Answer<"),
-    ):
-        assert words in drawn[name]
-    assert not [words for svg in drawn.values() for words in re.findall(r">([^<>]+)</text>", svg) if "_" in words]
-
-
-@pytest.mark.nightly
-def test_plot_draws_the_questions_and_levels_of_a_study_without_statements(opened_levels: Path, tmp_path: Path) -> None:
-    written = {path.name for path in plot(opened_levels, tmp_path)}
-    assert {f"levels-{block}.{form}" for block in BLOCKS for form in ("png", "svg", "pdf", "txt")} < written
-    assert "question-viscosity-choice_2ifc.png" in written

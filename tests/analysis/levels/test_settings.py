@@ -6,7 +6,6 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -37,26 +36,6 @@ def rows(*held: tuple[str, float, float], standard: float | None = 6.0) -> pd.Da
     """Return the rows of `tracks` of participant, starting level and setting."""
     frame = pd.DataFrame(held, columns=["participant", "level", "setting"])
     return frame.assign(block="set", standard=standard, analysed=True, response="1")
-
-
-def test_settings_on_log_spacing_are_averaged_as_logarithms() -> None:
-    table = rows(("A", 2.1, 4.0), ("A", 17.0, 9.0), ("B", 2.2, 6.0), ("B", 16.0, 6.0))
-    group, a, b = settings(block(), table)
-    assert (a.participant, b.participant, group.participant, group.n) == ("A", "B", None, 2)
-    assert a.pse == pytest.approx(6.0)
-    assert a.jnd == pytest.approx(np.std(np.log10([4, 9]), ddof=1))
-    assert a.hysteresis == pytest.approx(math.log10(9 / 4))
-    assert (a.constant_error, b.constant_error) == pytest.approx((0.0, 0.0), abs=1e-12)
-    assert (a.levels, a.started_high) == ((4.0, 9.0), (False, True))
-    assert group.pse == pytest.approx(6.0)
-    assert group.hysteresis == pytest.approx(math.log10(9 / 4) / 2)
-
-
-def test_without_an_interval_of_the_standard_there_is_no_constant_error() -> None:
-    _, a = settings(block(standard=False), rows(("A", 3.0, 5.0), ("A", 17.0, 7.0)))
-    assert a.constant_error is None
-    _, alone = settings(block(standard=False), rows(("A", 3.0, 5.0), ("A", 17.0, 7.0), standard=None))
-    assert (alone.standard, alone.n) == (None, 2)
 
 
 def test_settings_that_do_not_count_and_trials_without_one_are_left_out() -> None:

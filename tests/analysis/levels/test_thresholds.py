@@ -13,9 +13,8 @@ from study_app.analysis.statistics.thresholds import group_mean, p_of_fit
 from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.methods import QuestPlus, TrackSetting, TrialResult, UpDown
-from study_app.protocol.trials.stimuli import SESSION_SD, Stimulus, analysis_grid, assumed_for
+from study_app.protocol.trials.stimuli import SESSION_SD, Stimulus
 from study_app.psychophysics.families import rise, success
-from study_app.psychophysics.grid import fit
 from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, arranged, block, rows
 
 
@@ -58,17 +57,6 @@ def test_thresholds_are_compared_with_published_ones_at_their_percentage() -> No
     assert (group.compared_low, group.compared_high) == pytest.approx((10 ** (mean.low or 0), 10 ** (mean.high or 0)))
 
 
-@pytest.mark.parametrize("values", [(), published(71.0, 75.0), published(None), published(71.0, measure="exponent")])
-def test_without_one_known_percentage_there_is_no_comparison(values: tuple[Published, ...]) -> None:
-    found = list(thresholds(replace(block(), published=values), rows({"P001": 0.1})))
-    assert [one.compared for one in found] == [None, None]
-
-
-def test_a_percentage_that_the_function_never_has_is_not_compared() -> None:
-    found = list(thresholds(replace(block(), published=published(50.0)), rows({"P001": 0.1})))
-    assert [one.compared for one in found] == [None, None]
-
-
 @pytest.mark.parametrize(("planted", "width", "beyond"), [(60.0, 60.0, None), (104.0, 20.0, "above")])
 def test_levels_that_are_evenly_spaced_have_widths_and_thresholds_in_their_unit(
     planted: float, width: float, beyond: str | None
@@ -91,22 +79,9 @@ def test_levels_that_are_evenly_spaced_have_widths_and_thresholds_in_their_unit(
     assert one.width == pytest.approx(width, rel=0.7)
 
 
-def test_thresholds_are_at_the_levels_delivered_not_at_those_requested() -> None:
-    asked = rows({"P001": 0.2})
-    moved = asked.assign(level_delivered=asked["level"] * 1.1)
-    (_, plain), (_, found) = thresholds(block(), asked), thresholds(block(), moved)
-    assert found.threshold == pytest.approx(1.1 * plain.threshold, rel=0.01)
-
-
 def test_a_level_that_was_not_measured_counts_as_requested() -> None:
     one = rows({"P001": 0.2}).assign(level_delivered=pd.NA).astype({"level_delivered": "Float64"})
     assert counts_of(STIMULUS, one).levels == pytest.approx([math.log10(level) for level in LEVELS])
-
-
-@pytest.mark.parametrize(("planted", "beyond"), [(0.009, "below"), (1.2, "above")])
-def test_a_threshold_beyond_the_levels_presented_is_said_to_be(planted: float, beyond: str) -> None:
-    _, found = thresholds(block(), rows({"P001": planted}))
-    assert found.beyond == beyond
 
 
 def test_noise_trials_determine_the_guess_rate_of_yes_no() -> None:
@@ -140,23 +115,6 @@ def test_family_and_prior_on_the_width_are_those_that_questplus_states() -> None
     _, narrow = thresholds(replace(block(), method=QuestPlus(widths=(0.1, 0.3), width_prior=(0.2, 1.05))), plain)
     assert narrow.width == pytest.approx(0.2, rel=0.1)
     assert wide.flat_width == default.flat_width
-
-
-def test_the_band_holds_the_function_and_is_narrow_with_many_answers() -> None:
-    grid = analysis_grid(
-        STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")), session_sd=0.0
-    )
-    u = [math.log10(level) for level in LEVELS]
-    psi = success("weibull", u, -0.7, 1.4, 0.5, 0.02)
-    for n, widest in ((20, 0.5), (2000, 0.05)):
-        low, high = fit(u, n * psi, n * (1 - psi), grid).band(u)
-        assert (low <= high).all()
-        assert (low - 0.01 <= psi).all()
-        assert (psi <= high + 0.01).all()
-        assert (high - low).max() <= widest
-    many, flat = (fit(u, 1e4 * psi, 1e4 * (1 - psi), one) for one in (grid, replace(grid, width_prior=None)))
-    assert many.threshold == pytest.approx(-0.7, abs=0.03)  # widths are few
-    assert flat.threshold == pytest.approx(many.threshold, abs=0.03)
 
 
 def test_a_function_that_does_not_fit_and_answers_that_drift_are_said_to() -> None:

@@ -12,8 +12,9 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.methods import TrialResult
 from study_app.protocol.trials.presentation import arrangement_text, next_level, trial_result
-from study_app.protocol.trials.tracks import design_of, tracks_of
+from study_app.protocol.trials.tracks import adjusting_of, design_of, tracks_of
 from tests.golden import compare
+from tests.golden_values import one_line
 from tests.protocol.trials.level_studies import FIVE_POINTS, key_of, study
 from tests.protocol.trials.matching import ALONE, DELAY, matching
 
@@ -130,6 +131,8 @@ def presented(protocol: Protocol) -> list[str]:
             f"{trial.number} {trial.code} {key.codes[trial.block][trial.code]} {due.level} of {due.standard} {letters}"
             f"{' catch' if due.catch else ''}: {', '.join(shown)} | {answered.correct} {answered.success}"
         )
+        if (setting := adjusting_of(protocol, block, due.standard, due.level)) is not None:
+            lines.append(f"    {one_line(setting)}")
     return lines
 
 
