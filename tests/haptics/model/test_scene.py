@@ -2,23 +2,11 @@ import pytest
 from pydantic import ValidationError
 
 from study_app.haptics.model.effects import drag
-from study_app.haptics.model.effects.wake import Wake
-from study_app.haptics.model.scene import Body, Liquid, MotionBox, Scene
+from study_app.haptics.model.scene import Liquid, MotionBox, Scene
 from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import liquid, scene
 
 SHORT = {"length": 1, "scaling": 1}
-
-
-def test_defaults_are_those_of_the_thesis():
-    empty = Scene()
-    assert empty.body == Body(diameter_m=0.068, drag_coefficient=0.47, density_kg_m3=1000)
-    assert (empty.scale, empty.rate_hz, empty.force_limit_n) == (10, 1000, 8)
-    assert (empty.velocity.kind, empty.velocity.alpha) == ("ewma", 0.1)
-    assert (empty.knee.law, empty.knee.threshold_mps) == ("sqrt", 5)
-    wake = Wake(length=1700, scaling=1700)
-    assert (wake.breaking_angle_deg, wake.breaking_span_m, wake.decay, wake.axes) == (45, 0.068, 0.999975, "xz")
-    assert empty.liquids == ()
 
 
 @pytest.mark.parametrize(

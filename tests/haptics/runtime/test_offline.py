@@ -1,31 +1,12 @@
 import numpy as np
 import pytest
 
-from study_app.haptics.model.layout import LIMITER_SLEW
 from study_app.haptics.model.motion import Motion, circle
-from study_app.haptics.model.slope_limits import SLEW_N
-from study_app.haptics.runtime.offline import COLUMNS, simulate
+from study_app.haptics.runtime.offline import simulate
 from study_app.store.tables.csv_files import write_columns
-from tests.haptics.scenes import HONEY, WATER, moving, scene
+from tests.haptics.scenes import WATER, scene
 
 # The settings of the thesis' figures 3 to 8.
-
-
-def test_the_table_holds_inputs_and_results_by_name():
-    motion = moving([(1.0, 2.0, 3.0), (1.0, 2.0, 3.0)])
-    table = simulate(HONEY, motion)
-    assert table.dtype.names == COLUMNS
-    assert COLUMNS[:7] == ("t_s", "x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps")
-    assert (table.t_s == motion.t_s).all()
-    assert table.z_m == pytest.approx(motion.position_m[:, 2], abs=0)
-    assert table.limiters.dtype == np.int64
-
-
-def test_what_is_sent_is_slewed_from_zero_with_the_start_fade_over():
-    table = simulate(WATER, moving(np.tile([1.6, 0.0, 0.0], (3, 1))))
-    assert table.device_fx_n[0] == pytest.approx(-SLEW_N)
-    assert table.limiters[0] == LIMITER_SLEW
-    assert table.device_fx_n[2] == table.fx_n[2]
 
 
 def test_every_row_is_a_tick_of_its_own_time_not_of_the_rate():

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.slope_limits import table
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import built_alike, pack, pack_into
 from study_app.lab.parameters import changed
@@ -77,11 +75,3 @@ def test_checks_know_what_it_passes_of_a_swing(name, hz):
     v = found(name, np.column_stack([x_m, 0 * x_m, 0 * x_m]))[1000:, 0]
     true = 0.02 * w * np.cos(w * t_s)[1000:]
     assert passed_share(scene(name).velocity, 1000, hz) == pytest.approx((v @ true) / (true @ true), abs=0.04)
-
-
-@each
-def test_the_table_of_slope_limits_has_its_entries_at_each_measured_parameter(name):
-    kind = NAMED[name]
-    entries = [it for it in table() if it.estimator == name]
-    assert {it.parameter for it in entries} == (set(kind.measured) or {None})
-    assert len(entries) == 16 * max(len(kind.measured), 1)

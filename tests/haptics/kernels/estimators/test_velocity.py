@@ -35,11 +35,6 @@ def test_a_step_of_speed_is_there_to_99_percent_after_44_samples():
     assert v[1:] == pytest.approx(1 - 0.9 ** np.arange(1, 100))
 
 
-def test_given_velocities_are_taken_as_they_are():
-    v = np.random.default_rng(3).normal(0, 1, (20, 3))
-    assert (vectors(simulate(scene(knee=UNBENT), moving(v)), "velocity") == v).all()
-
-
 def test_a_given_velocity_that_is_not_there_is_refused():
     motion = Motion(np.arange(3) / 1000, np.zeros((3, 3)))
     with pytest.raises(StudyError, match="vx_mps"):
