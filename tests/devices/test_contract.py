@@ -22,7 +22,7 @@ from study_app.devices.force_dimension.library import OPTION
 from study_app.devices.inverse3.service import FAILURES as INVERSE3
 from study_app.devices.registry import descriptor_of, doctor_of, list_devices, open_device
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound, ServoFault
-from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
+from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
 from study_app.protocol.load import load
 from tests.compiled import needs_servo
 from tests.devices.subjects import (
@@ -84,15 +84,6 @@ def test_a_receipt_can_hold_what_a_device_is(made: Callable[..., Subject], reque
     device.close()
 
 
-@over(*MOVING[:-1])
-def test_a_sample_is_new_once(subject: Subject) -> None:
-    ticks = subject.ticks()
-    assert ticks.after(5) == READ_NEW
-    assert ticks.read() == READ_NEW
-    assert ticks.read(pause_ns=0) == READ_NOTHING_NEW
-    assert ticks.after(2) == READ_NEW
-
-
 @over(*UNFELT, *FELT)
 def test_a_force_acts_in_the_hand_frame_until_the_device_is_closed(subject: Subject) -> None:
     force_n = (0.5, -1.0, 1.5)
@@ -122,16 +113,6 @@ def test_no_force_is_beyond_the_limit_or_not_finite(
         assert np.linalg.norm(subject.acting_n()) <= 2.0 * 1.001
         assert np.linalg.norm(sent_n) <= 2.0 * 1.001
         until(lambda: np.allclose(subject.acting_n(), ticks.take(asked_n)[1], atol=subject.exact_n), "another force")
-
-
-@over(*MOVING)
-def test_buttons_are_read(subject: Subject) -> None:
-    assert subject.press is not None
-    ticks = subject.ticks()
-    for buttons in (0b01, 0b10, 0):
-        subject.press(buttons)
-        ticks.after(3)
-        assert ticks.reading[0].buttons == buttons
 
 
 @over(*UNFELT, *FELT)
