@@ -4,7 +4,6 @@ from typing import Any
 
 import pytest
 
-from study_app.errors import ProtocolError
 from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.protocol.load import parse
 from study_app.protocol.questionnaires import (
@@ -109,27 +108,6 @@ def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_re
         for language in languages:
             own = known.get("text", {}).get(language, f"own {language}")
             assert item.text == own if isinstance(item.text, str) else item.text[language] == own
-
-
-WEIGHTED, PAIR = "nasa-tlx-weighted", "mental_demand_or_effort"
-
-
-@pytest.mark.parametrize(
-    ("name", "item", "said"),
-    [
-        ("nasa-tlx", '{ id = "effort", kind = { a = 1 } }', 'kind: is "slider" in nasa-tlx: leave it out'),
-        ("nasa-tlx", '{ id = "effort", kind = "text" }', 'kind: is "slider" in nasa-tlx: leave it out'),
-        (WEIGHTED, '{ id = "ssq", options = [] }', '"ssq" is not an item of nasa-tlx-weighted'),
-        (WEIGHTED, f'{{ id = "{PAIR}", options = [{{ id = "efort" }}] }}', f'"efort" is not an option of {PAIR}'),
-        (WEIGHTED, f'{{ id = "{PAIR}", options = 7 }}', "options: must be an array, not 7"),
-    ],
-)
-def test_what_a_study_changes_of_an_instruments_item_is_judged_in_one_line(name: str, item: str, said: str) -> None:
-    text = MIXED.replace('instrument = "nasa-tlx"', f'instrument = "{name}"\nitems = [{item}]')
-    with pytest.raises(ProtocolError) as refused:
-        parse(text.encode(), "mixed")
-    assert said in str(refused.value.problems[-1])
-    assert len(refused.value.problems) <= 2
 
 
 def view(name: str, condition: ShowIf | None = None) -> NumberView:
