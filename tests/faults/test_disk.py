@@ -1,7 +1,10 @@
 """A disk that takes nothing: before a session it is refused, within one it waits, and nothing is lost or doubled."""
 
 import csv
+import shutil
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -9,15 +12,23 @@ import pytest
 from study_app.errors import StoreError
 from study_app.session.pages import EndPage, PausePage, TroublePage
 from study_app.session.runner import RETRY_S
+from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.transitions.events import Note
 from study_app.session.transitions.state import Phase
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import exclude
 from study_app.store.journals import journal
+from study_app.store.sessions.recovery import rebuild
 from study_app.store.verification.verify_study import verify
+from study_app.store.withdrawals import withdraw
 from tests.benchmarks.sessions import disk
 from tests.faults.support.worlds import StoredWorld
 from tests.platforms import files_up_to
 from tests.session import small
+from tests.studies import made_up
 
+MOST_CALLS = 300
+P001 = "data/sub-P001/ses-01"
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files as POSIX systems can")
 
 
@@ -94,10 +105,47 @@ def test_a_disk_that_is_full_at_the_start_refuses_the_session_and_keeps_its_id_f
 def test_a_fault_at_any_call_of_the_disk_leaves_a_session_that_begins_and_ends_soundly(
     tmp_path: Path, kind: str
 ) -> None:
-    for call in range(300):
+    for call in range(MOST_CALLS):
         used = disk.Disk(kind, call)
         disk.held(tmp_path / f"{call:03d}", "P001", used)
         assert verify(tmp_path / f"{call:03d}").errors == (), call
         if not used.happened:
             return
     raise AssertionError("the session never ended")
+
+
+def opened(study: Path) -> None:
+    if (left := unblind(study, "AK", "closed").left) != ():
+        raise StoreError("\n".join(left))
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("answered") / "demo"
+    study = rehearse_answers("demo", participants=2, seed=1, results=folder, features=made_up("demo"))
+    exclude(study, "P002", 1, by="AK", reason="the phone rang")
+    return study
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", disk.CALLS)
+@pytest.mark.parametrize(
+    "command",
+    [opened, lambda study: withdraw(study, "P002", by="AK", reason="asked"), lambda study: rebuild(study / P001)],
+    ids=["unblind", "withdraw", "rebuild"],
+)
+def test_a_command_that_met_a_fault_at_any_call_of_the_disk_is_given_again(
+    tmp_path: Path, answered: Path, kind: str, command: Callable[[Path], object]
+) -> None:
+    for call in range(MOST_CALLS):
+        study, used = shutil.copytree(answered, tmp_path / f"{call:03d}"), disk.Disk(kind, call)
+        for table in [] if command is opened else (study / P001).glob("*_data.csv"):
+            table.unlink()
+        with used.used():
+            disk.tried(partial(command, study))
+        rebuild(study / P001)
+        assert verify(study).errors == (), call
+        if not used.happened:
+            return
+    raise AssertionError("the command never ended")

@@ -241,8 +241,11 @@ def _open_study(study: StudyFolder) -> None:
     if name is not None:
         write_participants(study, name)
     for session in study.sessions():
-        with contextlib.suppress(StoreError, KeyError, TypeError, ValueError):  # another receipt is used instead
+        try:
             protocol = receipt.read(session.receipt)["protocol"]
             head, number = StudyHead.model_validate(protocol["study"]), protocol.get("format", 1)
-            write_description(study, head, number, intervals=has_intervals(protocol))
-            return
+            intervals = has_intervals(protocol)
+        except (StoreError, KeyError, TypeError, ValueError):  # another receipt is used instead
+            continue
+        write_description(study, head, number, intervals=intervals)
+        return

@@ -70,8 +70,8 @@ def open_alone(folder: Path) -> Opening:
         Another program has it open, or the marker cannot be written. Nothing is left behind.
     """
     opening = Opening(folder / f".open-{secrets.token_hex(4)}.json")
-    write_file(opening.marker, json.dumps(_this_program()).encode())
     try:
+        write_file(opening.marker, json.dumps(_this_program()).encode())
         for marker in markers(folder):
             if marker != opening.marker:
                 if _lives(holder := _holder(marker)):
