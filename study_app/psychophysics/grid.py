@@ -210,8 +210,10 @@ APART: Final = (0.05, 0.1, 0.2)
 """Standard deviations of the thresholds of people of one group [range of thresholds]. [choice]"""
 
 
-def group_widths(flat: Sequence[Posterior], width_prior: tuple[float, float]) -> NDArray[np.float64]:
+def group_widths(flat: Sequence[Posterior], width_prior: tuple[float, float]) -> tuple[NDArray[np.float64], float]:
     """Return the prior on each person's width, (people, widths), that follows from the answers of the others.
+
+    Followed by the variance [u²] of the mean of the people's thresholds that is due to the width that they share.
 
     Widths of a group are log-normal about a centre, which is log-normal itself; thresholds are normal about a mean, all
     means being equally likely. One person has `width_prior`, but for its share beyond the grid.
@@ -237,7 +239,13 @@ def group_widths(flat: Sequence[Posterior], width_prior: tuple[float, float]) ->
     evidence = np.log(np.maximum(evidence, 1e-300))
     of_others = log_centres + evidence.sum(axis=0) - evidence
     weights = np.exp(of_others - of_others.max(axis=(1, 2), keepdims=True)).sum(axis=1)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True) @ own, float)
+    priors = np.asarray(weights / weights.sum(axis=1, keepdims=True) @ own, float)
+    of_all = log_centres + evidence.sum(axis=0)
+    centres = np.exp(of_all - of_all.max()).sum(axis=0)
+    centres /= centres.sum()
+    masses = np.einsum("paw,cw->pac", joint, own)
+    means = (np.einsum("pac,a->pc", masses, thresholds) / masses.sum(axis=1)).mean(axis=0)
+    return priors, float(centres @ (means - centres @ means) ** 2)
 
 
 def _median(values: Values, weights: NDArray[np.float64]) -> float:

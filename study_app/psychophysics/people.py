@@ -106,12 +106,16 @@ _COVERED: Final = 0.95
 
 
 class Estimates(NamedTuple):
-    """Thresholds of many observers, (observers,) arrays [u]: medians, ends of 95 % intervals, variances."""
+    """Thresholds of many observers, (observers,) arrays [u]: medians, ends of 95 % intervals, variances.
+
+    ``shared`` is the variance of their group's mean that is due to the width that its people share.
+    """
 
     medians: Floats
     lows: Floats
     highs: Floats
     variances: Floats
+    shared: Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -180,7 +180,7 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
         heard = dict(list(at_standard.groupby("participant")))
         own = [_own(block, stimulus, standard, one, heard[one.person]) for one in fits]
         if own:
-            yield _group(stimulus, standard, own)
+            yield _group(stimulus, standard, own, fits[0].shared)
         yield from own
 
 
@@ -215,7 +215,8 @@ def fit_answers(stimulus: Stimulus, rows: pd.DataFrame, grid: Grid, *, two_inter
 class PersonFit:
     """What the ``rows`` of a participant at a standard say, and how the threshold changes over them [decades].
 
-    ``flat`` is the posterior under a flat prior on the width, ``width_prior`` the prior of the other one.
+    ``flat`` is the posterior under a flat prior on the width, ``width_prior`` the prior of the other one, ``shared``
+    the variance of the group's mean that is due to the width that people share [u²].
     """
 
     person: Any
@@ -225,6 +226,7 @@ class PersonFit:
     width_prior: Array
     posterior: Posterior
     change: float
+    shared: float
 
 
 def _fits(block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.DataFrame) -> list[PersonFit]:
@@ -239,15 +241,14 @@ def _fits(block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.Data
     counts = [fit_answers(stimulus, own, grid, two_intervals=two)[0] for _, own in of_people]
     flat = [one.fit(replace(grid, width_prior=None)) for one in counts]
     found = []
-    for (person, own), one, unknown, prior in zip(
-        of_people, counts, flat, group_widths(flat, assumed.width_prior) if flat else (), strict=True
-    ):
+    priors, shared = group_widths(flat, assumed.width_prior) if flat else ((), 0.0)
+    for (person, own), one, unknown, prior in zip(of_people, counts, flat, priors, strict=True):
         session_sd = SESSION_SD / math.sqrt(own["session"].nunique())
         widened = unknown.with_widths(prior)
         change = _change(stimulus, own, one, widened)
         session_sd = math.hypot(session_sd, change / math.sqrt(12))
         widened = replace(widened, grid=analysis_grid(stimulus, block.design, assumed, session_sd))
-        found.append(PersonFit(person, own, one, unknown, prior, widened, change))
+        found.append(PersonFit(person, own, one, unknown, prior, widened, change, shared))
     return found
 
 
@@ -307,11 +308,11 @@ def _reversal_mean(block: LevelBlock, stimulus: Stimulus, heard: pd.DataFrame) -
     return stimulus.level_of(float(np.mean(means))) if means else None
 
 
-def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate]) -> ThresholdEstimate:
+def _group(stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate], shared: float) -> ThresholdEstimate:
     """Return the random-effects mean of participants, at the published percentage too where all have theirs."""
 
     def mean(levels: Sequence[float]) -> list[Any]:
-        found = group_mean([stimulus.coordinate(level) for level in levels], [one.variance or 0.0 for one in own])
+        found = group_mean([*map(stimulus.coordinate, levels)], [one.variance or 0.0 for one in own], shared)
         return [None if end is None else stimulus.level_of(end) for end in (found.mean, found.low, found.high)]
 
     group = ThresholdEstimate(None, number_or_none(standard), len(own), *mean([one.threshold for one in own]))
@@ -595,7 +596,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 f"deviation of log widths {100 * ALIKE:.0f} % was taken to be between participants, so that each "
                 "participant’s width follows from the answers of all. Group means are "
                 "random-effects means with the between-person variance of Paule and Mandel (1982) and, from "
-                f"{FEWEST} participants on, the interval of Hartung and Knapp (2001)."
+                f"{FEWEST} participants on, the interval of Hartung and Knapp (2001), widened by the uncertainty of "
+                "the width that all have in common."
             )
 
 

@@ -119,15 +119,17 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
     first = case.seed[-1] * BATCH
     kinds = [_kind_of(first + place)[1] for place in range(BATCH)]
     parts = [_estimates(one, part, kinds, rng) for one, part in zip(each, np.split(truth, len(each), 2), strict=True)]
-    medians, variances = (np.concatenate(it, 2) for it in zip(*parts, strict=True))
+    medians, variances, shared = (np.concatenate(it, 2) for it in zip(*parts, strict=True))
     errors = (medians - truth) * (math.log(10) if log else 1 / truth)
     found = PrecisionResult()
     full = plan.measures(means)
-    for one, median, variance, measured in zip(errors, medians, variances, full.ravel().tolist(), strict=True):
+    common = shared[:, 0].sum(axis=1) / plan.standards**2
+    each_study = zip(errors, medians, variances, common.tolist(), full.ravel().tolist(), strict=True)
+    for one, median, variance, of_all, measured in each_study:
         of_people, of_variances = median.mean(axis=1), variance.sum(axis=1) / plan.standards**2
         halves = []
         for n in sizes:
-            group = group_mean(of_people[:n].tolist(), of_variances[:n].tolist()) if n >= FEWEST else None
+            group = group_mean(of_people[:n].tolist(), of_variances[:n].tolist(), of_all) if n >= FEWEST else None
             if group is None or group.low is None or group.high is None:
                 halves.append(math.nan)
             elif not measured:
@@ -162,8 +164,8 @@ def _kind_of(study: int) -> tuple[str, Person]:
 
 def _estimates(
     plan: ThresholdPlan, truth: Array, kinds: Sequence[Person], rng: np.random.Generator
-) -> tuple[Array, Array]:
-    """Return posterior medians and variances of observers with these thresholds (studies, people, standards) [u].
+) -> tuple[Array, ...]:
+    """Return medians, variances and what is shared of observers with these thresholds (studies, people, standards) [u].
 
     In each study all observers are of one of ``kinds``.
     """
@@ -172,11 +174,10 @@ def _estimates(
     who = [kind for kind in kinds for _ in range(people * standards)]
     starts = range(0, len(own), at_once)
     found = [plan.simulate(own[first : first + at_once], rng, who[first : first + at_once], people) for first in starts]
-    medians, variances = (
+    return tuple(
         np.concatenate(it).reshape(studies, standards, people).transpose(0, 2, 1)
-        for it in zip(*((one.medians, one.variances) for one in found), strict=True)
+        for it in zip(*((one.medians, one.variances, one.shared) for one in found), strict=True)
     )
-    return medians, variances
 
 
 def sweep(

@@ -386,8 +386,11 @@ class GroupMean:
     between: float
 
 
-def group_mean(estimates: Sequence[float], variances: Sequence[float]) -> GroupMean:
-    """Return the random-effects mean of estimates, shape (n,), with their variances, each above zero."""
+def group_mean(estimates: Sequence[float], variances: Sequence[float], shared: float = 0.0) -> GroupMean:
+    """Return the random-effects mean of estimates, shape (n,), with their variances, each above zero.
+
+    ``shared`` is the variance of an error that all have in common.
+    """
     y, v = np.asarray(estimates, float), np.asarray(variances, float)
     n = len(y)
     if n == 0:
@@ -406,5 +409,5 @@ def group_mean(estimates: Sequence[float], variances: Sequence[float]) -> GroupM
     if n < FEWEST:
         return GroupMean(n, mean, None, None, between)
     variance = float((weights * (y - mean) ** 2).sum()) / ((n - 1) * float(weights.sum()))
-    half = float(student.ppf(0.975, n - 1)) * math.sqrt(variance)
+    half = math.hypot(float(student.ppf(0.975, n - 1)) * math.sqrt(variance), Z_95 * math.sqrt(shared))
     return GroupMean(n, mean, mean - half, mean + half, between)

@@ -65,7 +65,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     type=click.IntRange(10, 1_000_000),
     default=200,
     show_default=True,
-    help="Studies of ten participants, of each protocol and seed.",
+    help="Studies of 20 participants, of each protocol and seed.",
 )
 @click.option(
     "--seed",
@@ -81,7 +81,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], workers: Workers, to: Path | None) -> None:
     """Recover the known thresholds of simulated observers, with methods and analysis alone and with the whole program.
 
-    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) many studies of ten
+    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) many studies of 20
     observers, who differ by a factor of 1.2, are simulated and analysed; in magnitude estimation the exponent is known.
     Then three participants are rehearsed with servo, files, unblinding and analysis. Every value is printed with its
     limit. Ends with exit code 3 if a value exceeds its limit.

@@ -70,7 +70,8 @@ POINTS: Final = 64
 BETWEEN_SESSIONS: Final = 10**SESSION_SD
 """Factor between a person's thresholds of several sessions, as measured."""
 
-PEOPLE: Final = 10
+PEOPLE: Final = 20
+"""Of a study: so many, and ±`NEAR`, are planned in the shipped studies (``analysis.participants``, ``precision``)."""
 REHEARSED: Final = 3
 ERROR_MOST: Final = 0.05
 NEAR: Final = 0.15
@@ -369,8 +370,11 @@ def rehearsed(one: Known, source: bytes, seed: int) -> Rehearsed:
         return Rehearsed(float(intervals["invalid_reasons"].isna().mean()), findings, values)
 
 
-def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
-    """Yield whether 95 % intervals hold the truth: the group's in 95 % of studies but for chance, and participants'."""
+def coverage(name: str, studies: Sequence[StudyFound], *, few: bool = False) -> Iterator[Verdict]:
+    """Yield whether 95 % intervals hold the truth: the group's in 95 % of studies but for chance, and participants'.
+
+    Of ``few`` studies participants' intervals are judged but for chance, too.
+    """
     groups = [one.covered for found in studies for one in found.group]
     share, slack = float(np.mean(groups)), 3 * math.sqrt(0.95 * 0.05 / len(studies))
     limit, what = f"95 ± {100 * slack:.1f} %", "coverage of the group's 95 % intervals"
@@ -379,7 +383,12 @@ def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Verdict]:
     if own:
         (low, high), share = OWN_COVERAGE, float(np.mean(own))
         what, limit = "coverage of participants' 95 % intervals", f"{100 * low:.0f} to {100 * high:.0f} %"
-        yield Verdict(name, what, f"{100 * share:.1f} %", limit, low <= share <= high)
+        if few:
+            least, most = wilson_interval(share, len(own))
+            value = f"{100 * share:.1f} % [{100 * least:.1f}, {100 * most:.1f}]"
+            yield Verdict(name, what, value, f"reaches {limit}", least <= high and most >= low)
+        else:
+            yield Verdict(name, what, f"{100 * share:.1f} %", limit, low <= share <= high)
 
 
 def judged(one: Known, found: Rehearsed, spread: float) -> Iterator[Verdict]:
@@ -423,7 +432,7 @@ def validate(
         progress(f"people: {kind}", None)
         found_of = [run(one.simulate, [(*it, kind) for it in cases], executor) for one in of_thresholds]
         errors = np.concatenate([one.errors(found) for one, found in zip(of_thresholds, found_of, strict=True)])
-        verdicts += [_of_kind(kind, errors), *coverage(kind, [one for found in found_of for one in found])]
+        verdicts += [_of_kind(kind, errors), *coverage(kind, [one for found in found_of for one in found], few=True)]
     return verdicts
 
 

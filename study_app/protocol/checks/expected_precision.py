@@ -35,7 +35,7 @@ from study_app.protocol.trials.tracks import (
 from study_app.psychophysics.adaptive import Answers, Observers
 from study_app.psychophysics.detection import NORMAL, rating
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.grid import Z_95, fit, group_widths
+from study_app.psychophysics.grid import Z_95, Posterior, fit, group_widths
 from study_app.psychophysics.people import ALONE, ASSUMED, ESTIMATE_NOISE, Estimates, Expected, Person
 
 D_PRIME: Final = 1.0
@@ -318,9 +318,9 @@ class ThresholdPlan:
         found = []
         for first in range(0, len(fits), together):
             group = fits[first : first + together]
-            for one, prior in zip(group, group_widths(group, assumed.width_prior), strict=True):
-                own = one.with_widths(prior)
-                found.append((own.threshold, *own.interval, own.variance))
+            priors, shared = group_widths(group, assumed.width_prior)
+            fitted = map(Posterior.with_widths, group, priors)
+            found += [(own.threshold, *own.interval, own.variance, shared) for own in fitted]
         return Estimates(*np.array(found).T)
 
     def simulate(

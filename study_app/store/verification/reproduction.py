@@ -17,6 +17,7 @@ from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import RecordedTrial, Schedule, build_schedule, reproduce
 from study_app.protocol.streams import Key, group_of
 from study_app.protocol.trials.presentation import arrangement_text, next_level
+from study_app.protocol.trials.stimuli import LEVEL_RULES
 from study_app.protocol.trials.tracks import adjusting_of, design_of
 from study_app.store import receipt
 from study_app.store.blinded import blinding
@@ -65,8 +66,8 @@ def reproduced(session_folder: Path) -> Reproduced:
     if lines and events.start_of(lines).intervals:
         compared = _Compared(protocol, Key(key.codes, key.nonce), schedule)
         _levels(compared, lines, key, found)
-        version = ran["versions"].get("liquid-study")
-        if compared.differences and version != study_app.__version__:
+        version, *rules = (ran["versions"].get(name) for name in ("liquid-study", "level rules"))
+        if compared.differences and (version, *rules) != (study_app.__version__, LEVEL_RULES):
             found.followed.append(
                 f"liquid-study {version} ran the session and may choose levels by other rules: run reproduce of it"
             )

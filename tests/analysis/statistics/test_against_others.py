@@ -123,12 +123,13 @@ def test_mean_variance_and_interval_are_those_of_statsmodels(spread):
     assert (found.low, found.high) == pytest.approx((low, high), abs=1e-5)
 
 
-@pytest.mark.parametrize("people", [3, 5, 10, 20])
-def test_intervals_cover_the_mean(people):
+@pytest.mark.parametrize(("people", "shared"), [(3, 0.0), (5, 0.0), (5, 0.02), (10, 0.0), (20, 0.0), (20, 0.02)])
+def test_intervals_cover_the_mean(people, shared):
     draw, covered = np.random.default_rng(people), 0
     for _ in range(1000):
         variances = draw.uniform(0.02, 0.1, people)
-        found = group_mean(draw.normal(0, np.sqrt(variances + 0.05)), variances)
+        common = draw.normal(0, np.sqrt(shared))
+        found = group_mean(draw.normal(common, np.sqrt(variances + 0.05)), variances, shared)
         assert found.low is not None
         assert found.high is not None
         covered += found.low <= 0 <= found.high

@@ -1,5 +1,6 @@
 """Known thresholds and exponents are recovered, and an observer that is wrong is found."""
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -44,6 +45,13 @@ design = "2ifc"
 method = "short"
 """,
 )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def ten_people() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as change:
+        change.setattr(known_values, "PEOPLE", 10)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -174,6 +182,13 @@ def test_the_limit_of_a_coverage_follows_from_the_number_of_all_studies() -> Non
     (alone,), (pooled,) = coverage("one seed", seed), coverage("two seeds", 2 * seed)
     assert (alone.value, alone.limit, alone.holds) == ("91.5 %", "95 ± 4.6 %", True)
     assert (pooled.value, pooled.limit, pooled.holds) == ("91.5 %", "95 ± 3.3 %", False)
+
+
+@pytest.mark.parametrize(("studies", "holds"), [(10, True), (100, False)])
+def test_few_intervals_are_judged_but_for_chance(studies: int, holds: bool) -> None:
+    held, missed = (((Estimated(1.0, 0.5, high, 1.0),),) * part for high, part in ((2.0, 9), (0.9, 1)))
+    found = [StudyFound((Estimated(1.0, 0.5, 2.0, 1.0),), held + missed)] * studies
+    assert [[*coverage("k", found, few=few)][-1].holds for few in (False, True)] == [False, holds]
 
 
 @pytest.mark.slow
