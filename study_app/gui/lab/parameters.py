@@ -387,6 +387,7 @@ class NumberRow(ParameterRow):
     def let_go(self) -> None:
         super().let_go()
         self.slider.let_go()
+        self.field.put_back()
 
     def parts(self) -> tuple[QWidget, ...]:
         return self.slider, self.field

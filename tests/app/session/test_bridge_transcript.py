@@ -143,6 +143,7 @@ PLAYS = {
     "bug": f"{BEGUN}, bug, second error, wait, reconnect, resume, push, abort, wait, close",
     "video": f"{BEGUN}, no clip, wait, reconnect, reconnected, wait, resume, shown, close, accept, close",
     "servo": f"{BEGUN}, servo error, wait, leave, leave",
+    "closed twice": f"{BEGUN}, close, close, leave",
 }
 
 

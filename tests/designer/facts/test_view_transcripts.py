@@ -7,9 +7,11 @@ from typing import Any
 import pytest
 
 from study_app.designer.document.additions import additions_for, repairs
+from study_app.designer.document.document import template
 from study_app.designer.document.elements import brief, found_fields, outline, position_of, used_by
 from study_app.designer.document.steps import MakeSeries
 from study_app.designer.document.study import Study, read
+from study_app.designer.document.toml_edits import Set
 from study_app.designer.form.form import form
 from study_app.designer.measures.measures_page import clipped_sentence
 from study_app.designer.measures.measures_view import MeasuresView, measures_view
@@ -153,6 +155,53 @@ def test_what_is_shown_of_studies(name: str, pytestconfig: pytest.Config) -> Non
 def test_what_is_shown_of_simulations(name: str, pytestconfig: pytest.Config) -> None:
     (_, study), *_ = studies((name,))
     compare(GOLDEN / f"simulations_of_{name}.txt", list(of_blocks(study, SIMULATED[name])), pytestconfig)
+
+
+DAMPING = ("stimuli", "damping")
+WIDE = Set((*DAMPING, "levels"), [0.02, 2.0])
+FREE = Set(("tasks", "stir"), {"kind": "explore", "min_s": 2, "max_s": 4, "instruction": "Feel."})
+LIMITED: dict[str, tuple[Set, ...]] = {
+    "levels below the error": (Set((*DAMPING, "levels"), [0.005, 0.03]),),
+    "high levels are clipped": (WIDE, Set((*DAMPING, "standards"), [32])),
+    "levels are clipped in fast motions": (WIDE, Set((*DAMPING, "standards"), [12]), FREE),
+    **{
+        f"standards {standards}": (Set((*DAMPING, "standards"), standards),)
+        for standards in ([52], [8, 52], [60], [8, 60])
+    },
+}
+
+
+def of_limits() -> Iterator[str]:
+    """Yield what is said where limits clip levels, before and after observers were simulated, and of weak forces."""
+    shown = Shown()
+    for name, edits in {"as it is": (), **LIMITED}.items():
+        study, _ = template("viscosity-jnd").edited(*edits)
+        for threshold in (0.019, 0.19):
+            observed = Observed(
+                threshold, 0.02, 400, 0.75, (0.1,), (0.7,), ((0.7,),), (), ((1, (0.1,) * 5),), (), 0.03, 80
+            )
+            group = GroupPrecision(12, 60, 0.15, 80, 0.9, 107, 1.0, 60, 9)
+            for simulated in (Simulated(measurable=Measurable(None, ())), Simulated(observed, group=group)):
+                yield f"== {name}, {'' if simulated.observed else 'not '}simulated at {threshold}"
+                controls = Controls(threshold=threshold)
+                for block in ("viscosity", "training"):
+                    view = measures_view(study, facts(study), ("blocks", block), controls, simulated, {})
+                    clipped = "" if view.levels is None else clipped_sentence(view.levels)
+                    yield from shown.note(block, {"numbers": view.numbers, "clipped": clipped})
+    (_, study), (_, late) = studies(("rek2024", "forcedelay"))
+    for edit in (Set(("device", "force_limit_n"), 0.5), Set(("blocks", "liquids", "repetitions"), -1)):
+        edited, _ = study.edited(edit)
+        yield f"== {edit.path[-1]} {edit.value}"
+        yield from shown.note(
+            "study", measures_view(edited, facts(edited), ("study",), Controls(), Simulated(), {}).cards
+        )
+    view = measures_view(late, facts(late), ("blocks", "delay"), Controls(), Simulated(), {})
+    yield f"simulated: {measures(view)['simulated']}"
+
+
+@pytest.mark.slow
+def test_what_is_said_of_limits(pytestconfig: pytest.Config) -> None:
+    compare(GOLDEN / "limits.txt", of_limits(), pytestconfig)
 
 
 FAULTS = ("designs", "formats", "adjustment", "groups", "impossible", "methods", "pace", "questions", "sound")

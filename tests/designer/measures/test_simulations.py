@@ -12,7 +12,6 @@ from study_app.designer.document.document import template
 from study_app.designer.document.steps import DuplicateElement, RetypeFile, Situation
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.measures_controller import ANEW, _pages
 from study_app.designer.measures.measures_view import FAILED
 from study_app.designer.measures.simulation import (
@@ -34,6 +33,8 @@ from study_app.protocol.source.files import shipped_file
 from study_app.protocol.wording.languages import words
 from study_app.workers.server import Crashed, Stopped
 from tests.designer.measures.conftest import Worker, jnd, shown
+
+UNKNOWN = "–"
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
-"""What is said of each device, true to what was found, and of its last bench."""
+"""What is said of each device, true to what was found, and of its last bench, compared with a reviewed text."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,59 +10,29 @@ from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READ
 from study_app.devices.registry import backends, list_devices
 from study_app.gui.kit.devices import benches_shown, device_named, devices_shown, looking
 from study_app.store.workstation import DEFAULTS, DeviceBench
+from tests.golden import compare
+from tests.golden_values import value_lines
 
 MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
 EMULATED = Backend("falcon-emulated", "the program", READY, "by command")
 
 
-def falcon(state, why=""):
+def falcon(state: str, why: str = "") -> Backend:
     return Backend("falcon", "libusb 1.0", state, "felt, up to 8 N", why)
 
 
-def ftdi(state, why=""):
+def ftdi(state: str, why: str = "") -> Backend:
     return Backend("falcon", "ftd2xx", state, "the same", why)
 
 
-def test_every_device_is_shown_once_and_those_that_people_feel_with_first():
-    shown = devices_shown(backends())
-    names = [device.name for device in shown]
-    assert set(list_devices()) <= set(names)
-    assert len(names) == len(set(names))
-    assert set(names[:5]) == {"mouse", "spacemouse", "falcon", "force-dimension", "inverse3"}
-    assert all(device.can.endswith(".") for device in shown)
-    (real,) = (device for device in shown if device.name == "falcon")
-    assert [way.by.split()[0] for way in real.ways] == ["libusb", "ftd2xx"]
-
-
-@pytest.mark.parametrize(
-    ("ways", "word", "ready", "why"),
-    [
-        ((falcon("connected: FT1"), ftdi(NOT_AVAILABLE, "for Windows alone")), "Connected", True, ""),
-        ((falcon("connected: unnamed", "no permission"), ftdi(NOT_AVAILABLE)), "Check it", False, "No permission."),
-        ((falcon(NONE, "plug it in"), ftdi(NOT_AVAILABLE, "for Windows alone")), "Not connected", False, "Plug it in."),
-        ((falcon(NONE, "plug it in"), ftdi(DRIVER_READY)), "Driver ready", False, ""),
-        (
-            (falcon(NOT_AVAILABLE, "install libusb"), ftdi(NOT_AVAILABLE, "other")),
-            "Not available",
-            False,
-            "Install libusb.",
-        ),
-    ],
+FOR_WINDOWS = ftdi(NOT_AVAILABLE, "for Windows alone")
+WAYS = (
+    (falcon("connected: FT1"), FOR_WINDOWS),
+    (falcon("connected: unnamed", "no permission"), ftdi(NOT_AVAILABLE)),
+    (falcon(NONE, "plug it in"), FOR_WINDOWS),
+    (falcon(NONE, "plug it in"), ftdi(DRIVER_READY)),
+    (falcon(NOT_AVAILABLE, "install libusb"), ftdi(NOT_AVAILABLE, "other")),
 )
-def test_a_falcon_is_as_well_as_the_best_way_to_it(ways, word, ready, why):
-    (shown,) = devices_shown(ways)
-    assert (shown.word, shown.ready, shown.why) == (word, ready, why)
-
-
-def test_the_preferred_device_is_named_before_anybody_looked_and_if_nobody_knows_it():
-    shown = devices_shown([MOUSE, falcon("connected: FT1"), EMULATED])
-    assert device_named("falcon:FT1", shown).title == "Novint Falcon"
-    assert device_named("falcon-emulated", shown).title == "Emulated Falcon"
-    assert device_named("falcon", ()) == looking("falcon")
-    assert device_named("falcon", ()).word == "Looking …"
-    unknown = device_named("hammer", shown)
-    assert not unknown.ready
-    assert "choose one of" in unknown.why
 
 
 def bench(**fields: Any) -> DeviceBench:
@@ -78,28 +49,34 @@ def bench(**fields: Any) -> DeviceBench:
     return DeviceBench.model_validate(numbers | fields)
 
 
-def test_words_have_date_serial_number_and_the_range_over_the_axes() -> None:
-    shown = benches_shown([bench(gain=0.984)])["falcon"]
-    assert shown.words == (
-        "Measured 2026-11-21, serial number FT1: mass 0.19 to 0.21 kg, damping 0.5 N·s/m, friction 0.10 to 0.12 N, "
-        "delay 1.0 ms, stable damping 118 to 122 N·s/m, 0.98 N on the scale per newton sent."
-    )
-    assert shown.report is None
+def told(folder: Path) -> Iterator[str]:
+    for ways in WAYS:
+        yield from value_lines(devices_shown(ways), "the best way to a Falcon")
+    shown = devices_shown([MOUSE, falcon("connected: FT1"), EMULATED])
+    for name in ("falcon:FT1", "falcon-emulated", "hammer"):
+        yield from value_lines(device_named(name, shown), f"preferred {name}")
+    assert device_named("falcon", ()) == looking("falcon")
+    yield from value_lines(looking("falcon"), "before anybody looked")
+    benches = [
+        bench(gain=0.984, measured="2026-11-01"),
+        bench(serial="B", measured="2026-11-20", report=str(folder / "gone.md")),
+        bench(name="inverse3", serial="", gain=0.984, report=str(folder / "here.md")),
+    ]
+    (folder / "here.md").write_text("# Bench\n")
+    machine = DEFAULTS
+    for measured in benches:
+        machine = machine.with_bench(measured)
+    for name, one in (*benches_shown(benches[:1]).items(), *benches_shown(machine.benches).items()):
+        yield f"{name}: {one.words} Report: {one.report}"
 
 
-def test_the_newest_bench_of_a_device_is_shown() -> None:
-    older, newer = bench(serial="A", measured="2026-11-01"), bench(serial="B", measured="2026-11-20")
-    other = bench(name="inverse3", serial="")
-    shown = benches_shown(DEFAULTS.with_bench(older).with_bench(newer).with_bench(other).benches)
-    assert list(shown) == ["inverse3", "falcon"]
-    assert "Measured 2026-11-20, serial number B:" in shown["falcon"].words
-    assert "Measured 2026-11-21: " in shown["inverse3"].words
+def test_devices_and_benches_are_told_as_reviewed(tmp_path: Path, pytestconfig: pytest.Config) -> None:
+    lines = (line.replace(f"{tmp_path}/", "") for line in told(tmp_path))
+    compare(Path(__file__).parent / "golden" / "devices.txt", lines, pytestconfig)
 
 
-def test_a_report_that_is_gone_is_said_and_not_offered(tmp_path: Path) -> None:
-    report = tmp_path / "bench.md"
-    gone = benches_shown([bench(report=str(report))])["falcon"]
-    assert gone.report is None
-    assert gone.words.endswith(f"The report is missing: {report}.")
-    report.write_text("# Bench\n")
-    assert benches_shown([bench(report=str(report))])["falcon"].report == report
+def test_every_device_is_shown_once_and_those_that_people_feel_with_first() -> None:
+    names = [device.name for device in devices_shown(backends())]
+    assert set(list_devices()) <= set(names)
+    assert len(names) == len(set(names))
+    assert set(names[:5]) == {"mouse", "spacemouse", "falcon", "force-dimension", "inverse3"}

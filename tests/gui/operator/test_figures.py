@@ -1,0 +1,149 @@
+"""Figures of the tiles and points of the plots after each batch of samples, compared with a reviewed text."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.gui.operator.servo_health import Forces, ServoHealth
+from study_app.gui.settings.display_test import FrameTimes
+from study_app.gui.widgets.live_plots import lateness_histogram
+from study_app.haptics.model.layout import (
+    LIMITER_FADE,
+    LIMITER_NORM,
+    LIMITER_SLEW,
+    LIMITER_SLOPE,
+    LIMITER_STOP,
+    SAMPLE,
+    records,
+)
+from tests.golden import compare
+from tests.golden_values import value_lines
+
+MS = 1_000_000
+REFRESH_NS = 16_666_667
+
+
+def samples(count: int, *, first: int = 0, period_ns: int = MS, **fields: Any) -> Any:
+    made = records(SAMPLE, count)
+    made.tick = np.arange(first, first + count)
+    made.time_ns = made.tick * period_ns
+    for name, value in ({"scene": 1, "lateness_ns": 15_000} | fields).items():
+        setattr(made, name, value)
+    return made
+
+
+def ends(name: str, values: Any) -> str:
+    """Return how many values there are, the first, the last and the mean, and whether they rise."""
+    values = np.asarray(values)
+    rises = "rise" if (np.diff(values, axis=0) > 0).all() else "do not rise"
+    return f"{name}: {len(values)} {rises}, {values[0]} to {values[-1]}, mean {values.mean(axis=0)}"
+
+
+def of_health(health: ServoHealth, now_s: float = 0.0) -> Iterator[str]:
+    yield from value_lines(health.vitals())
+    if health.vitals().ticks:
+        edges, counts = lateness_histogram(health.latenesses_us)
+        yield f"histogram: {counts.sum()} from {edges[0]} to {edges[-1]}"
+        yield ends("sorted latenesses", np.sort(health.lateness_ns))
+    if now_s:
+        yield from (ends(*one) for one in zip(("times", "places"), health.trace(now_s), strict=True))
+
+
+def healths() -> Iterator[str]:
+    for name, rate_hz, batches in (
+        ("800 ticks a second", 1000.0, [samples(2500, period_ns=1_250_000)]),
+        (
+            "a minute in odd batches after a late second",
+            1000.0,
+            [
+                samples(1000, lateness_ns=9_000_000),
+                *(samples(777, first=first, lateness_ns=20_000) for first in range(1000, 61_000, 777)),
+            ],
+        ),
+        ("a batch longer than what is kept", 10.0, [samples(5000, lateness_ns=np.arange(5000))]),
+        ("far apart", 1000.0, [samples(3000, lateness_ns=np.random.default_rng(1).integers(-500, 80_000_000, 3000))]),
+    ):
+        health = ServoHealth(rate_hz)
+        for batch in batches:
+            health.take(batch)
+        yield from (f"== {name}", *of_health(health))
+    for name, gaps_ms in (("frames missed", (16, 17, 24, 26, 51, 2)), ("a page between", (0, 16))):
+        health, at_ns = ServoHealth(1000.0, refresh_hz=60.0), 1
+        for gap_ms in gaps_ms:
+            health.frame(at_ns)
+            at_ns += gap_ms * MS
+            if gap_ms == 0:
+                health.frames_rest()
+                at_ns = 60_000_000_000
+        health.frame(at_ns)
+        yield from (f"== {name}", *of_health(health))
+    for step in range(1600):
+        health.hand(step * 0.0213, (step, 0.0, 0.0))
+    yield from ("== a hand", *of_health(health, 1600 * 0.0213))
+
+
+def forces() -> Iterator[str]:
+    plays: dict[str, list[Any]] = {
+        "shares of the limit": [
+            samples(100, device_force_n=(0.0, 4.5, 0.0)),
+            samples(100, first=100, device_force_n=(1.5, 0.0, 0.0)),
+            samples(100, first=200, scene=0),
+            samples(100, first=300, scene=2, device_force_n=(0.6, 0.0, 0.0), wake_mps=(0.3, 0.0, -0.4)),
+        ],
+        "limiters of a trial": [
+            samples(500, limiters=LIMITER_FADE, permitted_n=4.0, withheld_n=0.25),
+            samples(30, first=500, limiters=LIMITER_SLOPE | LIMITER_SLEW),
+            samples(5, first=530, limiters=LIMITER_NORM | LIMITER_STOP),
+            samples(20, first=535, limiters=LIMITER_NORM, scene=np.where(np.arange(20) < 12, 1, 2)),
+        ],
+        "longer than the plot": [samples(613, first=first) for first in range(0, 31_000, 613)],
+    }
+    for name, batches in plays.items():
+        it, end = Forces(6.0), 0
+        yield f"== {name}"
+        for batch in batches if len(batches) < 9 else [batches]:
+            for part in batch if isinstance(batch, list) else [batch]:
+                it.take(part)
+                end = int(part.time_ns[-1]) + MS
+            yield from value_lines(it.figures())
+        yield from (ends(*one) for one in zip(("times", "forces", "wakes"), it.trace(end), strict=True))
+
+
+def frame_times() -> Iterator[str]:
+    even = [number * REFRESH_NS for number in range(240)]
+    gaps_ms = [16] * 297 + [30] * 2 + [200]
+    for name, times_ns in (
+        ("too few", even[:20]),
+        ("even", even),
+        ("three refreshes once", even[:120] + [even[119] + (3 + number) * REFRESH_NS for number in range(120)]),
+        ("every second one", even[::2]),
+        ("one far longer", list(np.cumsum([0, *gaps_ms]) * MS)),
+        ("longer than is kept", [number * REFRESH_NS for number in range(1800)]),
+    ):
+        frames = FrameTimes(60.0)
+        for time_ns in times_ns:
+            frames.add(int(time_ns))
+        yield from (f"== {name}", *value_lines(frames.figures()))
+
+
+@pytest.mark.parametrize("of", [healths, forces, frame_times], ids=lambda of: of.__name__)
+def test_figures_are_the_reviewed_ones(of: Any, pytestconfig: pytest.Config) -> None:
+    compare(Path(__file__).parent / "golden" / f"figures_of_{of.__name__}.txt", of(), pytestconfig)
+
+
+def test_a_peak_of_one_tick_is_not_missed_however_it_came_in() -> None:
+    pushed = samples(4000, device_force_n=(0.1, 0.0, 0.0))
+    pushed.device_force_n[1234] = (0.0, -7.5, 0.0)
+    traces = []
+    for batch in (4000, 17, 16, 1):
+        forces = Forces(8.0)
+        for first in range(0, 4000, batch):
+            forces.take(pushed[first : first + batch])
+        traces.append(np.column_stack(forces.trace(4000 * MS)))
+    assert all(np.array_equal(one, other) for one, other in pairwise(traces))
+    (peak,) = traces[0][traces[0][:, 4] == 7.5]
+    assert peak[:5].tolist() == [pytest.approx(-(4000 - 1234) / 1000, abs=0.02), 0.0, -7.5, 0.0, 7.5]
