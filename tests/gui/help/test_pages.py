@@ -34,6 +34,7 @@ ASKED = [
     # A researcher, after five participants
     ("A word in a question is wrong.", "typo after five participants", "designer", "proposes the next version"),
     ("There is a new version: take it?", "update in the middle of a study", "year", "Do not update if you can stay."),
+    ("May questions come in any order?", "shuffled questions", "questions", "`shuffled`: drawn each time"),
     # An assistant, with a participant in the room
     (
         "The tank is on my screen, not on theirs.",
@@ -41,6 +42,7 @@ ASKED = [
         "this-machine",
         "the participant's screen",
     ),
+    ("I see no taskbar any more.", "not full screen", "run-a-session", "On a single screen use `--windowed`"),
     ("I typed P12 instead of P21.", "wrong participant number", "run-a-session", "A wrong participant ID"),
     ("She has to go to the toilet.", "participant needs a break", "run-a-session", "P pauses"),
     ("The power failed.", "power cut during a trial", "run-a-session", "No answer is lost."),
@@ -48,6 +50,7 @@ ASKED = [
     ("He comes again.", "second session same participant", "run-a-session", "enter the same ID and *Session* 2"),
     # An analyst, with a folder of results
     ("Where are reaction times?", "reaction time", "level-results", "time to answer"),
+    ("How do I leave one trial out?", "exclude one trial", "commands", "Only this trial; default: the whole session"),
     ("How do I read recordings?", "open recordings in matlab", "export", "`parquetread` in MATLAB"),
     ("Are p-values corrected?", "multiple comparisons", "statistics", "Holm over the statements"),
     (
