@@ -1,6 +1,7 @@
 """Where an interrupted session goes on, for every line its journal may end with, and what it then presents."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,182 +14,92 @@ from study_app.cli import commands
 from study_app.errors import SessionError
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import PageStep, Schedule, Trial, build_schedule
+from study_app.protocol.orders.schedule import Schedule, build_schedule
 from study_app.protocol.source.files import protocol_hash, source_bytes
 from study_app.session.pages import PausePage
 from study_app.session.resume import REHEARSED_SCREENS, begun_schedule, find_protocol, is_rehearsal, resume_at
 from study_app.session.start import NewSession, check, open_store, resumed
-from study_app.session.transitions.events import Begin, FadeIn, ResumeRequested, ShowPage, StartTrial, Write
-from study_app.session.transitions.state import Phase, SessionState
+from study_app.session.transitions.events import Begin, ResumeRequested, ShowPage, StartTrial, Write
+from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import advance, open_session
 from study_app.store.journals import journal
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
+from tests import golden
 from tests.journal_lines import event_from, event_of
 from tests.session import small
 
 STARTED = {"event": "session_started", "t_s": 0.0}
 
 
-def study(resume: str = "trial") -> Protocol:
-    return Protocol.model_validate(small.TABLES | {"study": small.TABLES["study"] | {"resume": resume}})
+def study(resume: str, *, breaks: bool = False) -> Protocol:
+    tables = small.TABLES | {"study": small.TABLES["study"] | {"resume": resume}}
+    if breaks:
+        rest = {"kind": "break", "title": "Rest", "body": "Breathe."}
+        feeling = tables["blocks"]["feeling"] | {"break_every": 1, "break_page": "rest"}
+        tables |= {"pages": tables["pages"] | {"rest": rest}, "blocks": tables["blocks"] | {"feeling": feeling}}
+    return Protocol.model_validate(tables)
 
 
-def told(until: int) -> tuple[SessionState, list[dict[str, Any]]]:
-    """Walk through a whole session; return the state and the journal when ``until`` lines were written, or all."""
-    state = small.opened()
-    lines: list[dict[str, Any]] = [STARTED]
-    at_s = 0.0
-    while state.phase is not Phase.COMPLETE:
-        state, commands = advance(state, small.next_event(state, at_s))
-        at_s += 1.0
+def walked(protocol: Protocol, lines: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[str]]:
+    """Resume after these lines and walk to the end; return the lines written and what was presented."""
+    schedule, key = build_schedule(protocol, "P001", 1), small.opened().plan.key
+    state = open_session(protocol, schedule, key, "en", resume_at(protocol, schedule, map(event_from, lines)))
+    written, presented = [], []
+    event: Any = Begin(100.0)
+    while True:
+        state, commands = advance(state, event)
         for command in commands:
-            if isinstance(command, Write):
-                lines.append({"event": command.line.event, "t_s": at_s, **command.line.fields()})
-                if len(lines) == until:
-                    return state, lines
-    return state, lines
+            match command:
+                case Write(line=line):
+                    written.append({"event": line.event, "t_s": event.at_s, **line.fields()})
+                    presented += [line.fields()["page"]] if line.event == "page_shown" else []
+                case StartTrial(trial=trial, attempt=attempt):
+                    presented.append(f"{state.trial.block} {trial}/{attempt}")
+                case ShowPage(page=PausePage(force_off=force_off)):
+                    presented.append("waits without force" if force_off else "waits")
+        if state.phase is Phase.COMPLETE:
+            return written, presented
+        at_s = event.at_s + 1.0
+        paused = state.phase is Phase.PAUSED
+        event = ResumeRequested(at_s, "participant") if paused else small.next_event(state, at_s)
 
 
-LINES = len(told(-1)[1])
+def where(lines: list[dict[str, Any]], first: int, *, breaks: bool = False) -> Iterator[str]:
+    """Yield each line of a journal and, where it has changed, what is presented if the journal ends there."""
+    before = None
+    for count in range(first, len(lines) + 1):
+        line = lines[count - 1]
+        said = (str(line[name]) for name in ("event", "page", "trial", "item") if line.get(name) is not None)
+        yield " ".join(said)
+        found = [walked(study(resume, breaks=breaks), lines[:count])[1] for resume in ("trial", "block")]
+        if found != before:
+            for resume, then in zip(("trial", "block"), found, strict=True):
+                yield f"    by {resume}: {', '.join(then) or 'nothing'}"
+        before = found
 
 
-def opened_again(resume: str, lines: list[dict[str, Any]]) -> tuple[SessionState, tuple[Any, ...]]:
-    """Resume and begin; return the state and the commands."""
-    plan = small.opened().plan
-    protocol = study(resume)
-    start = resume_at(protocol, plan.schedule, map(event_from, lines))
-    state = open_session(protocol, plan.schedule, plan.key, "en", start)
-    return advance(state, Begin(100.0))
+def test_where_it_goes_on_for_every_last_line(pytestconfig: pytest.Config) -> None:
+    def told() -> Iterator[str]:
+        lines = [STARTED, *walked(study("block"), [STARTED])[0]]
+        yield "=== a session"
+        yield from where(lines, 1)
+        yield "=== a session with breaks within a block"
+        yield from where([STARTED, *walked(study("block", breaks=True), [STARTED])[0]], 1, breaks=True)
+        yield "=== a session that went on by block after the first choice about its third trial"
+        cut = next(n for n, line in enumerate(lines) if line["event"] == "choice" and line["trial"] == 3)
+        again = [*lines[: cut + 1], {"event": "session_resumed", "t_s": 100.0}]
+        yield from where([*again, *walked(study("block"), again)[0]], len(again))
 
-
-def begun(resume: str, lines: list[dict[str, Any]]) -> tuple[SessionState, tuple[Any, ...]]:
-    """Resume, begin, and be ready where a trial waits for that; return the state and the commands since."""
-    state, commands = opened_again(resume, lines)
-    return advance(state, ResumeRequested(101.0, "participant")) if state.phase is Phase.PAUSED else (state, commands)
-
-
-@pytest.mark.parametrize("resume", ["trial", "block"])
-@pytest.mark.parametrize("count", range(1, LINES + 1))
-def test_no_trial_begins_before_somebody_is_ready_for_it(count: int, resume: str) -> None:
-    _, lines = told(count)
-    state, commands = opened_again(resume, lines)
-    assert not any(isinstance(command, StartTrial | FadeIn) for command in commands)
-    assert isinstance(commands[-1], ShowPage)
-    if isinstance(state.step, Trial):
-        assert commands[-1] == ShowPage(PausePage(force_off=False))
-        assert commands[0] == Write(event_of("paused", by="program"))
-        state, commands = begun(resume, lines)
-        (start,) = [command for command in commands if isinstance(command, StartTrial)]
-        assert (start.trial, start.attempt, state.attempt) == (state.trial.number, state.attempt, start.attempt)
-        assert start.attempt >= 1
-    else:
-        assert state.phase in {Phase.READING, Phase.COMPLETE}
-
-
-@pytest.mark.parametrize("count", range(1, LINES + 1))
-def test_whatever_the_last_line_nothing_confirmed_is_asked_again_and_nothing_is_passed_over(count: int) -> None:
-    _, lines = told(count)
-    state, commands = begun("trial", lines)
-    steps = state.plan.schedule.steps
-    left = {line["page"] for line in lines if line["event"] == "page_left"}
-    answered = {line["trial"] for line in lines if line["event"] == "responses"}
-    silent = {step.number for step in steps if isinstance(step, Trial) and step.block in {"practice", "baseline"}}
-    done = {line["trial"] for line in lines if line["event"] == "trial_ended"} & silent
-    over = [step.page_id in left if isinstance(step, PageStep) else step.number in answered | done for step in steps]
-    assert state.index == over.index(False) if False in over else state.phase is Phase.COMPLETE
-    started = [command for command in commands if isinstance(command, StartTrial)]
-    before = [line["trial"] for line in lines if line["event"] == "trial_started"]
-    for command in started:
-        assert command.attempt == before.count(command.trial) + 1
-    assert isinstance(commands[-1], ShowPage)
-
-
-@pytest.mark.parametrize("count", range(1, LINES + 1))
-def test_by_block_it_goes_back_to_the_block_that_was_under_way(count: int) -> None:
-    _, lines = told(count)
-    by_trial, _ = begun("trial", lines)
-    by_block, commands = begun("block", lines)
-    step = by_trial.step
-    if not isinstance(step, Trial):
-        assert by_block.index == by_trial.index
-        return
-    first = by_block.step
-    assert isinstance(first, Trial)
-    assert (first.block, first.index) == (step.block, 1)
-    before = [line["trial"] for line in lines if line["event"] == "trial_started"]
-    (start,) = [command for command in commands if isinstance(command, StartTrial)]
-    assert start.attempt == before.count(first.number) + 1
-    assert by_block.plan.schedule == by_trial.plan.schedule
-
-
-def test_later_trials_of_a_block_that_is_presented_again_count_their_attempts_too() -> None:
-    _, lines = told(-1)
-    cut = max(n for n, line in enumerate(lines) if line["event"] == "choice" and line["trial"] == 3)
-    state, _ = begun("block", lines[:cut])
-    state = small.walk(state, Phase.TASK)
-    assert (state.trial.number, state.attempt) == (3, 2)
-    state = small.walk(state, Phase.TASK)
-    assert (state.trial.number, state.attempt) == (4, 1)
-
-
-def test_a_session_that_goes_on_by_block_goes_on_again_after_the_next_interruption() -> None:
-    _, lines = told(-1)
-    cut = max(n for n, line in enumerate(lines) if line["event"] == "choice" and line["trial"] == 3)
-    lines = [*lines[:cut], {"event": "session_resumed", "t_s": 100.0}]
-    protocol, presented = small.protocol(), {}
-    again = Protocol.model_validate(small.TABLES | {"study": small.TABLES["study"] | {"resume": "block"}})
-    schedule = build_schedule(again, "P001", 1)
-    for trial in (2, 3):
-        which = {"t_s": 101.0, "trial": trial, "attempt": 2}
-        lines.append({"event": "trial_started", **which})
-        presented[trial] = 2
-        start = resume_at(again, schedule, map(event_from, lines))
-        first = schedule.steps[start.step]
-        assert isinstance(first, Trial)
-        assert (first.block, first.index) == ("feeling", 1)
-        assert {number: start.presented[number] for number in presented} == presented
-        by_trial = resume_at(protocol, schedule, map(event_from, lines))
-        here = schedule.steps[by_trial.step]
-        assert isinstance(here, Trial)
-        assert here.number == trial
-        lines.append({"event": "trial_ended", **which, "outcome": "complete"})
-        lines.append({"event": "responses", **which, "items": []})
-
-
-def test_a_break_within_a_block_belongs_to_it() -> None:
-    tables = small.TABLES | {
-        "pages": small.TABLES["pages"] | {"rest": {"kind": "break", "title": "Rest", "body": "Breathe."}},
-        "study": small.TABLES["study"] | {"resume": "block"},
-    }
-    tables["blocks"] = tables["blocks"] | {
-        "feeling": tables["blocks"]["feeling"] | {"break_every": 1, "break_page": "rest"}
-    }
-    protocol = Protocol.model_validate(tables)
-    schedule = build_schedule(protocol, "P001", 1)
-    pause = next(n for n, step in enumerate(schedule.steps) if step == PageStep("rest"))
-    lines: list[dict[str, Any]] = [STARTED]
-    for step in schedule.steps[:pause]:
-        if isinstance(step, PageStep):
-            lines += [{"event": name, "t_s": 1.0, "page": step.page_id} for name in ("page_shown", "page_left")]
-        else:
-            which = {"t_s": 1.0, "trial": step.number, "attempt": 1}
-            lines.append({"event": "trial_started", **which})
-            lines.append({"event": "trial_ended", **which, "outcome": "complete"})
-            lines += [{"event": "responses", **which, "items": []}] if step.block == "feeling" else []
-    lines.append({"event": "page_shown", "t_s": 2.0, "page": "rest"})
-    start = resume_at(protocol, schedule, map(event_from, lines))
-    first = schedule.steps[start.step]
-    assert isinstance(first, Trial)
-    assert (first.block, first.index) == ("feeling", 1)
+    golden.compare(Path(__file__).parent / "golden" / "resume.txt", told(), pytestconfig)
 
 
 def test_a_journal_of_another_order_is_refused() -> None:
     plan = small.opened().plan
     lines = [event_from(STARTED), event_of("trial_started", t_s=1.0, trial=3, attempt=1)]
     with pytest.raises(SessionError, match="does not follow the order"):
-        resume_at(study(), plan.schedule, lines)
+        resume_at(study("trial"), plan.schedule, lines)
 
 
 def began(study: str, protocol_hash: str = "0") -> Any:
