@@ -11,41 +11,17 @@ import psutil
 import pytest
 
 from study_app.cli import main
-from study_app.errors import StudyError, WorkerError
+from study_app.errors import WorkerError
 from study_app.workers import cases
 from study_app.workers.cases import environment
 from study_app.workers.executors import Workers, open_executor
 from tests.strangers import CLOSE, Answer, dripped, flooded, sent, serving
 from tests.workers.local_cluster import INSTALLED, MISSING, local_cluster
-from tests.workers.worker_cases import draw, killed_once, refuse
+from tests.workers.worker_cases import draw, killed_once
 
 pytestmark = pytest.mark.slow
 needs_distributed = pytest.mark.skipif(not INSTALLED, reason=MISSING)
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-
-
-@needs_distributed
-def test_results_are_those_of_the_seeds_in_their_order_and_an_error_is_that_of_its_case(dask_cluster: str) -> None:
-    with open_executor(Workers(cluster=dask_cluster)) as executor:
-        assert list(executor.map(draw, range(50))) == [draw(seed) for seed in range(50)]
-        futures = [executor.submit(refuse, case) for case in range(6)]
-        with pytest.raises(StudyError, match="case 3"):
-            futures[3].result()
-        assert [future.result() for future in futures[:3]] == [0, 1, 2]
-
-
-@needs_distributed
-def test_an_exception_cancels_the_cases_that_have_not_finished(dask_cluster: str) -> None:
-    def interrupted() -> None:
-        with open_executor(Workers(cluster=dask_cluster)) as executor:
-            waiting.extend(executor.submit(draw, seed) for seed in range(300))
-            raise KeyboardInterrupt
-
-    waiting: list[object] = []
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert all(future.done() for future in waiting)  # type: ignore[attr-defined]
-    assert any(future.cancelled() for future in waiting)  # type: ignore[attr-defined]
 
 
 @pytest.mark.nightly

@@ -27,11 +27,27 @@ SOON_S = 60.0
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 
-@pytest.mark.parametrize("workers", [1, 2, None])
-def test_results_are_those_of_the_seeds_in_their_order(workers: int | None) -> None:
-    with open_executor(Workers(workers)) as executor:
+@pytest.fixture(params=[1, 2, None, "cluster"])
+def workers(request: pytest.FixtureRequest) -> Workers:
+    if request.param != "cluster":
+        return Workers(request.param)
+    return Workers(cluster=request.getfixturevalue("dask_cluster"))
+
+
+def test_results_are_those_of_the_seeds_in_their_order_and_an_error_is_that_of_its_case(workers: Workers) -> None:
+    with open_executor(workers) as executor:
         assert isinstance(executor, Executor)
         assert list(executor.map(draw, range(20))) == [draw(seed) for seed in range(20)]
+        futures = [executor.submit(refuse, case) for case in range(6)]
+        with pytest.raises(StudyError, match="case 3"):
+            futures[3].result()
+        assert [future.result() for future in futures[:3]] == [0, 1, 2]
+        with pytest.raises(ProtocolError, match=r"a\.toml: 1 problem\n  line 7: blocks\.b: is unknown") as refused:
+            executor.submit(refuse_file, 7).result()
+        assert refused.value.problems == (Problem("blocks.b", "is unknown", 7, "did you mean c?"),)
+        assert executor.submit(draw, 1).result() == draw(1)
+    with pytest.raises(Exception if workers.cluster else RuntimeError, match=r"shutdown|Client is closed"):
+        executor.submit(draw, 1)
 
 
 def test_a_process_loads_no_window_library_and_computes_in_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,33 +85,22 @@ def test_a_process_that_cannot_be_started_is_one_clear_line(monkeypatch: pytest.
         executor.submit(draw, 1).result()
 
 
-def test_an_error_of_a_case_is_raised_where_its_result_is_asked_for() -> None:
-    with open_executor(Workers(2)) as executor:
-        futures = [executor.submit(refuse, case) for case in range(6)]
-        with pytest.raises(StudyError, match="case 3"):
-            futures[3].result()
-        assert [future.result() for future in futures[:3]] == [0, 1, 2]
-        with pytest.raises(ProtocolError, match=r"a\.toml: 1 problem\n  line 7: blocks\.b: is unknown") as refused:
-            executor.submit(refuse_file, 7).result()
-        assert refused.value.problems == (Problem("blocks.b", "is unknown", 7, "did you mean c?"),)
-        assert executor.submit(draw, 1).result() == draw(1)
-    with pytest.raises(RuntimeError, match="shutdown"):
-        executor.submit(draw, 1)
-
-
-def test_an_exception_cancels_the_cases_that_have_not_finished() -> None:
+@pytest.mark.parametrize("workers", [1, "cluster"], indirect=True)
+def test_an_exception_cancels_the_cases_that_have_not_finished(workers: Workers) -> None:
     waiting: list[Future[float]] = []
 
     def interrupted() -> None:
-        with open_executor(Workers(1)) as executor:
-            waiting.extend(executor.submit(draw, seed) for seed in range(20_000))
+        with open_executor(workers) as executor:
+            waiting.extend(executor.submit(draw, seed) for seed in range(300 if workers.cluster else 20_000))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
+    finished = []
     for future in waiting:
         with contextlib.suppress(CancelledError, BrokenExecutor):
-            future.result(SOON_S)
+            finished.append(future.result(SOON_S))
+    assert len(finished) < len(waiting)
 
 
 ENDLESS = """
