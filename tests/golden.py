@@ -35,8 +35,12 @@ def compare(
     mask: re.Pattern[str] | None = None,
     rel: float = 1e-5,
     abs_: float = 1e-9,
+    exact: bool = False,
 ) -> None:
-    """Compare lines with a golden file, or write it: what ``mask`` matches is left out, numbers may differ a little."""
+    """Compare lines with a golden file, or write it.
+
+    What ``mask`` matches is left out; numbers may differ a little, or as they are written, unless ``exact``.
+    """
     found = "\n".join(lines).split("\n")
     if mask is not None:
         found = [mask.sub("*", line) for line in found]
@@ -45,7 +49,8 @@ def compare(
         kept.write_text("\n".join(found) + "\n", encoding="utf-8")
     expected = kept.read_text(encoding="utf-8").removesuffix("\n").split("\n")
     pairs = zip_longest(expected, found)
-    if not all(a is not None and b is not None and _alike(a, b, rel, abs_) for a, b in pairs):
+    alike = found == expected if exact else all(None not in pair and _alike(*pair, rel, abs_) for pair in pairs)
+    if not alike:
         different = list(unified_diff(expected, found, n=0, lineterm=""))[2:]
         more = [f"... {len(different) - SHOWN} lines more"] if len(different) > SHOWN else []
         pytest.fail("\n".join([f"{kept}: review, then --regenerate", *different[:SHOWN], *more]), pytrace=False)

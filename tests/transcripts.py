@@ -32,10 +32,26 @@ def value_of(line: str, names: Mapping[str, Any]) -> Any:
                 return names[name](*map(value, arguments), **given)
             case ast.Name(name):
                 return names[name]
+            case ast.List(items):
+                return [*map(value, items)]
             case _:
                 return ast.literal_eval(node)
 
     return value(ast.parse(line, mode="eval").body)
+
+
+def calls(names: Mapping[str, Any], *refusals: type[Exception]) -> Play:
+    """Return what plays calls: each is told with its value, or the words of its refusal."""
+
+    def play(_start: str, lines: list[str]) -> Iterator[str]:
+        for line in lines:
+            yield line
+            try:
+                yield f"> {value_of(line, names)!r}"
+            except refusals as error:
+                yield f"> refused: {error}"
+
+    return play
 
 
 class Files:

@@ -10,7 +10,6 @@ from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.column_dictionary import dictionary_markdown
 from study_app.store.tables.columns import RESPONSES_2
-from study_app.store.tables.csv_files import guarded
 from study_app.store.tables.study_files import check_study, write_description
 
 
@@ -28,11 +27,6 @@ from study_app.store.tables.study_files import check_study, write_description
 )
 def test_a_line_says_kind_unit_range_and_meaning(line: str) -> None:
     assert line in dictionary_markdown().splitlines()
-
-
-@pytest.mark.parametrize("text", ['=HYPERLINK("http://x")', "+1", "-2", "@SUM(1)", "\t=1", "\r=1", "＝1", "'=1"])
-def test_a_formula_has_an_apostrophe_before_it(text: str) -> None:
-    assert guarded(text) == "'" + text
 
 
 def test_the_column_of_kinds_names_every_kind_of_question() -> None:

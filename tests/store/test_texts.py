@@ -1,0 +1,69 @@
+"""Texts and what the store says of them, in files that people review: lines, cells, and settings of a machine."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft7Validator
+
+from study_app.store.journals.journal_events import journal_schema, problem
+from study_app.store.tables.csv_files import Column, guarded, header, problems, read_table
+from study_app.store.workstation import ASIDE, DEFAULTS, MachineSettings, load, load_or_default, save
+from study_app.user_folder import settings_file
+from tests.golden import compare
+from tests.transcripts import calls, played
+
+ALL = {"n": 1, "t_s": 0.0, "at": "2026-03-01T10:00:00.000+01:00"}
+COLUMNS = (
+    Column("name", "text", "A name."),
+    Column("count", "integer", "How many.", minimum=1, maximum=99),
+    Column("speed", "number", "How fast.", "m/s", minimum=0, may_miss=True),
+    Column("real", "flag", "Whether."),
+    Column("level", "text", "Which.", levels=(("low", "little"), ("high", "much")), may_miss=True),
+    Column("at", "time", "When."),
+)
+RIGHT = dict(zip(header(COLUMNS), ("x", "7", "0.5", "true", "low", "2026-03-01T10:00:00.000+01:00"), strict=True))
+
+
+def line(fields: dict[str, Any], **more: Any) -> tuple[str | None, bool]:
+    """Return what is wrong with a line of a journal, and whether the schema refuses it."""
+    return problem(fields | more), any(Draft7Validator(journal_schema()).iter_errors(fields | more))
+
+
+def cell(column: str, text: str) -> tuple[list[str], bool]:
+    """Return the problems of a table, and whether it is read."""
+    wrong = ['"' + value + '"' for value in (RIGHT | {column: text}).values()]
+    table = "".join(f"{','.join(row)}\n" for row in (RIGHT, RIGHT.values(), wrong, wrong)).encode()
+    try:
+        read_table(table, COLUMNS)
+    except ValueError as error:
+        return list(problems(table, COLUMNS)), "is not" not in str(error)
+    return list(problems(table, COLUMNS)), True
+
+
+def settings(content: bytes) -> str:
+    """Return what is said of a file of settings."""
+    settings_file().parent.mkdir(exist_ok=True)
+    settings_file().write_bytes(content)
+    found, said = load_or_default()
+    assert found == DEFAULTS
+    save(MachineSettings(screen="DP-1", theme="dark"))
+    assert load() == MachineSettings(screen="DP-1", theme="dark")
+    assert settings_file().with_name(ASIDE).read_bytes() == content
+    return re.sub(r"\(Expecting .*\)", "(...)", said.replace(str(settings_file()), "FILE"))
+
+
+def screen(*there: str, **chosen: Any) -> int:
+    return MachineSettings(**chosen).screen_among(there)
+
+
+PLAY = calls({"ALL": ALL, "LONG": 999 * "x", **{one.__name__: one for one in (line, cell, guarded, settings, screen)}})
+
+
+@pytest.mark.parametrize("file", sorted((Path(__file__).parent / "texts").iterdir()), ids=lambda file: file.stem)
+def test_what_is_said_of_a_text(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pytestconfig: pytest.Config
+) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
+    compare(file, played(file, PLAY), pytestconfig, exact=True)
