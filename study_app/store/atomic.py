@@ -99,6 +99,24 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True,
     return True
 
 
+def make_folder(path: Path, *, waits: bool = True) -> None:
+    """Create a folder, which several programs may share, with those above it; with ``waits`` flush them to the disk.
+
+    Raises
+    ------
+    StoreError
+        It cannot be made.
+    """
+    path = path.absolute()
+    missing = [level for level in (path, *path.parents) if not is_there(level)]
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        for level in missing if waits else ():
+            sync_folder(level.parent)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+
+
 def copy_folder(folder: Path, to: Path) -> None:
     """Copy a folder with its contents to ``to``, which must not exist, atomically.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, parse_json, temporaries, write_file
+from study_app.store.atomic import append_line, make_folder, parse_json, read_if_there, temporaries, write_file
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.user_folder import data_folder
 
@@ -67,8 +67,8 @@ def save(file: Path, text: str, base: str) -> str:
             with contextlib.suppress(OSError):
                 left.unlink()
         mode = None
-        if target.exists():
-            content, mode = _content(target), target.stat().st_mode & 0o777
+        if (content := read_if_there(target)) is not None:
+            mode = target.stat().st_mode & 0o777
             if content_hash(content) != base:
                 raise ChangedOutsideError(
                     f"{file} was changed by another program: compare it with the edits, then choose"
@@ -97,7 +97,7 @@ def keep_version(file: Path, content: bytes, origin: Origin) -> None:
         return
     line = {"hash": hash_, "origin": origin, "at": datetime.now(UTC).astimezone().isoformat(timespec="seconds")}
     path = _list_file(file)
-    _make_folder(path.parent)
+    make_folder(path.parent, waits=False)
     append_line(path, json.dumps(line).encode() + b"\n")
 
 
@@ -146,7 +146,7 @@ def write_whole(path: Path, content: bytes) -> None:
     StoreError
         It cannot be written.
     """
-    _make_folder(path.parent)
+    make_folder(path.parent, waits=False)
     write_file(path, content)
 
 
@@ -154,7 +154,7 @@ def write_whole(path: Path, content: bytes) -> None:
 def _alone(file: Path) -> Iterator[None]:
     """Let no other program save the file meanwhile."""
     folder = data_folder() / "saving" / file_key(file)
-    _make_folder(folder)
+    make_folder(folder, waits=False)
     try:
         opening = open_alone(folder)
     except StoreError as error:
@@ -163,20 +163,6 @@ def _alone(file: Path) -> Iterator[None]:
         yield
     finally:
         opening.release()
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise StoreError(f"{path} cannot be read: {error.strerror}") from error
-
-
-def _make_folder(path: Path) -> None:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"{path} cannot be made: {error.strerror}") from error
 
 
 def _list_file(file: Path) -> Path:

@@ -16,7 +16,7 @@ from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import unbundled
 from study_app.store import receipt
-from study_app.store.atomic import cannot_write, is_there, sweep_old, sync_folder, temporary_path
+from study_app.store.atomic import cannot_write, is_there, make_folder, sweep_old, sync_folder, temporary_path
 from study_app.store.blinded.allocation import Allocation, allocate, check_session
 from study_app.store.blinded.blinding import Key, open_or_draw_key, reveals, sealed_model
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
@@ -239,18 +239,6 @@ def surroundings(
         **{name: dict(value) for name, value in optional.items() if value is not None},
         **({"plug_ins": used} if used else {}),
     }
-
-
-def make_folder(path: Path) -> None:
-    """Create the study's folder, which several programs may share, and flush it and its parents to the disk."""
-    path = path.absolute()
-    missing = [level for level in (path, *path.parents) if not is_there(level)]
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        for level in missing:
-            sync_folder(level.parent)
-    except OSError as error:
-        raise cannot_write(path, error) from error
 
 
 @dataclass(frozen=True, slots=True)

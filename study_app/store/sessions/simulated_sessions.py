@@ -20,14 +20,14 @@ from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import unbundled
 from study_app.store import receipt
-from study_app.store.atomic import cannot_write, create_folder
+from study_app.store.atomic import create_folder, make_folder
 from study_app.store.blinded.allocation import allocate
 from study_app.store.blinded.blinding import open_or_draw_key, opened_key, reveals, sealed
 from study_app.store.checksums import checksum_bytes, fingerprint, note_fingerprint
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import SessionClock, line_bytes, line_of
 from study_app.store.journals.journal_events import Allocated, Event, SessionEnded, plain, read_event, start_of
-from study_app.store.sessions.begin import SessionStart, check_participant, first_records, make_folder, used_ids
+from study_app.store.sessions.begin import SessionStart, check_participant, first_records, used_ids
 from study_app.store.sessions.folder_lock import Opening, open_alone
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.study_files import check_study, write_description, write_participants
@@ -120,10 +120,7 @@ class SimulatedStudy:
         }
         sums = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
         path = place.folder.path
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise cannot_write(path, error) from error
+        make_folder(path.parent, waits=False)
         if not create_folder(path, {**files, place.folder.checksums.name: checksum_bytes(sums)}, waits=False):
             raise used_ids(self.folder).refusal(place.folder.participant, place.folder.number)
         note_fingerprint(self.folder, place.folder, fingerprint(sums, lines), waits=False)

@@ -153,7 +153,7 @@ def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: p
     keeper.edited("x", (), 0.0)
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "file"))
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(StoreError, match="cannot be made"):
+    with pytest.raises(StoreError, match="a file is where a folder is needed"):
         keeper.write()
     (tmp_path / "file").unlink()
     assert keeper.write()

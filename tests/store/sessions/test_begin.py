@@ -52,7 +52,8 @@ def test_the_entry_of_every_folder_that_is_created_is_flushed(
         flushed.append(path)
         sync_folder(path)
 
-    monkeypatch.setattr("study_app.store.sessions.begin.sync_folder", sync)
+    for module in ("atomic", "sessions.begin"):
+        monkeypatch.setattr(f"study_app.store.{module}.sync_folder", sync)
     results = tmp_path / "results" / "study"
     start(results=results).close()
     created = [results.parent, results, results / "data", results / "data/sub-P007", results / "data/sub-P007/ses-01"]
