@@ -5,6 +5,7 @@ import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -170,6 +171,25 @@ def test_the_sidebar_has_one_width_per_size_of_window_at_every_place(visit: Main
             visit.window.go(name)
             qtbot.wait(1)
             assert (visit.window.size().toTuple(), visit.window.rail.width()) == (size, width), name
+
+
+def test_results_show_what_was_run_last(visit: MainController, monkeypatch: Any) -> None:
+    shown: list[Path] = []
+    monkeypatch.setattr(main_controller, "LiveSession", Held)
+    monkeypatch.setattr(visit, "results_controller", SimpleNamespace(choose=shown.append))
+    visit.window.place("home").session_asked.emit(CHOSEN)
+    assert (shown, visit.live) == ([CHOSEN.results], None)
+
+
+def test_a_place_that_cannot_be_made_is_told_of_once(visit: MainController, monkeypatch: Any) -> None:
+    monkeypatch.setattr("study_app.gui.help.view.HelpPlace", lambda: 1 // 0)
+    for go in (partial(visit.window.go, "help"), visit.show_help):
+        with pytest.raises(ZeroDivisionError) as raised:
+            go()
+        visit.show_bug(raised.value)  # as of a slot
+        shown = [notice for notice in visit.window.findChildren(QDialog) if notice.isVisible()]
+        assert [notice.windowTitle() for notice in shown] == ["“Help” could not be opened"]
+        shown[0].reject()
 
 
 def test_a_mistake_before_the_first_window_leads_home_again(

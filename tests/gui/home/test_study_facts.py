@@ -112,6 +112,7 @@ def test_sessions_are_told_as_they_were_held(tmp_path, pytestconfig):
     start(tmp_path / "rehearsed", "P012", "completed", simulated=True)
     lines += ["== simulated", *told(tmp_path / "rehearsed")]
     stop_at(tmp_path, "P013", 2, screens=dict(REHEARSED_SCREENS))
+    lines += ["== a rehearsal that stopped", *told(tmp_path)]
     lost = {"trial": 1, "attempt": 1, "reason": "the disk is full"}
     for participant, then in (
         ("P020", [("recording_lost", lost), ("device_reconnected", {"device": "mouse", "described": {}})]),

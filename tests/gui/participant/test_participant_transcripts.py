@@ -186,10 +186,13 @@ QUESTIONNAIRES = {
 }  # fmt: skip
 
 
-def filmed(x: float, colour: tuple[int, int, int] | None) -> TankView:
-    pixels = np.zeros((180, 320, 4), np.uint8)
+def filmed(
+    x: float, colour: tuple[int, int, int] | None, number: int = 0, size: tuple[int, int] = (320, 180)
+) -> TankView:
+    width, height = size
+    pixels = np.zeros((height, width, 4), np.uint8)
     pixels[..., :3] = colour or (0, 0, 0)
-    frame = VideoFrame(0, 320, 180, 4 * 320, memoryview(pixels), 0, None, 33_333_333) if colour else None
+    frame = VideoFrame(number, width, height, 4 * width, memoryview(pixels), 0, None, 33_333_333) if colour else None
     return replace(follow_view(x, (0.03, 0.01, 0)), video=frame)
 
 
@@ -227,6 +230,11 @@ TANKS = {
     "video": Case(
         task_page(follow(), video=True), filmed(0.0, (200, 30, 60)), filmed(0.01, (20, 130, 60)), filmed(0.01, None),
         size=NARROW,
+    ),
+    "video of other ratios": Case(
+        task_page(follow(), video=True, overlay=False), filmed(0.0, (20, 130, 60), 0, (400, 40)),
+        filmed(0.0, (20, 130, 60), 1, (40, 400)), filmed(0.0, (200, 30, 60), 2),
+        task_page(follow(), video=True, overlay=False), task_page(follow()), filmed(0.0, None), size=NARROW,
     ),
     "video without an overlay": Case(task_page(follow(), video=True, overlay=False), filmed(0.0, (200, 30, 60)),
         size=NARROW),
