@@ -7,7 +7,8 @@ import numpy as np
 from study_app.protocol.load import load
 from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, ShowIf, SliderView, TextView
 from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
-from study_app.session.pages import Progress, QuestionnairePage, TaskPage, TextPage
+from study_app.protocol.wording.languages import words
+from study_app.session.pages import ChoicePage, NumberPage, Progress, QuestionnairePage, TaskPage, TextPage
 from study_app.session.tasks import TankView, TaskView
 
 THESIS = load("rek2024")
@@ -64,6 +65,22 @@ def questionnaire(statements: tuple[str, ...] = STATEMENTS, **changed: Any) -> Q
         "progress": Progress(1, 2, "Liquid setting 1", 1, 3),
     }
     return QuestionnairePage(**(fields | changed))
+
+
+ORDINALS = ("first", "second", "third", "fourth")
+SOME = Progress(1, 1, "Pair 57", 57, 220, at_most=True)
+
+
+def choice(count: int = 2, language: str = "en") -> ChoicePage:
+    said = words(language)
+    options = tuple((name, said.design_answers[name]) for name in ORDINALS[:count])
+    return ChoicePage(1, ChoiceView("choice", 1, said.design_questions["forced_choice"], True, options=options), SOME)
+
+
+def number(language: str = "en") -> NumberPage:
+    said = words(language)
+    text = f"{said.modulus.format(number=10)} {said.design_questions['estimation']}"
+    return NumberPage(1, NumberView("strength", 1, text, True, least=1e-9), SOME)
 
 
 def reach(**changed: Any) -> Reach:

@@ -3,43 +3,27 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QImage, QKeyEvent, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel, QLineEdit, QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.participant.intervals.answer_page import STEP_MS
 from study_app.gui.participant.window import PointerCapture
-from study_app.protocol.questions import ChoiceView, NumberView
 from study_app.protocol.wording.languages import LANGUAGES, words
-from study_app.session.pages import ChoicePage, FeedbackPage, Interval, NumberPage, Progress, TaskPage
+from study_app.session.pages import Interval, TaskPage
 from study_app.session.transitions.events import Continue, PauseRequested, Stepped, Submitted
 from tests.gui.participant.driver import KEY, Participant
-from tests.gui.small import follow, task_page, view
+from tests.gui.small import ORDINALS, choice, follow, number, task_page, view
 
 Opening = Callable[..., Participant]
 FULL, SMALL = (1366, 768), (1024, 640)
-ORDINALS = ("first", "second", "third", "fourth")
-SOME = Progress(1, 1, "Pair 57", 57, 220, at_most=True)
 QUESTION = "Adjust the second one until both are equally strong."
 NONE = Qt.KeyboardModifier.NoModifier
-
-
-def choice(count: int = 2, language: str = "en") -> ChoicePage:
-    said = words(language)
-    options = tuple((name, said.design_answers[name]) for name in ORDINALS[:count])
-    return ChoicePage(1, ChoiceView("choice", 1, said.design_questions["forced_choice"], True, options=options), SOME)
-
-
-def number(language: str = "en") -> NumberPage:
-    said = words(language)
-    text = f"{said.modulus.format(number=10)} {said.design_questions['estimation']}"
-    return NumberPage(1, NumberView("strength", 1, text, True, least=1e-9), SOME)
 
 
 def values(seen: Participant) -> list[Any]:
@@ -81,32 +65,6 @@ def test_a_number_above_0_is_taken_and_anything_else_is_reported(opening: Openin
     if not taken:
         seen.type("4")
         assert "Enter a number above 0." not in seen.texts
-
-
-@pytest.mark.parametrize("language", LANGUAGES)
-@pytest.mark.parametrize(("size", "text_scale"), [(SMALL, 1.0), (SMALL, 2.0), ((1366, 716), 2.0)])
-def test_everything_fits_apart_and_can_be_hit_and_escape_pauses(
-    opening: Opening, language: str, size: tuple[int, int], text_scale: float
-) -> None:
-    seen = opening(None, size, language, text_scale)
-    for asked in (choice(4, language), number(language), FeedbackPage(False)):
-        seen.show(asked)
-        if isinstance(asked, NumberPage):
-            seen.press(KEY.Key_Return)  # what is wrong is reported
-        parts = [one for one in seen.page.findChildren(QWidget) if one.isVisible() and not one.findChildren(QWidget)]
-        places = [QRect(one.mapTo(seen.page, QPoint(0, 0)), one.size()) for one in parts]
-        for one, place in zip(parts, places, strict=True):
-            assert seen.page.rect().contains(place), one
-            if isinstance(one, QLabel) and one.wordWrap():
-                assert one.height() >= one.heightForWidth(one.width()) - 1, one.text()
-            elif isinstance(one, QLabel):
-                assert one.width() >= one.sizeHint().width(), one.text()
-            if isinstance(one, QAbstractButton | QLineEdit):
-                assert min(place.width(), place.height()) >= 44
-        for one, other in combinations(places, 2):
-            assert not one.intersects(other)
-        seen.press(KEY.Key_Escape)
-        assert (seen.kinds[-1], seen.told[-1].by) == (PauseRequested, "participant")
 
 
 def interval(*, adjusts: bool = False, language: str = "en", resting: bool = False) -> TaskPage:
