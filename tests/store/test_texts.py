@@ -1,4 +1,4 @@
-"""Texts and what the store says of them, in files that people review: lines, cells, and settings of a machine."""
+"""Texts and what the store says of them, in files that people review: lines, cells, words that tell, settings."""
 
 import re
 from pathlib import Path
@@ -7,8 +7,12 @@ from typing import Any
 import pytest
 from jsonschema import Draft7Validator
 
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
 from study_app.store.journals.journal_events import journal_schema, problem
+from study_app.store.sessions.begin import check_participant
 from study_app.store.tables.csv_files import Column, guarded, header, problems, read_table
+from study_app.store.verification.leaks import telltales
 from study_app.store.workstation import ASIDE, DEFAULTS, MachineSettings, load, load_or_default, save
 from study_app.user_folder import settings_file
 from tests.golden import compare
@@ -58,12 +62,14 @@ def screen(*there: str, **chosen: Any) -> int:
     return MachineSettings(**chosen).screen_among(there)
 
 
-PLAY = calls({"ALL": ALL, "LONG": 999 * "x", **{one.__name__: one for one in (line, cell, guarded, settings, screen)}})
+NAMES = {"ALL": ALL, "LONG": 999 * "x"}
+NAMES |= {one.__name__: one for one in (line, cell, guarded, settings, screen, check_participant)}
 
 
 @pytest.mark.parametrize("file", sorted((Path(__file__).parent / "texts").iterdir()), ids=lambda file: file.stem)
 def test_what_is_said_of_a_text(
-    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pytestconfig: pytest.Config
+    file: Path, protocol: Protocol, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pytestconfig: pytest.Config
 ) -> None:
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
-    compare(file, played(file, PLAY), pytestconfig, exact=True)
+    play = calls(NAMES | {"in_text": telltales(protocol).in_text}, StoreError)
+    compare(file, played(file, play), pytestconfig, exact=True)

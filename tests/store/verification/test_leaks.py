@@ -19,30 +19,6 @@ def found(folder: Path, protocol: Protocol) -> list[tuple[str, str]]:
     return [(leak.place, leak.word) for leak in find_leaks(folder, telltales(protocol))]
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("Liquid setting 1 of 2", []),
-        ("it is mildew, surely", ["mildew"]),
-        ("mildewed", []),
-        ("like_mildew", []),
-        ("137 ms", ["137"]),
-        ("137.0 ms", ["137.0"]),
-        ("after 137. Then", ["137"]),
-        ("1370 of 5137", []),
-        ("137.25 and 3.137", []),
-        ("0.137s", []),
-        ("0.137 s", ["0.137"]),
-        ("-1013.7", ["1013.7"]),
-        ("liquids.quagmire.density", ["quagmire"]),
-        ("quagmire.csv", ["quagmire"]),
-    ],
-)
-def test_a_word_tells_where_it_stands_by_itself(protocol: Protocol, text: str, told: list[str]) -> None:
-    """In a window's title, a line of a log, an accessible name."""
-    assert telltales(protocol).in_text(text) == told
-
-
 def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, start: Start) -> None:
     store = start(device={"name": "scripted", "rate_hz": 1013.7})
     store.append(journal_events.Note(kind="note", text="this must be mildew, 137 ms"))
