@@ -30,6 +30,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "Liquid Study"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = [("search.js", {"defer": "defer"})]
 html_theme_options = {"show_prev_next": False, "navigation_with_keys": False, "show_nav_level": 2}
 html_show_sourcelink = False
 
