@@ -302,7 +302,7 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
         (QUESTION.replace(' = "toy-plug:toy"', ""), "its kind has no default: give it the value of its Literal"),
         ("Toy = 3", "toy_plug:Toy is not a class that extends Question"),
         (QUESTION.replace("toy-plug:toy", "mood"), "its kind is 'mood': call it 'toy-plug:' and"),
-        (QUESTION.replace("Literal[", "Liberal["), "NameError: name 'Liberal' is not defined"),
+        (QUESTION.replace('"toy_plug:MEASURE"', "LATER"), "NameError: name 'LATER' is not defined"),
         (QUESTION.replace("def problem", "x: slice\n\n        def problem"), "PydanticSchemaGenerationError"),
     ],
 )

@@ -3,6 +3,7 @@
 It draws an ``OperatorView`` and two plots, and says what the operator asks for; it knows no runner and no servo.
 """
 
+import re
 from collections.abc import Callable
 from functools import partial
 from traceback import clear_frames
@@ -130,6 +131,9 @@ class Arrangement(QWidget):
 FULL = QSize(1600, 900)
 LEAST = QSize(1024, 640)
 
+PASSED_ON: Final = re.compile(r"^(Error calling Python override of [\w:]+\(\): )+")
+"""What PySide 6.10 and newer write before the words of an exception that one of Qt's calls passes on."""
+
 
 class OperatorWindow(Themed, QMainWindow):
     """The cockpit.
@@ -220,7 +224,7 @@ class OperatorWindow(Themed, QMainWindow):
     def tell_of_failure(self, error: BaseException) -> None:
         """Say once that a part of the window failed."""
         clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
-        if (what := f"{type(error).__name__}: {error}") not in self._failures:
+        if (what := f"{type(error).__name__}: {PASSED_ON.sub('', str(error))}") not in self._failures:
             self._failures.add(what)
             self.show_message("A part of this window failed", f"{what}. The session continues.")
             self.ask("failed", error)
