@@ -214,6 +214,6 @@ def test_the_website_builds_without_a_warning_or_the_network(tmp_path: Path) -> 
         "commands": "--participants",
         "data-dictionary": "lateness_p99_ms",
         "protocol-format": "breaking_angle_deg",
-        "api": "build_schedule",
+        "api": "study_app.api.open_session",
     }.items():
         assert words_on_it in (tmp_path / "html" / f"{page}.html").read_text(encoding="utf-8")
