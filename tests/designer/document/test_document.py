@@ -245,7 +245,11 @@ def test_save_replaces_the_file_keeps_its_permissions_and_its_previous_content(t
     file.chmod(0o640)
     link.symlink_to(file)
     base = content_hash(b"a = 1\r\n")
+    halves = [file.with_name(f".{name}.0123abcd.tmp") for name in (file.name, "other.toml")]  # of killed programs
+    for half in halves:
+        half.write_text("a =")
     after = save(link, "a = 2\r\n", base)
+    assert [half.exists() for half in halves] == [False, True]
     assert file.read_bytes() == b"a = 2\r\n"
     assert link.is_symlink()
     assert file.stat().st_mode & 0o777 == 0o640
