@@ -32,7 +32,7 @@ WRITING = {
     "report.write_report.sections.of_levels": "texts: findings",
     "report.write_report.r_script": "report.R",
     "report.write_report.motion_csv": "motion.csv",
-    "findings.delays.LowestDelay.section": "lowest delay",
+    "findings.delays.LowestDelay.section": "lowest delay that shows",
     "report.write_report.sections.conduct": "section “How it was run”",
 }
 
