@@ -497,7 +497,7 @@ def meaning(document: Mapping[str, Any], edit: Edit) -> Document:
     if isinstance(edit, Set):
         _check_value(edit.value)
         node = _own(found, parent, makes=True)
-        if isinstance(node, list):
+        if isinstance(node, list) or isinstance(last, int):
             _at(node, last)
         elif not isinstance(node, dict):
             raise Refused(f"{_words(tuple(parent))} is not a table: it has no key {last}")
@@ -528,7 +528,8 @@ def _own(document: Document, path: Iterable[str | int], *, makes: bool = False) 
     """Return what is at a path as the document's own: tables and arrays on the way are copied, the rest is shared."""
     node: Any = document
     for step in path:
-        inner = {} if makes and isinstance(node, dict) and step not in node else _at(node, step)
+        absent = isinstance(node, dict) and isinstance(step, str) and step not in node
+        inner = {} if makes and absent else _at(node, step)
         node[step] = dict(inner) if isinstance(inner, dict) else list(inner) if _is_array(inner) else inner
         node = node[step]
     return node
