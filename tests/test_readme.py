@@ -4,7 +4,9 @@ import re
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from study_app.cli import commands
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import reveal
 from study_app.store.exclusions import exclude
@@ -22,6 +24,11 @@ def test_the_readme_is_short_and_leads_to_every_section() -> None:
     assert len(text.splitlines()) <= LONGEST
     assert text.count("![") == 1
     assert max(len(line) for line in text.splitlines() if not line.startswith(("|", "python3", "!"))) <= 120
+
+
+def test_the_sample_is_sound_and_described_by_this_version() -> None:
+    done = CliRunner().invoke(commands, ["verify", str(ROOT / "results" / "sample-rek2024")])
+    assert (done.output, done.exit_code) == ("12 sessions: sound\n", 0)
 
 
 @pytest.fixture(scope="module")
