@@ -159,9 +159,6 @@ class Registry(Mapping[str, T], Generic[T]):
             name = "" if kind is None else kind.default
             if not re.fullmatch(rf"{begins}[a-z][a-z0-9_]*", str(name)):
                 raise StudyError(f"its kind is {name!r}: call it '{begins}' and small letters, digits or underscores")
-        for attribute in ("place", "row_place") if self._key == "key" else ():
-            if not isinstance(value := getattr(found, attribute), int | float):
-                raise StudyError(f"{place} has the {attribute} {value!r}: give a number")
         if not isinstance(name, str) or not name:
             raise StudyError(f"{place} has no {self._key}: give it one")
         if name in self.own or name in others:

@@ -41,7 +41,7 @@ def value_of(line: str, names: Mapping[str, Any]) -> Any:
 
 
 def calls(names: Mapping[str, Any], *refusals: type[Exception]) -> Play:
-    """Return what plays calls: each is told with its value, or the words of its refusal."""
+    """Return what plays calls: each with its value, or the words of its refusal."""
 
     def play(_start: str, lines: list[str]) -> Iterator[str]:
         for line in lines:
@@ -66,14 +66,14 @@ class Files:
         return {path.relative_to(self.root).as_posix(): path.read_bytes() for path in paths}
 
     def files(self) -> Iterator[str]:
-        """Tell which files differ from what they were."""
+        """Yield which files differ from what they were."""
         now = self._contents()
         yield from (f"gone: {name}" for name in sorted(self.before.keys() - now.keys()))
         yield from (f"new: {name}" for name in sorted(now.keys() - self.before.keys()))
         yield from (f"other: {one}" for one in sorted(now.keys() & self.before.keys()) if now[one] != self.before[one])
 
     def same(self, folder: str, other: str) -> Iterator[str]:
-        """Tell which files of two folders differ."""
+        """Yield which files of two folders differ."""
         one, two = (Files(self.root / name)._contents() for name in (folder, other))
         yield f"{len(one)} files, different: {sorted(name for name in one | two if one.get(name) != two.get(name))}"
 

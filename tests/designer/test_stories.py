@@ -347,7 +347,7 @@ def header(record: Record) -> None:
     record.note("Enter in the list", lambda: QTest.keyClick(box.view(), Qt.Key.Key_Return))
 
 
-def beside(record: Record) -> None:
+def keys_without_a_field(record: Record) -> None:
     """Letters and space do nothing where no field has the keyboard."""
     designer, place = record.designer, record.designer.place
     record.play("@blocks.liquids")
@@ -530,7 +530,7 @@ def new_study(record: Record) -> None:
 
 
 def hypotheses(record: Record) -> None:
-    """A hypothesis is a sentence with choices; a bound that is no number is refused."""
+    """A hypothesis is a sentence with choices; a bound that is not a number is refused."""
     designer, contrasts = record.designer, ("analysis", "contrasts")
     line = lambda: designer.field(*contrasts).lines[0]  # noqa: E731
     record.ask(RetypeFile(FORMAT_2.replace("[limits]", "[analysis]\nparticipants = 11\n\n[limits]")))
@@ -614,7 +614,7 @@ STORIES: tuple[tuple[Callable[[Record], None], str, str], ...] = (
     (fields, FORMAT_2, "place.form"),
     (adaptive, DEMO, "place.form"),
     (header, DEMO, "place.header"),
-    (beside, DEMO, "place.header"),
+    (keys_without_a_field, DEMO, "place.header"),
     (typed_into_the_file, DEMO, "place.form"),
     (unreadable, BROKEN, "place"),
     (repairs, DEMO, "place.problems"),

@@ -325,7 +325,7 @@ def test_what_cannot_be_used_is_a_line_and_hides_no_other(
 
 
 @pytest.mark.parametrize(("name", "value"), [("place", "'first'"), ("row_place", "None")])
-def test_a_finding_whose_place_is_no_number_is_a_line_and_is_left_out(
+def test_a_finding_whose_place_is_not_a_number_is_reported_and_left_out(
     run: Any, site: Path, name: str, value: str
 ) -> None:
     source = f"""
@@ -337,7 +337,7 @@ def test_a_finding_whose_place_is_no_number_is_a_line_and_is_left_out(
     """
     install(site, "toy-plug", "finding", {"toy": "toy_plug:Toy"}, toy_plug=source)
     code, said, _ = run("plugins")
-    assert (code, f"toy: toy_plug:Toy has the {name} {value}: give a number; update" in said) == (3, True)
+    assert (code, f"toy: Toy has the {name} {value}: give a number; update" in said) == (3, True)
     assert "toy" not in {one.key for one in all_findings()}
 
 

@@ -18,6 +18,7 @@ from study_app.analysis.report.html_page import drawn
 from study_app.analysis.results import BlockResult, Failure, Failures, NotTested, Results, Tested, Verdict
 from study_app.analysis.statistics.outcome import DRAWS, Outcome, draws_for, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import DRAWN_UP_TO
+from study_app.errors import StudyError
 from study_app.store.tables.csv_files import Column, optional
 
 T = TypeVar("T")
@@ -381,6 +382,12 @@ class Finding(Generic[R]):
     figure_name: ClassVar[str] = ""
     figure_title: ClassVar[str] = ""
     question: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        for name in ("place", "row_place"):
+            if not isinstance(value := getattr(cls, name), int | float):
+                raise StudyError(f"{cls.__name__} has the {name} {value!r}: give a number")
 
     def __init__(self, found: BlockResult, results: Results, pictures: Mapping[str, Picture] | None = None) -> None:
         self.found = found

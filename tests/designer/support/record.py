@@ -72,7 +72,7 @@ class Record:
     def note(self, name: str, act: Callable[[], Any], *, paints: bool = False, of: QWidget | None = None) -> None:
         """Do something, and note what it changes: in the window, or in a part since the last act of that name.
 
-        Only the form is painted: the cards beside it keep a height that depends on when they are laid out.
+        Only the form is painted: the height of the other cards depends on when they are laid out.
         """
         if QApplication.activePopupWidget() is None and not self.designer.window.isActiveWindow():
             self.designer.window.activateWindow()

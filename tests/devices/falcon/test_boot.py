@@ -38,7 +38,7 @@ GOLDEN = Path(__file__).parent / "golden"
 
 
 class Wrong(PyUsbTransport):
-    """A bridge that does not do all as it is told.
+    """A bridge that disobeys.
 
     ``bauds`` it takes for others; ``fails`` when it writes; of the firmware's bytes it spoils number ``spoils``, and
     after ``ends`` pieces of it the mains adapter is out.

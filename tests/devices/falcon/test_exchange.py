@@ -40,8 +40,8 @@ ANSWERS = {READ_NEW: "new", READ_NOTHING_NEW: "nothing", READ_LOST: "lost"}
 GREAT_N = tuple(20 * np.array(PUSH_N))
 
 
-class Told(Ticks):
-    """Ticks that tell what they do; ``every``: one of so many is told."""
+class Recorded(Ticks):
+    """Ticks that keep what they do as lines: one in ``every``."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -64,9 +64,9 @@ class Told(Ticks):
         if self.taken % self.every == 0:
             flags = [f"{int(packet[FLAGS_AT] - ZERO):04b}" for packet in went]
             vectors = np.round([1e3 * self.position_m, sent_n], 2) + 0.0
-            told = [" ".join(f"{one:.2f}" for one in vector) for vector in vectors]
+            recorded = [" ".join(f"{one:.2f}" for one in vector) for vector in vectors]
             answer = " ".join(ANSWERS[one] for one in answers)
-            self.lines.append(f"{answer} | {' | '.join(told)} | {self.reading[0].buttons} | {' '.join(flags)}")
+            self.lines.append(f"{answer} | {' | '.join(recorded)} | {self.reading[0].buttons} | {' '.join(flags)}")
         return answers
 
     def ticks(self, count: int, *replies: bytes, **how: Any) -> None:
@@ -74,178 +74,178 @@ class Told(Ticks):
             self.tick(*replies, **how)
 
 
-def positions(told: Told) -> None:
-    told.tick()
-    told.tick(reply(SOMEWHERE_M))
-    told.tick()
-    told.bridge.queue.append(MODEM_STATUS + reply(CENTRE_M) + reply(SOMEWHERE_M))  # two
-    told.tick()
-    told.bridge.queue.extend(MODEM_STATUS + part for part in (reply(SOMEWHERE_M)[:9], reply(SOMEWHERE_M)[9:]))
-    told.tick()
-    told.tick(reply()[:14])
-    told.tick(reply(SOMEWHERE_M))
-    told.bridge.queue.extend([MODEM_STATUS, MODEM_STATUS + reply(SOMEWHERE_M)])
-    told.tick()
-    told.tick(reply(), after_ns=30 * MS)  # from before a pause
-    told.tick(reply())
+def positions(recorded: Recorded) -> None:
+    recorded.tick()
+    recorded.tick(reply(SOMEWHERE_M))
+    recorded.tick()
+    recorded.bridge.queue.append(MODEM_STATUS + reply(CENTRE_M) + reply(SOMEWHERE_M))  # two
+    recorded.tick()
+    recorded.bridge.queue.extend(MODEM_STATUS + part for part in (reply(SOMEWHERE_M)[:9], reply(SOMEWHERE_M)[9:]))
+    recorded.tick()
+    recorded.tick(reply()[:14])
+    recorded.tick(reply(SOMEWHERE_M))
+    recorded.bridge.queue.extend([MODEM_STATUS, MODEM_STATUS + reply(SOMEWHERE_M)])
+    recorded.tick()
+    recorded.tick(reply(), after_ns=30 * MS)  # from before a pause
+    recorded.tick(reply())
 
 
-def places_that_cannot_be(told: Told) -> None:
-    told.tick()
-    told.tick(reply(SOMEWHERE_M))
-    told.tick(reply(counts=(4000, -4000, 4000)))  # no pose
+def places_that_cannot_be(recorded: Recorded) -> None:
+    recorded.tick()
+    recorded.tick(reply(SOMEWHERE_M))
+    recorded.tick(reply(counts=(4000, -4000, 4000)))  # no pose
     counts = counts_at(SOMEWHERE_M)
-    told.tick(reply(counts=np.add(counts, [0, 0x40, 0])))  # garbled
-    told.tick(reply(counts=np.add(counts, [1, 0, 0])))
-    told.ticks(2, reply(CENTRE_M))  # a leap that a second reply confirms
+    recorded.tick(reply(counts=np.add(counts, [0, 0x40, 0])))  # garbled
+    recorded.tick(reply(counts=np.add(counts, [1, 0, 0])))
+    recorded.ticks(2, reply(CENTRE_M))  # a leap that a second reply confirms
     for k in range(1, 10):
-        told.tick(reply(counts=counts_at(CENTRE_M) + k * 100))
+        recorded.tick(reply(counts=counts_at(CENTRE_M) + k * 100))
 
 
-def buttons(told: Told) -> None:
-    told.tick()
-    told.tick(reply())
-    told.ticks(2, reply(buttons=0b1000))
+def buttons(recorded: Recorded) -> None:
+    recorded.tick()
+    recorded.tick(reply())
+    recorded.ticks(2, reply(buttons=0b1000))
 
 
-def gate(told: Told) -> None:
-    told.tick(force_n=PUSH_N)
+def gate(recorded: Recorded) -> None:
+    recorded.tick(force_n=PUSH_N)
     for homed in (0b000, 0b011, 0b110, 0b101):
-        told.ticks(3, reply(OUT_M, homed=homed), force_n=PUSH_N)
-    told.ticks(20, reply(), force_n=PUSH_N)
-    told.ticks(3, reply(OUT_M, homed=0b011), force_n=PUSH_N)
-    told.tick(reply(OUT_M), force_n=PUSH_N)  # one garbled packet does not open it
-    told.tick(reply(OUT_M, homed=0b011), force_n=PUSH_N)
-    told.ticks(2, reply(OUT_M), force_n=PUSH_N)
-    told.ticks(3, reply(), force_n=PUSH_N)
-    told.every = 50
-    told.ticks(560, reply(), force_n=PUSH_N)  # it comes in over half a second
-    told.every = 1
-    told.tick(reply(homed=0b011), force_n=PUSH_N)  # one does not close it
-    told.tick(reply(), force_n=PUSH_N)
-    told.ticks(3, reply(homed=0b110), force_n=PUSH_N)
-    told.ticks(5, reply(), force_n=PUSH_N)
-    told.pull_out()
-    told.ticks(3, reply(), force_n=PUSH_N)
+        recorded.ticks(3, reply(OUT_M, homed=homed), force_n=PUSH_N)
+    recorded.ticks(20, reply(), force_n=PUSH_N)
+    recorded.ticks(3, reply(OUT_M, homed=0b011), force_n=PUSH_N)
+    recorded.tick(reply(OUT_M), force_n=PUSH_N)  # one garbled packet does not open it
+    recorded.tick(reply(OUT_M, homed=0b011), force_n=PUSH_N)
+    recorded.ticks(2, reply(OUT_M), force_n=PUSH_N)
+    recorded.ticks(3, reply(), force_n=PUSH_N)
+    recorded.every = 50
+    recorded.ticks(560, reply(), force_n=PUSH_N)  # it comes in over half a second
+    recorded.every = 1
+    recorded.tick(reply(homed=0b011), force_n=PUSH_N)  # one does not close it
+    recorded.tick(reply(), force_n=PUSH_N)
+    recorded.ticks(3, reply(homed=0b110), force_n=PUSH_N)
+    recorded.ticks(5, reply(), force_n=PUSH_N)
+    recorded.pull_out()
+    recorded.ticks(3, reply(), force_n=PUSH_N)
 
 
-def growth(told: Told) -> None:
-    told.open_gate()
-    told.lines.clear()
-    told.ticks(12, reply(), force_n=(5.0, 0.0, 0.0))
-    told.ticks(3, reply(), force_n=(-5.0, 0.0, 0.0))  # falls at once and grows by steps
-    told.ticks(2, reply(), force_n=(-1.0, 0.0, 0.0))
-    told.tick(reply())
+def growth(recorded: Recorded) -> None:
+    recorded.open_gate()
+    recorded.lines.clear()
+    recorded.ticks(12, reply(), force_n=(5.0, 0.0, 0.0))
+    recorded.ticks(3, reply(), force_n=(-5.0, 0.0, 0.0))  # falls at once and grows by steps
+    recorded.ticks(2, reply(), force_n=(-1.0, 0.0, 0.0))
+    recorded.tick(reply())
     for bad in (np.nan, np.inf, 8.1):
-        told.ticks(2, reply(), force_n=(1.0, 2.0, 0.0))
-        told.tick(reply(), force_n=(1.0, bad, 0.0))
-    told.falcon.force_limit_n = np.inf
-    told.every = 20
-    told.ticks(100, reply(SOMEWHERE_M), force_n=GREAT_N)  # more than the motors give keeps its direction
+        recorded.ticks(2, reply(), force_n=(1.0, 2.0, 0.0))
+        recorded.tick(reply(), force_n=(1.0, bad, 0.0))
+    recorded.falcon.force_limit_n = np.inf
+    recorded.every = 20
+    recorded.ticks(100, reply(SOMEWHERE_M), force_n=GREAT_N)  # more than the motors give keeps its direction
 
 
-def braking(told: Told) -> None:
-    told.open_gate()
+def braking(recorded: Recorded) -> None:
+    recorded.open_gate()
     for along in (1.0, -1.0):
-        told.lines.clear()
+        recorded.lines.clear()
         for place in np.arange(40) * 0.3e-3:  # 0.3 m/s
-            told.tick(reply((along * place, 0.0, 0.0)), force_n=(0.0, 0.5, 0.0))
-        told.tick(reply((along * 12e-3, 0.0, 0.0)), force_n=(4.0, 0.5, 0.0))
-        assert abs(told.command[0].sent_n[0] - (GROWTH_N if along > 0 else 4.0)) < 0.05
-        told.ticks(20, reply())
+            recorded.tick(reply((along * place, 0.0, 0.0)), force_n=(0.0, 0.5, 0.0))
+        recorded.tick(reply((along * 12e-3, 0.0, 0.0)), force_n=(4.0, 0.5, 0.0))
+        assert abs(recorded.command[0].sent_n[0] - (GROWTH_N if along > 0 else 4.0)) < 0.05
+        recorded.ticks(20, reply())
 
 
-def errors(told: Told) -> None:
-    told.tick()
+def errors(recorded: Recorded) -> None:
+    recorded.tick()
     for code in (ERROR_IO, ERROR_OVERFLOW):
-        told.bridge.queue.append(code)
-        told.bridge.write_answer = code
-        told.tick()
-        told.bridge.write_answer = 0
-        told.tick()
-        told.tick(reply())
-    told.bridge.write_answer = ERROR_TIMEOUT  # on the way out: no request
-    told.tick()
+        recorded.bridge.queue.append(code)
+        recorded.bridge.write_answer = code
+        recorded.tick()
+        recorded.bridge.write_answer = 0
+        recorded.tick()
+        recorded.tick(reply())
+    recorded.bridge.write_answer = ERROR_TIMEOUT  # on the way out: no request
+    recorded.tick()
 
 
-def packets_that_do_not_go_out(told: Told) -> None:
-    told.open_gate()
-    told.lines.clear()
-    told.tick(reply(), force_n=(0.3, 0.0, 0.0))
-    told.bridge.write_answer = ERROR_TIMEOUT
-    told.ticks(20, reply(), force_n=(5.0, 0.0, 0.0))
-    told.tick(reply())  # nor does an end of force: it is tried again
-    told.bridge.write_answer = 0
-    told.tick(reply(), force_n=(5.0, 0.0, 0.0))
-    assert np.linalg.norm(force_of(told, CENTRE_M)) < 0.3 + GROWTH_N + 0.01
-    told.tick(reply())
-    assert told.torques == [0, 0, 0]
+def packets_that_do_not_go_out(recorded: Recorded) -> None:
+    recorded.open_gate()
+    recorded.lines.clear()
+    recorded.tick(reply(), force_n=(0.3, 0.0, 0.0))
+    recorded.bridge.write_answer = ERROR_TIMEOUT
+    recorded.ticks(20, reply(), force_n=(5.0, 0.0, 0.0))
+    recorded.tick(reply())  # nor does an end of force: it is tried again
+    recorded.bridge.write_answer = 0
+    recorded.tick(reply(), force_n=(5.0, 0.0, 0.0))
+    assert np.linalg.norm(force_of(recorded, CENTRE_M)) < 0.3 + GROWTH_N + 0.01
+    recorded.tick(reply())
+    assert recorded.torques == [0, 0, 0]
 
 
-def unplugged(told: Told) -> None:
-    told.tick()
-    told.bridge.queue.append(ERROR_NO_DEVICE)
-    told.ticks(2)
-    told.tick(reply())
+def unplugged(recorded: Recorded) -> None:
+    recorded.tick()
+    recorded.bridge.queue.append(ERROR_NO_DEVICE)
+    recorded.ticks(2)
+    recorded.tick(reply())
 
 
-def gone_when_written_to(told: Told) -> None:
-    told.tick()
-    told.bridge.write_answer = ERROR_NO_DEVICE
-    told.ticks(2, reply())
+def gone_when_written_to(recorded: Recorded) -> None:
+    recorded.tick()
+    recorded.bridge.write_answer = ERROR_NO_DEVICE
+    recorded.ticks(2, reply())
 
 
-def losses(told: Told) -> None:
-    told.open_gate()
-    told.lines.clear()
+def losses(recorded: Recorded) -> None:
+    recorded.open_gate()
+    recorded.lines.clear()
     waiting = 1
     for tick in range(120):
-        before = len(told.bridge.sent)
-        told.tick(*[reply()] * (waiting if tick % 20 else 0), force_n=PUSH_N)
-        waiting = len(told.bridge.sent) - before
-    runs = "".join(" " if line.startswith("new") else "x" for line in told.lines).split()
+        before = len(recorded.bridge.sent)
+        recorded.tick(*[reply()] * (waiting if tick % 20 else 0), force_n=PUSH_N)
+        waiting = len(recorded.bridge.sent) - before
+    runs = "".join(" " if line.startswith("new") else "x" for line in recorded.lines).split()
     assert max(map(len, runs)) <= 4  # below the 5 ms after which the force would fade
 
 
-def late_replies(told: Told) -> None:
-    told.open_gate()
-    told.lines.clear()
+def late_replies(recorded: Recorded) -> None:
+    recorded.open_gate()
+    recorded.lines.clear()
     pipe = [0] * 10  # how many replies come in so many ticks
     for tick in range(200):
         if tick >= 140:  # when the pipe is quick again, it recovers
             pipe[:] = [sum(pipe)]
-        before = len(told.bridge.sent)
-        told.tick(*[reply(SOMEWHERE_M)] * pipe.pop(0), force_n=PUSH_N)
-        pipe.append(len(told.bridge.sent) - before)
-    assert not any(line.startswith("new") for line in told.lines[10:140])
-    assert all(line.startswith("new") for line in told.lines[-20:])
+        before = len(recorded.bridge.sent)
+        recorded.tick(*[reply(SOMEWHERE_M)] * pipe.pop(0), force_n=PUSH_N)
+        pipe.append(len(recorded.bridge.sent) - before)
+    assert not any(line.startswith("new") for line in recorded.lines[10:140])
+    assert all(line.startswith("new") for line in recorded.lines[-20:])
 
 
-def measurements_of_the_delay(told: Told) -> None:
-    told.open_gate()
+def measurements_of_the_delay(recorded: Recorded) -> None:
+    recorded.open_gate()
     for force_n in ((0.0, 0.0, 0.0), (0.5, -0.25, 1.0)):  # a great change of force is not held back by one
-        told.ticks(20, reply(), force_n=PUSH_N)
-        told.lines.clear()
-        told.falcon.unsure = 1
-        told.ticks(6, reply(), force_n=force_n)
+        recorded.ticks(20, reply(), force_n=PUSH_N)
+        recorded.lines.clear()
+        recorded.falcon.unsure = 1
+        recorded.ticks(6, reply(), force_n=force_n)
     for tick in range(60):  # and is withheld for two ticks at most, seldom, whatever is lost
-        told.tick(*[reply()] * (tick % 3 > 0), force_n=PUSH_N)
-    withheld = "".join("x" if line.endswith("| ") else " " for line in told.lines).split()
+        recorded.tick(*[reply()] * (tick % 3 > 0), force_n=PUSH_N)
+    withheld = "".join("x" if line.endswith("| ") else " " for line in recorded.lines).split()
     assert max(map(len, withheld)) <= 2
 
 
-def swift_hands(told: Told) -> None:
-    told.tick()
+def swift_hands(recorded: Recorded) -> None:
+    recorded.tick()
     for speed_mps in (0.5, 2.0):  # believed though replies are lost
         x, v = -0.035, 0.0
-        told.ticks(3, reply((x, 0.0, 0.0)))
-        told.lines.clear()
-        refused = int(told.falcon.refused)
+        recorded.ticks(3, reply((x, 0.0, 0.0)))
+        recorded.lines.clear()
+        refused = int(recorded.falcon.refused)
         while x < 0.035:
-            told.tick(*[] if told.taken % 7 == 3 else [reply((x, 0.0, 0.0))] * told.falcon.asked)
+            recorded.tick(*[] if recorded.taken % 7 == 3 else [reply((x, 0.0, 0.0))] * recorded.falcon.asked)
             v = min(v + 0.1, speed_mps)  # 10 g
             x += v / 1000
-        assert told.falcon.refused == refused
+        assert recorded.falcon.refused == refused
 
 
 SCENARIOS = (
@@ -255,11 +255,11 @@ SCENARIOS = (
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_what_the_exchange_answers_and_sends(scenario: Callable[[Told], None], pytestconfig: pytest.Config) -> None:
-    told = Told()
-    scenario(told)
-    told.lines.append(" ".join(f"{name} {told.falcon[name]}" for name in COUNTERS if told.falcon[name]))
-    compare(Path(__file__).parent / "golden" / f"exchange_{scenario.__name__}.txt", told.lines, pytestconfig)
+def test_what_the_exchange_answers_and_sends(scenario: Callable[[Recorded], None], pytestconfig: pytest.Config) -> None:
+    recorded = Recorded()
+    scenario(recorded)
+    recorded.lines.append(" ".join(f"{name} {recorded.falcon[name]}" for name in COUNTERS if recorded.falcon[name]))
+    compare(Path(__file__).parent / "golden" / f"exchange_{scenario.__name__}.txt", recorded.lines, pytestconfig)
 
 
 @pytest.mark.slow

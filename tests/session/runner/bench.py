@@ -31,7 +31,7 @@ TO_AND_FRO_M = 0.03
 SWING_S = np.arange(0, 60, 0.005)
 STILL_N, FELT_N = 1e-9, 0.5
 TOLD = ("trial", "attempt", "outcome", "by", "value", "steps", "what", "kind", "text")
-"""What is told of a line: nothing that was measured."""
+"""What is printed of a line: nothing that was measured."""
 EXPLORED = ('kind = "follow"\ncycles = 1', 'kind = "explore"\nmin_s = 1\nmax_s = 2\ninstruction = "Stir."')
 UNJUDGED = ("[liquids", "[limits]\nlevel_error_percent = 100\nwithheld_percent = 100\n\n[liquids")
 TIMED = ("repetitions = 4", "repetitions = 4\nmost_s = 2")

@@ -15,7 +15,7 @@ from tests.session.transitions.transcribed import EVENTS
 from tests.transcripts import value_of
 
 SHOWN = ("trial", "force_off", "held", "chosen", "paragraph")
-"""What is told of a page."""
+"""What is printed of a page."""
 NAMES: dict[str, Any] = {
     **EVENTS,
     "LEFT": LEFT,

@@ -26,7 +26,7 @@ from tests.transcripts import value_of
 FOLDER = Path(__file__).parent / "transcripts"
 EVENTS: Mapping[str, type[Any]] = {kind.__name__: kind for kind in ALL_EVENTS}
 SHOWN = ("phase", "index", "attempt", "interval", "steps", "force_off", "held", "invalid")
-"""What is told of a state."""
+"""What is printed of a state."""
 VALUE = (("levels = [0.1, 0.8]", 'levels = [0.1, 0.8]\nlevel = "value"'), ("standards = [1, 2]\n", ""))
 UNTRAINED = ('sequence = ["training", "viscosity"]', 'sequence = ["viscosity"]')
 DELAYS = (

@@ -25,7 +25,7 @@ def usb_error(code: int | None, number: int | None = None) -> usb.core.USBError:
     return usb.core.USBError("what libusb says", code, number)
 
 
-class Told:
+class Recorded:
     """What was done with a bridge, as lines: each call of its library, what came back, and what failed."""
 
     def __init__(self) -> None:
@@ -68,34 +68,34 @@ CHOSEN: tuple[tuple[tuple[str | None, ...], dict[str, Any]], ...] = (
 )
 
 
-def opening(told: Told) -> None:
+def opening(recorded: Recorded) -> None:
     for serials, chosen in CHOSEN:
         backend = Backend(*serials)
-        transport = told(f"open {chosen} of {serials}", backend, PyUsbTransport, backend, **chosen)
+        transport = recorded(f"open {chosen} of {serials}", backend, PyUsbTransport, backend, **chosen)
         if transport is not None:
-            told("close", backend, transport.close)
-            told("close", backend, transport.close)
-            told("write", backend, transport.write, b"a", 1.0)
+            recorded("close", backend, transport.close)
+            recorded("close", backend, transport.close)
+            recorded("write", backend, transport.write, b"a", 1.0)
             transport.reopen()
-            told.lines.append(f"open again -> {transport.serial}")
+            recorded.lines.append(f"open again -> {transport.serial}")
             backend.fails = dict.fromkeys(("release_interface", "close_device"), FAILURES["no device"])
-            told("close what has gone", backend, transport.close)
+            recorded("close what has gone", backend, transport.close)
             backend.fails.clear()
     for method in ("open_device", "claim_interface", "get_configuration"):
         for name, error in FAILURES.items():
             for chosen in ({}, {"serial": "A"}):
                 backend = Backend("A", fails={method: error})
-                told(f"{method}: {name} {chosen}", backend, PyUsbTransport, backend, **chosen)
+                recorded(f"{method}: {name} {chosen}", backend, PyUsbTransport, backend, **chosen)
     for name, how in {
         "unconfigured": {"configured": False},
         "driver of the system": {"kernel_driver": True},
         "driver that stays": {"kernel_driver": True, "fails": {"detach_kernel_driver": FAILURES["access"]}},
     }.items():
         backend = Backend("A", **how)
-        told(name, backend, PyUsbTransport, backend)
+        recorded(name, backend, PyUsbTransport, backend)
 
 
-def transfers(told: Told) -> None:
+def transfers(recorded: Recorded) -> None:
     backend = Backend("A")
     transport = PyUsbTransport(backend)
     ways: tuple[tuple[str, Callable[..., Any], tuple[Any, ...]], ...] = (
@@ -110,10 +110,10 @@ def transfers(told: Told) -> None:
     for error in (None, usb_error(constants.ERROR_NO_DEVICE, 19), usb_error(None, 75)):
         backend.fails = dict.fromkeys(("ctrl_transfer", "bulk_write", "bulk_read"), error) if error else {}
         for name, use, given in ways:
-            told(f"{name}, {error}", backend, use, *given)
+            recorded(f"{name}, {error}", backend, use, *given)
     backend.fails.clear()
     backend.most_written = 15
-    told("write in part", backend, transport.write, b"hello, a Falcon!", 0.25)
+    recorded("write in part", backend, transport.write, b"hello, a Falcon!", 0.25)
 
 
 FTDI_REQUESTS = {
@@ -127,49 +127,49 @@ FTDI_REQUESTS = {
 }
 
 
-def ftdi(told: Told) -> None:
+def ftdi(recorded: Recorded) -> None:
     falcon, cable = ("A1", "FALCON HAPTIC"), ("B9", "USB SERIAL")
     for devices, serial in (((), None), ((cable,), None), ((falcon,), "B"), ((cable, falcon), None)):
         library = D2xx(*devices)
-        transport = told(f"open {serial} of {devices}", library, FtdiTransport, library, serial=serial)
+        transport = recorded(f"open {serial} of {devices}", library, FtdiTransport, library, serial=serial)
     for request, values in FTDI_REQUESTS.items():
         for value in values:
             number = getattr(constants, value) if isinstance(value, str) else value
-            told(f"{request} {value}", library, transport.control, getattr(constants, request), number)
-    told("close", library, transport.close)
-    told("close", library, transport.close)
-    told("write", library, transport.write, b"a", 1.0)
+            recorded(f"{request} {value}", library, transport.control, getattr(constants, request), number)
+    recorded("close", library, transport.close)
+    recorded("close", library, transport.close)
+    recorded("write", library, transport.write, b"a", 1.0)
 
 
 @pytest.mark.parametrize("scenario", [opening, transfers, ftdi])
-def test_calls(scenario: Callable[[Told], None], pytestconfig: pytest.Config) -> None:
-    told = Told()
-    scenario(told)
-    compare(GOLDEN / f"transport_{scenario.__name__}.txt", told.lines, pytestconfig)
+def test_calls(scenario: Callable[[Recorded], None], pytestconfig: pytest.Config) -> None:
+    recorded = Recorded()
+    scenario(recorded)
+    compare(GOLDEN / f"transport_{scenario.__name__}.txt", recorded.lines, pytestconfig)
 
 
 @pytest.mark.slow
 @both
 def test_ftdis_library_moves_bytes_as_a_bridge_would(kind: Any, pytestconfig: pytest.Config) -> None:
     """Transfers of compiled code are those of the transport: one golden holds both."""
-    library, told = D2xx(("A1", "FALCON HAPTIC")), Told()
+    library, recorded = D2xx(("A1", "FALCON HAPTIC")), Recorded()
     way = kind(FtdiTransport(library))
     for waiting, coming in ((b"abcd", b""), (b"", b"waited for"), (b"", b"x"), (b"", b""), (bytes(range(100)), b"")):
         library.waiting += waiting
         library.coming += coming
-        told("read", library, way.read)
-    told("read the rest", library, way.read)
+        recorded("read", library, way.read)
+    recorded("read the rest", library, way.read)
     for timeout_s in (0.02, 0.02, 0.005, 0.005):
-        told(f"read {timeout_s}", library, way.read, timeout_s)
-        told(f"write {timeout_s}", library, way.write, b"a", timeout_s)
+        recorded(f"read {timeout_s}", library, way.read, timeout_s)
+        recorded(f"write {timeout_s}", library, way.write, b"a", timeout_s)
     library.most_written = 3
-    told("write in part", library, way.write, b"abcd")
-    told.lines.append(f"written {library.written!r}")
+    recorded("write in part", library, way.write, b"abcd")
+    recorded.lines.append(f"written {library.written!r}")
     for status in (4, 1, 5, 18):
         library.status = status
-        told(f"read: status {status}", library, way.read)
-        told(f"write: status {status}", library, way.write, b"a")
-    compare(GOLDEN / "transport_ftdi_bytes.txt", told.lines, pytestconfig)
+        recorded(f"read: status {status}", library, way.read)
+        recorded(f"write: status {status}", library, way.write, b"a")
+    compare(GOLDEN / "transport_ftdi_bytes.txt", recorded.lines, pytestconfig)
 
 
 def test_libraries_that_are_missing_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

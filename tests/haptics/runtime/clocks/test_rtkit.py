@@ -16,7 +16,7 @@ from study_app.haptics.runtime.clocks.linux import make_high_priority, make_real
 
 
 class Service:
-    """A bus with the service on it: takes calls apart by the specification, and answers each as it is told."""
+    """A bus with the service on it: takes calls apart by the specification, and answers each as it is set up to."""
 
     def __init__(self, path, *, refuses=(), auth=b"OK 1234deadbeef\r\n"):
         self.calls = []
