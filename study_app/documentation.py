@@ -106,7 +106,7 @@ def search(words: str) -> tuple[Section, ...]:
     stems = [_ENDING.sub("", word) for word in typed if word not in _NO_MATTER.split()] or typed
     score = dict.fromkeys(_sections(), 0.0)
     for stem in dict.fromkeys(stems):
-        begins = re.compile(rf"(?<![^\W_]){re.escape(stem)}")
+        begins = re.compile(rf"(?<![^\W_]){re.escape(stem)}" + r"(?!\w)" * (len(stem) == 1))
         weights = {one: 3 * _has(one.names, stem, begins) or _has(one.text, stem, begins) for one in score}
         pages = {one.page for one, weight in weights.items() if weight}
         rarity = math.log(1 + len(names()) / max(1, len(pages)))

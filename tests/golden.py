@@ -42,6 +42,7 @@ def compare(
     What ``mask`` matches is left out; numbers may differ a little, or as they are written, unless ``exact``.
     """
     found = "\n".join(lines).split("\n")
+    assert any(found), f"{kept} is compared with nothing"
     if mask is not None:
         found = [mask.sub("*", line) for line in found]
     if config.getoption("regenerate"):

@@ -177,17 +177,16 @@ def temporary_path(path: Path) -> Path:
 
 def temporaries(folder: Path, of: str = "") -> tuple[Path, ...]:
     """Return the temporary files in ``folder`` itself, ``of`` a name, of a program that writes now or was killed."""
-    begins = f".{of}." if of else "."
-    found = (path for path in folder.glob(".*.tmp") if path.name.startswith(begins))
-    return tuple(sorted(path for path in found if _TEMPORARY.fullmatch(path.name)))
+    found = (path for path in folder.glob(".*.tmp") if _TEMPORARY.fullmatch(path.name))
+    return tuple(sorted(path for path in found if not of or path.name[1:-13] == of))  # without ".", and ".01234567.tmp"
 
 
-def sweep_old(folder: Path) -> None:
-    """Remove temporary files of killed programs from ``folder``, into which others may write now.
+def sweep_old(folder: Path, of: str = "") -> None:
+    """Remove temporary files, ``of`` a name, of killed programs from ``folder``, into which others may write now.
 
     Only files too old to be in use are removed; what cannot be removed stays.
     """
-    for path in temporaries(folder):
+    for path in temporaries(folder, of):
         with contextlib.suppress(OSError):
             if not path.is_dir() and time.time() - path.stat().st_mtime > OLD_S:
                 path.unlink()

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, make_folder, parse_json, read_if_there, temporaries, write_file
+from study_app.store.atomic import append_line, make_folder, parse_json, read_if_there, sweep_old, write_file
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.user_folder import data_folder
 
@@ -63,9 +63,7 @@ def save(file: Path, text: str, base: str) -> str:
     """
     target, source = file.resolve(), text.encode()
     with _alone(file):
-        for left in temporaries(target.parent, target.name):  # of a program that was killed while it saved
-            with contextlib.suppress(OSError):
-                left.unlink()
+        sweep_old(target.parent, target.name)
         mode = None
         if (content := read_if_there(target)) is not None:
             mode = target.stat().st_mode & 0o777

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.designer.document.steps import ChangeLanguage
@@ -19,10 +18,6 @@ def test_every_key_of_the_place_is_one_shortcut(designer: Any) -> None:
     made.append(designer.place.header.play.play.shortcut().toString())
     wanted = [keys for one in COMMANDS if not one.within for keys in one.keys]
     assert sorted({"Ins": "Insert"}.get(keys, keys) for keys in made) == sorted(wanted)
-
-
-LEFT = Qt.MouseButton.LeftButton
-BLOCK = ("blocks", "liquids")
 
 
 MOST = 250

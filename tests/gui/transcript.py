@@ -355,7 +355,7 @@ def states(window: Any, shown: Actions, settled: Callable[[], None]) -> Iterator
 def story(
     window: QWidget, acts: Iterable[tuple[str, Callable[[], object]]], settled: Callable[[], None]
 ) -> Iterator[str]:
-    """Yield what a window tells, then the signals and what it tells otherwise after each act in turn."""
+    """Yield what a window shows, then its signals and what it shows otherwise after each act in turn."""
     heard = listen(window)
     settled()
     before = told(window)

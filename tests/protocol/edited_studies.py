@@ -65,6 +65,7 @@ def _lines(text: str) -> list[str]:
 def cases_of(file: Path) -> Iterator[Case]:
     """Yield the cases of a file."""
     head, *parts = file.read_text(encoding="utf-8").split("\n=== ")
+    assert parts, f"{file} has no cases"
     for part in parts:
         name, *lines = part.removesuffix("\n").split("\n")
         edits = "\n".join(line for line in lines if not line.startswith(">")).split("\n...\n")

@@ -17,6 +17,7 @@ FILES = sorted(CASES.glob("*.txt"))
 SLOW = {"compared", "methods", "precision", "rated"}
 """Files whose studies are described with simulated observers."""
 SHIPPED = ("demo", "physical2", "rek2024", "slime", "thickness", "viscosityjnd")
+STUDY_NAMES = sorted({*SHIPPED, *(path.stem for path in STUDIES.glob("*.toml"))})
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -24,7 +25,7 @@ def _written_anew(pytestconfig: pytest.Config) -> None:
     if pytestconfig.getoption("regenerate"):
         for file in FILES:
             regenerate(file)
-        for name in (*SHIPPED, *(path.stem for path in STUDIES.glob("*.toml"))):
+        for name in STUDY_NAMES:
             (DESCRIBED / f"{name}.txt").write_text(_description(name), encoding="utf-8")
 
 
@@ -45,7 +46,7 @@ def test_check_says_the_same_as_before(case: Case) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(path.stem for path in DESCRIBED.glob("*.txt")))
+@pytest.mark.parametrize("name", STUDY_NAMES)
 def test_a_study_is_described_as_before(name: str) -> None:
     assert _description(name) == (DESCRIBED / f"{name}.txt").read_text(encoding="utf-8")
 

@@ -16,10 +16,6 @@ from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance, open_session
 from tests.protocol.edited_studies import text_of
 
-# Numbers that occur nowhere by chance, so that a leak can be searched for.
-ODD_DELAY_MS = 137.0
-ODD_DENSITY = 1013.7
-
 WELL = Measurements(
     device="mouse",
     fresh_share=1.0,

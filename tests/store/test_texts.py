@@ -1,4 +1,4 @@
-"""Texts and what the store says of them, in files that people review: lines, cells, words that tell, settings."""
+"""Texts and what the store says of them, in reviewed files: lines, cells, words that reveal a condition, settings."""
 
 import re
 from pathlib import Path

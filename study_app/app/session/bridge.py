@@ -355,8 +355,9 @@ class SessionBridge(QObject):
             case "reconnect":
                 self._reconnect()
             case "failed":
-                log.error("a part of the operator's window failed: %s", *details, exc_info=details[0])
-                self.record_note(f"a part of the operator's window failed: {type(details[0]).__name__}: {details[0]}")
+                what, error = details
+                log.error("a part of the operator's window failed: %s", what, exc_info=error)
+                self.record_note(f"a part of the operator's window failed: {what}")
             case "page":
                 self.participant.come_forward()
             case "close":

@@ -284,8 +284,8 @@ def questions_card(protocol: Protocol, name: str, parts: int | None) -> MeasureC
     blocks = [block for block in protocol.blocks_in_order if block.questionnaire == name]
     times = sum(order_of(protocol, block).trials for block in blocks) + (name in protocol.forms)
     figures = (duration_figure(answering_s(questionnaire)), (str(count), _word(count, "answer")))
-    answers = f"{count * times} {_word(count * times, 'answer')}"
-    asked: Verdict = ("neutral", "info", f"{answers} per session, asked {times} {_word(times, 'time')}")
+    words = f"{counted(count * times, 'answer')} per session, asked {counted(times, 'time')}"
+    asked: Verdict = ("neutral", "info", words)
     if not times:
         asked = ("warn", "warning", "It is never asked")
     return MeasureCard("Each time it is asked", "", (Figures(figures), *_ruled((*_fit(parts), asked))))

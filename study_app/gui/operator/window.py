@@ -227,7 +227,7 @@ class OperatorWindow(Themed, QMainWindow):
         if (what := f"{type(error).__name__}: {PASSED_ON.sub('', str(error))}") not in self._failures:
             self._failures.add(what)
             self.show_message("A part of this window failed", f"{what}. The session continues.")
-            self.ask("failed", error)
+            self.ask("failed", what, error)
 
     def show_view(self, view: OperatorView) -> None:
         """Show everything but the plots; trouble first, for it may be that one of the parts cannot be shown."""

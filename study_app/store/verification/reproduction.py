@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import study_app
 from study_app.errors import StoreError
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
@@ -66,10 +65,10 @@ def reproduced(session_folder: Path) -> Reproduced:
     if lines and events.start_of(lines).intervals:
         compared = _Compared(protocol, Key(key.codes, key.nonce), schedule)
         _levels(compared, lines, key, found)
-        version, *rules = (ran["versions"].get(name) for name in ("liquid-study", "level rules"))
-        if compared.differences and (version, *rules) != (study_app.__version__, LEVEL_RULES):
+        version, rules = (ran["versions"].get(name) for name in ("liquid-study", "level rules"))
+        if compared.differences and rules != LEVEL_RULES:
             found.followed.append(
-                f"liquid-study {version} ran the session and may choose levels by other rules: run reproduce of it"
+                f"liquid-study {version} ran the session and chose levels by other rules: run reproduce of that version"
             )
     return found
 

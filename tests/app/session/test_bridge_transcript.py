@@ -109,7 +109,7 @@ STEPS: dict[str, Any] = {
     "exclude all": ask("exclude", None, "no consent"),
     "exclude again": ask("exclude", 9, "again"),
     "participant stops": event(ForceStopped, "participant"),
-    "part fails": ask("failed", ValueError("no plot")),
+    "part fails": ask("failed", "ValueError: no plot", ValueError("no plot")),
     "thread ends": lambda bridge, _: bridge._thread_exceptions.ended.emit("the writer ended"),
     "diagnose": ask("diagnose"),
     "disk is full": let(full=True),

@@ -245,11 +245,12 @@ def test_save_replaces_the_file_keeps_its_permissions_and_its_previous_content(t
     file.chmod(0o640)
     link.symlink_to(file)
     base = content_hash(b"a = 1\r\n")
-    halves = [file.with_name(f".{name}.0123abcd.tmp") for name in (file.name, "other.toml")]  # of killed programs
-    for half in halves:
+    halves = [file.with_name(f".{name}.tmp") for name in ("study.toml.0123abcd", "study.toml.v2.0123abcd")]
+    for half in (*halves, fresh := file.with_name(".study.toml.4567cdef.tmp")):
         half.write_text("a =")
+        os.utime(half, None if half == fresh else (0, 0))  # another program may be writing the fresh one
     after = save(link, "a = 2\r\n", base)
-    assert [half.exists() for half in halves] == [False, True]
+    assert [half.exists() for half in (*halves, fresh)] == [False, True, True]
     assert file.read_bytes() == b"a = 2\r\n"
     assert link.is_symlink()
     assert file.stat().st_mode & 0o777 == 0o640

@@ -3,7 +3,6 @@
 from PySide6.QtCore import Qt
 
 from study_app.designer import version_rows
-from study_app.gui.home.cards import StudyCard
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.view import HomePlace
 from study_app.gui.widgets.main_view import Place
@@ -35,10 +34,6 @@ def open_home(qtbot, results, size=None):
     home.main = window  # or it would be collected here
     qtbot.waitUntil(lambda: not home.reading and home.sessions.where.text() != "")
     return home
-
-
-def study_cards(home):
-    return [card for card in home.grid.cards if isinstance(card, StudyCard)]
 
 
 def cell(home, row, heading, role=Qt.ItemDataRole.AccessibleTextRole):

@@ -22,7 +22,6 @@ from tests.gui.small import ORDINALS, choice, follow, number, task_page, view
 
 Opening = Callable[..., Participant]
 FULL, SMALL = (1366, 768), (1024, 640)
-QUESTION = "Adjust the second one until both are equally strong."
 NONE = Qt.KeyboardModifier.NoModifier
 
 

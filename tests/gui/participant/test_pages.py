@@ -15,7 +15,6 @@ from tests.gui.small import text_page
 Opening = Callable[..., Participant]
 FULL = (1366, 768)
 ENGLISH = words("en")
-GO = (KEY.Key_Space, KEY.Key_Return, KEY.Key_Enter)
 
 
 def consent(*languages: str, language: str = "en") -> Any:

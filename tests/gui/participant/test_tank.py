@@ -26,11 +26,6 @@ def tank(made: Make) -> TankWidget:
     return made()
 
 
-@pytest.fixture
-def swing(made: Make) -> TankWidget:
-    return made(task_page(follow()))
-
-
 def hint(tank: TankWidget) -> Any:
     return tank.things["hint"].state
 

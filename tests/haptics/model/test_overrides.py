@@ -13,7 +13,6 @@ from tests.haptics.scenes import HONEY, LIGHT_OIL, POOL, WATER, scene
 
 FULL = scene(POOL)
 OF_FULL = {"centre_m", "region", "depth_m", "velocity.kind", "velocity"}
-RIVER = Uniform(velocity_mps=(1, 0, 0))
 
 
 def leaves(value: BaseModel, place: str) -> Iterator[tuple[str, str, Any]]:

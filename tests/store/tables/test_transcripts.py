@@ -20,7 +20,7 @@ PROGRESS = ("step", "page", "trial", "attempt", "task_done", "answers", "unconfi
 
 
 class Lines:
-    """A journal in the making: every method without an underscore is a line, or tells what is made of all."""
+    """A journal in the making: every method without an underscore is a line, or yields what is made of all lines."""
 
     def __init__(self, **session: Any) -> None:
         self._lines: list[Event] = []

@@ -159,7 +159,7 @@ class Changed(Files):
         yield "it can go on"
 
     def reopen(self, comment: bytes = b"", **changes: Any) -> Iterator[str]:
-        """Let it go on, and leave it; tell what that says that the journal does not tell yet."""
+        """Let it go on, and leave it; yield what that adds to the journal."""
         given: dict[str, Any] = {"operator": "CD", "device": {"name": "mouse"}, "screens": {}}
         with reopen(self.study / P007, _changed(changes), SOURCE + comment, **given) as store:
             yield from (f"{line.event} {getattr(line, 'torn_bytes', '')}" for line in store.lines[-1:])
@@ -241,7 +241,7 @@ class Changed(Files):
         receipt.write(path, {name: value for name, value in held.items() if name not in gone})
 
     def never_ended(self) -> None:
-        """Take away whatever tells that the session had ended, but for its tables."""
+        """Remove everything that shows that the session ended, but for its tables."""
         self.receipt(status="unfinished", reason="", ended_at=None)
         self.delete(NAMES["SUMS"], "fingerprints.txt")
 

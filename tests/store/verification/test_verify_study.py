@@ -51,7 +51,7 @@ def test_a_condition_that_is_told_is_found_but_not_repeated(study: Path, tmp_pat
     assert all(place in line for line in found)
     assert "mildew" not in warned(verify(study))
     blinding.reveal(study, "AB", "done")
-    assert "tells a condition" not in warned(verify(study))
+    assert "reveals a condition" not in warned(verify(study))
 
 
 def test_a_receipt_without_a_protocol_makes_no_word_of_the_study_a_telltale(study: Path) -> None:
@@ -60,11 +60,11 @@ def test_a_receipt_without_a_protocol_makes_no_word_of_the_study_a_telltale(stud
     content = json.loads(base64.b64decode(key.read_bytes()))
     content["tables"]["liquids"]["Settings"] = content["tables"]["liquids"].pop("mildew")
     key.write_bytes(base64.encodebytes(json.dumps(content).encode()))
-    assert "tells a condition" not in warned(verify(study))
+    assert "reveals a condition" not in warned(verify(study))
     for participant in ("P007", "P008"):
         of_receipt(protocol=...)(study / "data" / f"sub-{participant}" / "ses-01" / "receipt.json")
         assert "lacks protocol" in told(verify(study))
-        assert "tells a condition" not in warned(verify(study))
+        assert "reveals a condition" not in warned(verify(study))
 
 
 def test_nothing_of_the_key_is_shown(study: Path) -> None:

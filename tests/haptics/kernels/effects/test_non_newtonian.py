@@ -12,7 +12,6 @@ from tests.haptics.scenes import COMPILED, UNBENT, Hand, moving, scene, vectors
 
 pytestmark = pytest.mark.slow
 
-D = 0.068
 compiled = pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")
 
 
