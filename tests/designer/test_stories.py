@@ -1,5 +1,6 @@
 """Stories in the designer's window by keys, clicks and steps, compared with reviewed texts of what each act changes."""
 
+import os
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -158,11 +159,18 @@ def failing(record: Record) -> None:
     full = refusing("designer.document.document.keep_content", "the disk is full")
     record.play("ctrl+s")
     full.undo()
-    halves = [designer.file.with_name(f".{name}.0123abcd.tmp") for name in (designer.file.name, "other.toml")]
-    for half in halves:
-        half.write_text("format = ")  # as of a program that was killed
+    killed, written_now, other = (
+        designer.file.with_name(f".{name}.tmp")
+        for name in ("kitchen.toml.0123abcd", "kitchen.toml.4567abcd", "other.toml.0123abcd")
+    )
+    for half in (killed, written_now, other):
+        half.write_text("format = ")
+    for half in (killed, other):
+        os.utime(half, (0, 0))
     record.play("ctrl+s")
-    assert [half.exists() for half in halves] == [False, True]
+    assert not killed.exists()
+    assert written_now.exists()
+    assert other.exists()
     for _ in range(2):
         unreadable = refusing(
             "designer.document.document.Document.changed_outside", "kitchen.toml cannot be read: error"
