@@ -130,6 +130,7 @@ class DeviceDescriptor:
     moves_by_itself : the program moves its handle by a simulated hand; rehearsals may use it
     pointer : the window's pointer moves it; it then has ``point_to`` and ``press``
     motion_shows_force : its recorded position shows the force, so that motion is hidden while a study is blinded
+    stop_button : its button that stops the force, as windows name it: "device button 4"; "" without one
     options : its options when it is opened
     doctor : its diagnosis; None without one
     driver : ``module:Class`` of its `driver.FramedDevice`; "" if its driver is another one
@@ -147,6 +148,7 @@ class DeviceDescriptor:
     moves_by_itself: bool = False
     pointer: bool = False
     motion_shows_force: bool = True
+    stop_button: str = ""
     options: tuple[DeviceOption, ...] = ()
     doctor: Doctor | None = None
     driver: str = ""

@@ -41,6 +41,7 @@ def _felt_and_emulated(
     can: str,
     *,
     argument: str = "SERIAL",
+    stop_button: str = "device button 4",
     options: tuple[DeviceOption, ...] = (),
     emulated_options: tuple[DeviceOption, ...] = (),
 ) -> tuple[DeviceDescriptor, DeviceDescriptor]:
@@ -57,6 +58,7 @@ def _felt_and_emulated(
             kind="felt",
             probe=lambda: [resolve_name(package + probe)() for probe in probes],
             argument=argument,
+            stop_button=stop_button,
             options=options,
         ),
         framed(
@@ -68,6 +70,7 @@ def _felt_and_emulated(
             kind="simulated",
             probe=lambda: [Backend(twin, "the program", READY, can)],
             moves_by_itself=True,
+            stop_button=stop_button,
             options=emulated_options,
         ),
     )
@@ -104,6 +107,7 @@ DEVICES: Final = (
         ("inverse3.service:probe",),
         "simulated hand; the Inverse3's own driver with an emulated Inverse Service",
         argument="HOST:PORT",
+        stop_button="",  # the grip has three buttons
     ),
     DeviceDescriptor(
         name="mouse",
@@ -141,5 +145,6 @@ DEVICES: Final = (
             resolve_name("study_app.devices.spacemouse.device:SpaceMouseDevice")(**request.limits)
         ),
         probe=later("study_app.devices.spacemouse.hid:probe"),
+        stop_button="buttons 1 and 2",
     ),
 )

@@ -23,6 +23,7 @@ from study_app.devices.inverse3.service import FAILURES as INVERSE3
 from study_app.devices.registry import descriptor_of, doctor_of, list_devices, open_device
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound, ServoFault
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
+from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.protocol.load import load
 from tests.compiled import needs_servo
 from tests.devices.subjects import (
@@ -36,6 +37,7 @@ from tests.devices.subjects import (
     force_dimension_library,
     inverse3,
     over,
+    spacemouse,
     until,
     write,
 )
@@ -131,6 +133,17 @@ def test_a_lost_device_stays_lost_until_it_is_opened_again(subject: Subject) -> 
     assert subject.device.failure is None
     again = subject.ticks(ticks.now_ns if subject.device.name == "falcon-emulated" else None)
     until(lambda: again.after(5) == READ_NEW, "it gives no position")
+
+
+@over(falcon, inverse3, force_dimension, spacemouse)
+def test_its_descriptor_names_a_stop_button_if_one_of_its_buttons_stops_the_force(subject: Subject) -> None:
+    assert subject.press is not None
+    ticks, stops = subject.ticks(), False
+    for held in range(16):
+        subject.press(held)
+        ticks.after(5)
+        stops |= bool(ticks.reading[0].buttons & BUTTON_STOP)
+    assert stops == bool(descriptor_of(subject.device.name).stop_button)
 
 
 @over(*MOVING)

@@ -326,7 +326,10 @@ HELP: Actions = {
 
 STATES: dict[str, tuple[Callable[[Any], Any], Actions]] = {
     "operator": (operator, RUNNING),
-    "operator, single-blind": (lambda qtbot: operator(qtbot, force_limit_n=6.0, felt=False), DISK),
+    "operator, single-blind": (
+        lambda qtbot: operator(qtbot, force_limit_n=6.0, felt=False, stop_button="device button 4"),
+        DISK,
+    ),
     "strip": (strip, STRIP),
     "lab": (windows.lab, LAB),
     "results": (lambda qtbot: results(qtbot).main, RESULTS),

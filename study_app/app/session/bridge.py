@@ -477,6 +477,7 @@ def make_cockpit(chosen: NewSession, protocol: Protocol, rig: Rig, theme: Theme)
         reach_m=max(rig.device.workspace_m),
         pointer=described.pointer,
         felt=described.kind != "seen",
+        stop_button=described.stop_button,
         force_limit_n=protocol.device.force_limit_n if protocol.study.blinding == "single" else None,
         theme=theme,
     )

@@ -195,10 +195,11 @@ LEAST_WIDTH, LEAST_HEIGHT = 320, 160
 
 
 class StopButton(Themed, QPushButton):
-    """STOP FORCE; it acts when pressed, not when released."""
+    """STOP FORCE, and the other ways to stop it; it acts when pressed, not when released."""
 
-    def __init__(self) -> None:
+    def __init__(self, device_button: str) -> None:
         super().__init__()
+        self._others = f"Hold Esc in any window{f', or {device_button}' if device_button else ''}"
         self.setProperty("role", "stop")
         self.setAccessibleName("Stop force")
         self.setMinimumSize(LEAST_WIDTH, LEAST_HEIGHT)
@@ -222,22 +223,23 @@ class StopButton(Themed, QPushButton):
         centred = Qt.AlignmentFlag.AlignCenter
         painter.drawText(QRectF(0, middle, width, 38), centred, "STOP FORCE")
         painter.setFont(font("label", weight=600))
-        painter.drawText(QRectF(8, middle + 42, width - 16, 22), centred, "Hold Esc in any window, or device button 4")
+        wrapped = Qt.AlignmentFlag.AlignHCenter | Qt.TextFlag.TextWordWrap
+        painter.drawText(QRectF(8, middle + 42, width - 16, 38), wrapped, self._others)
 
 
 class StopPanel(Card):
     """The button under a line that says whether there is force, with the way back after a stop.
 
-    Of a device that exerts none (``felt``) the line says so.
+    Of a device that exerts none (``felt``) the line says so; ``device_button`` stops the force, too, if it has one.
     """
 
-    def __init__(self, *, felt: bool = True) -> None:
+    def __init__(self, *, felt: bool = True, device_button: str = "") -> None:
         super().__init__(padding=12, gap=10)
         self._felt = felt
         self.sign = Icon("check", "ok", 18)
         self.word = label("", "strong")
         self.fade_in = ActionButton("", "Fade in again", height=36)
-        self.stop = StopButton()
+        self.stop = StopButton(device_button)
         row = hbox(self.sign, self.word, STRETCH, self.fade_in, spacing=10, margins=(6, 0, 0, 0))
         keep = self.fade_in.sizePolicy()
         keep.setRetainSizeWhenHidden(True)

@@ -143,6 +143,7 @@ class OperatorWindow(Themed, QMainWindow):
     lateness_limit_s : the protocol's limit of the 99th percentile of lateness [s]
     reach_m : half of the longest edge of the tank [m], for the scale of the position plot
     pointer : whether positions are of the mouse pointer
+    stop_button : the device's button that stops the force, too; "" without one
     force_limit_n : largest force on the hand [N] in a single-blind study; None where the force is hidden
     """
 
@@ -156,6 +157,7 @@ class OperatorWindow(Themed, QMainWindow):
         reach_m: float,
         pointer: bool,
         felt: bool = True,
+        stop_button: str = "",
         force_limit_n: float | None = None,
         theme: Theme = LIGHT,
     ) -> None:
@@ -173,7 +175,7 @@ class OperatorWindow(Themed, QMainWindow):
         self.position = PositionCard(reach_m, pointer=pointer)
         self.device = DeviceCard()
         self.notes = NotesCard()
-        self.stop = StopPanel(felt=felt)
+        self.stop = StopPanel(felt=felt, device_button=stop_button)
         self.buttons = Actions()
         self.question: Question | None = None
         self._asks_about = ""  # the setting that the question is about
