@@ -32,7 +32,7 @@ git -C "$root/work" pull --quiet --ff-only "$here" HEAD
 export root
 exec unshare --mount --pid --fork bash -c '
     mount -t proc proc "$root/proc" && mount --rbind /dev "$root/dev" && mount -t tmpfs tmpfs "$root/dev/shm"
-    exec env -i HOME=/root LANG=C.UTF-8 PATH=/usr/bin:/bin:/usr/sbin:/sbin PIP_CERT=/etc/ssl/certs/ca-certificates.crt \
+    env -i HOME=/root LANG=C.UTF-8 PATH=/usr/bin:/bin:/usr/sbin:/sbin PIP_CERT=/etc/ssl/certs/ca-certificates.crt \
         QT_QPA_PLATFORM=offscreen LIQUID_STUDY_CONFIG=/tmp/settings LIQUID_STUDY_WORKSPACE=/work \
         chroot "$root" bash -euc "
             cd /work
@@ -40,4 +40,5 @@ exec unshare --mount --pid --fork bash -c '
             /venv/bin/pip install --quiet --upgrade --upgrade-strategy eager -e \".[test,proofs]\"
             /venv/bin/python --version
             /venv/bin/pip list | grep -iE \"^(pyside6_essentials|numpy|numba|pandas|pyarrow|pyqtgraph|scipy) \"
-            exec /venv/bin/python -m pytest \"\$@\"" bash "$@"' bash "$@"
+            exec /venv/bin/python -m pytest \"\$@\"" bash "$@"
+    exit $? # this shell is process 1: it collects processes whose parent was killed' bash "$@"

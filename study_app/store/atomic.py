@@ -321,14 +321,12 @@ def read_if_there(path: Path) -> bytes | None:
 def read_own(path: Path, root: Path) -> bytes:
     """Return the content of a file that must lie under ``root``, wherever links lead."""
     try:
-        real = path.resolve(strict=True)
+        real = Path(os.path.realpath(path, strict=True))  # raises OSError for a loop of links, with every Python
         if not real.is_relative_to(root.resolve()):
             raise StoreError(f"{path} leads by a link out of {root}, to {real}: replace the link by the file itself")
         return read_regular(real)
     except OSError as error:
         raise cannot_read(path, error) from error
-    except RuntimeError as error:  # a loop of links
-        raise StoreError(f"{path} cannot be read ({error}): replace the link by the file itself") from error
 
 
 def parse_json(content: bytes | str) -> Any:

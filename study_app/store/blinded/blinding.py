@@ -318,7 +318,7 @@ def read_key(folder: Path) -> Key:
     path = StudyFolder(folder).key
     sealed = read_own(path, folder)
     try:
-        content = parse_json(base64.b64decode(sealed, validate=False))
+        content = parse_json(base64.b64decode(b"".join(sealed.split()), validate=True))
         if content["format"] not in _FORMATS:
             raise StoreError(
                 f"{path} has format {content['format']!r}, this version reads 1 and 2: use a newer version of "
