@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from study_app.errors import StudyError
+
 Play = Callable[[str, list[str]], Iterator[str]]
 """Yields the commands of a transcript, from a start, each with what it does."""
 
@@ -20,6 +22,13 @@ def played(file: Path, play: Play) -> Iterator[str]:
         name, start, *lines = part.strip("\n").split("\n")
         yield from ("", f"=== {name}", start) if number else (f"=== {name}", start)
         yield from play(start.removeprefix("start:").strip(), [line for line in lines if not line.startswith(">")])
+
+
+def every(folder: Path, names: str) -> list[Path]:
+    """Return the files of transcripts in a folder, which are these: one that is deleted is missed."""
+    found = sorted(folder.glob("*.txt"))
+    assert [path.stem for path in found] == names.split(), f"{folder} holds {[path.stem for path in found]}"
+    return found
 
 
 def value_of(line: str, names: Mapping[str, Any]) -> Any:
@@ -52,6 +61,29 @@ def calls(names: Mapping[str, Any], *refusals: type[Exception]) -> Play:
                 yield f"> refused: {error}"
 
     return play
+
+
+def acts(begin: Callable[[str], Any], names: Mapping[str, Any], words: Callable[[str], str] = str) -> Play:
+    """Return what plays methods of the world that begins at a start; each with what `told` yields, in ``words``."""
+
+    def play(start: str, lines: list[str]) -> Iterator[str]:
+        world = begin(start)
+        for line in lines:
+            yield line
+            yield from (f"> {words(one)}" for one in told(world, line, names))
+
+    return play
+
+
+def told(world: Any, line: str, names: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what a method of a world, or a call of ``names``, says, or its refusal, and then the world's news."""
+    name = line.partition("(")[0]
+    try:
+        said = value_of(line, {**names, name: getattr(world, name)} if hasattr(world, name) else names)
+        yield from [said] if isinstance(said, str) else said or ()
+    except StudyError as error:
+        yield f"refused: {error}"
+    yield from getattr(world, "_news", tuple)()
 
 
 class Files:

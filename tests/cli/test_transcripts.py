@@ -18,9 +18,9 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from tests.compiled import needs_servo
 from tests.golden import CHANGING, compare
 from tests.studies import made_up, once
-from tests.transcripts import Files, value_of
+from tests.transcripts import Files, every, value_of
 
-GOLDEN = sorted((Path(__file__).parent / "golden").glob("*.txt"))
+GOLDEN = every(Path(__file__).parent / "golden", "data model outputs refusals sites study withdrawals")
 LATER = {
     "outputs": [pytest.mark.slow],
     "refusals": [pytest.mark.slow, needs_servo],

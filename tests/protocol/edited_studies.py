@@ -14,9 +14,15 @@ from study_app.errors import ProtocolError
 from study_app.protocol.describe import describe
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
+from tests.transcripts import every
 
 STUDIES = Path(__file__).parent / "studies"
 CASES = Path(__file__).parent / "cases"
+FILES = every(
+    CASES,
+    "adjustment block_order compared designs formats groups impossible impossible_levels late liquids methods pace "
+    "precision questions rated rows sound views",
+)
 
 
 class Case(NamedTuple):
@@ -91,3 +97,7 @@ def regenerate(file: Path) -> None:
 
 def _signed(sign: str, text: str) -> str:
     return "".join(f"{sign} {line}\n" if line else f"{sign}\n" for line in text.removeprefix("\n").splitlines())
+
+
+FAULTY = tuple(cases_of(CASES / "sound.txt"))
+"""The small sound protocol with mistakes."""

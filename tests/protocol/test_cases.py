@@ -9,11 +9,10 @@ from study_app.cli import main
 from study_app.errors import ProtocolError
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
-from tests.protocol.edited_studies import CASES, STUDIES, Case, cases_of, regenerate, said_of, text_of
+from tests.protocol.edited_studies import FILES, STUDIES, Case, cases_of, regenerate, said_of, text_of
 from tests.protocol.sound import SOUND
 
 DESCRIBED = Path(__file__).parent / "described"
-FILES = sorted(CASES.glob("*.txt"))
 SLOW = {"compared", "methods", "precision", "rated"}
 """Files whose studies are described with simulated observers."""
 SHIPPED = ("demo", "physical2", "rek2024", "slime", "thickness", "viscosityjnd")

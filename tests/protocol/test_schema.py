@@ -14,7 +14,7 @@ import pytest
 from study_app.protocol.source.files import shipped
 from study_app.protocol.source.json_schema import editor_schema, format_markdown
 from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
-from tests.protocol.edited_studies import CASES, STUDIES, cases_of, text_of
+from tests.protocol.edited_studies import FILES, STUDIES, cases_of, text_of
 from tests.protocol.forms.mixed import MIXED
 
 SCHEMA = editor_schema()
@@ -24,7 +24,7 @@ ACCEPTED = {
     **{file.stem: file.read_text(encoding="utf-8") for file in STUDIES.glob("*.toml")},
     **{
         f"{file.stem}: {case.name}": case.text
-        for file in CASES.glob("*.txt")
+        for file in FILES
         for case in cases_of(file)
         if case.said[0] == "accepted"
     },

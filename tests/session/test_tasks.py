@@ -15,7 +15,7 @@ from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.tasks import track
 from tests.golden import compare
 from tests.session.small import samples
-from tests.transcripts import played, value_of
+from tests.transcripts import acts, played, value_of
 
 LEFT, RIGHT, AWAY = (-0.02, 0.0, 0.0), (0.02, 0.0, 0.0), (0.0, 0.01, 0.0)
 BORDER, BEYOND, NOWHERE = (-0.02, 0.0, 0.005), (-0.02, 0.0, np.nextafter(0.005, 1)), (np.nan, 0.0, 0.0)
@@ -62,26 +62,16 @@ class Played:
         yield f"left: {self.tracker.leave()}, {self.tracker.outcome}"
 
 
-def play(start: str, lines: list[str]) -> Iterator[str]:
-    """Yield what happens to a task, and what it makes of it."""
-    names: dict[str, Any] = {
-        "LEFT": LEFT,
-        "RIGHT": RIGHT,
-        "AWAY": AWAY,
-        "BORDER": BORDER,
-        "BEYOND": BEYOND,
-        "NOWHERE": NOWHERE,
-    }
-    task = Played(value_of(start, {"reach": reach, "explore": explore, "follow": partial(Follow, kind="follow")}))
-    for line in lines:
-        yield line
-        name = line.partition("(")[0]
-        yield from (f"> {one}" for one in value_of(line, names | {name: getattr(task, name)}))
+def begun(start: str) -> Played:
+    return Played(value_of(start, {"reach": reach, "explore": explore, "follow": partial(Follow, kind="follow")}))
+
+
+PLACES = {"LEFT": LEFT, "RIGHT": RIGHT, "AWAY": AWAY, "BORDER": BORDER, "BEYOND": BEYOND, "NOWHERE": NOWHERE}
 
 
 def test_what_happens_in_a_task(pytestconfig: pytest.Config) -> None:
     file = Path(__file__).parent / "golden" / "tasks.txt"
-    compare(file, played(file, play), pytestconfig)
+    compare(file, played(file, acts(begun, PLACES)), pytestconfig)
 
 
 def slowly(task: Reach, rows: Any) -> tuple[list[tuple[int, int]], Any]:

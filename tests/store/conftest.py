@@ -3,7 +3,6 @@
 import itertools
 import tomllib
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,6 @@ from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from tests.journal_lines import event_of
-from tests.platforms import files_up_to
 from tests.protocol.edited_studies import text_of
 
 AWKWARD = 'comma, "quote",\nnew line\r\n\ttab 🌊 \u2028\x85 =SUM(A1)' + "é" * 10_000
@@ -31,7 +29,6 @@ Start = Callable[..., SessionStore]
 Attend = Callable[[SessionStore], None]
 Make = Callable[..., np.ndarray[Any, Any]]
 Tables = Callable[..., dict[str, Any]]
-FullDisk = Callable[[int], AbstractContextManager[None]]
 
 
 def study_tables(**changes: Any) -> dict[str, Any]:
@@ -100,11 +97,6 @@ def start(tmp_path: Path, protocol: Protocol, clock: SessionClock) -> Start:
         )
 
     return begin_one
-
-
-@pytest.fixture(name="files_up_to")
-def _files_up_to() -> FullDisk:
-    return files_up_to
 
 
 def choose(store: SessionStore, trial: int, items: list[dict[str, Any]]) -> None:

@@ -4,14 +4,14 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store.atomic import append_line, create_folder, probe, write_file
-from tests.store.conftest import FullDisk
+from tests.platforms import files_up_to
 
 
 def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_what_does_not_fit_leaves_what_was_there_and_nothing_beside(tmp_path: Path, files_up_to: FullDisk) -> None:
+def test_what_does_not_fit_leaves_what_was_there_and_nothing_beside(tmp_path: Path) -> None:
     table, lines = tmp_path / "table.csv", tmp_path / "reveals.jsonl"
     write_file(table, b"old\n")
     append_line(lines, b"1\n")

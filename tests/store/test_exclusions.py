@@ -10,7 +10,8 @@ from study_app.store.blinded import unblinding
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
 from study_app.store.verification.verify_study import verify
-from tests.store.conftest import FullDisk, Start
+from tests.platforms import files_up_to
+from tests.store.conftest import Start
 
 pytestmark = pytest.mark.slow
 
@@ -49,7 +50,7 @@ def test_a_rule_excludes_no_session_that_a_person_included_again(folder: Path, m
     assert unblinding.exclude_inattentive(folder) == ()
 
 
-def test_a_full_disk_leaves_the_list_as_it_was(folder: Path, files_up_to: FullDisk) -> None:
+def test_a_full_disk_leaves_the_list_as_it_was(folder: Path) -> None:
     row = exclude(folder, "P008", 1, by="AB", reason="withdrew")
     before = (folder / "exclusions.csv").read_bytes()
     with files_up_to(2000), pytest.raises(StoreError, match=r"exclusions\.csv cannot be written \(File too large\)"):

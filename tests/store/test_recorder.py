@@ -11,7 +11,8 @@ from study_app.store import recordings
 from study_app.store.journals.journal_events import Recorded, RecordingLost
 from study_app.store.recorder import Recorder, lost
 from study_app.store.recordings import SamplesFile, read_facts, read_frames, read_samples
-from tests.store.conftest import FullDisk, Make
+from tests.platforms import files_up_to
+from tests.store.conftest import Make
 
 pytestmark = pytest.mark.slow
 
@@ -126,7 +127,7 @@ def test_in_a_rehearsal_handing_over_waits_for_room_instead(tmp_path: Path, samp
 
 @pytest.mark.parametrize("size", [200, 500_000], ids=["from the first byte", "after a while"])
 def test_a_full_disk_loses_a_recording_with_its_reason_and_the_next_is_kept(
-    tmp_path: Path, samples_of: Make, files_up_to: FullDisk, size: int
+    tmp_path: Path, samples_of: Make, size: int
 ) -> None:
     recorder = Recorder(tmp_path / "recordings", FACTS, waits=True)
     with files_up_to(size):

@@ -20,7 +20,8 @@ from study_app.store.recordings import (
     read_samples,
     write_frames,
 )
-from tests.store.conftest import FullDisk, Make
+from tests.platforms import files_up_to
+from tests.store.conftest import Make
 
 EXACT = ("tick", "time_ns", "lateness_ns", "fresh", "buttons", "limiters", "scene", "status", "position_m")
 FACTS = {"participant": "P007", "trial": 3}
@@ -185,7 +186,7 @@ def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None
         assert "\n" not in str(refusal.value)
 
 
-def test_frames_that_do_not_fit_leave_nothing(tmp_path: Path, files_up_to: FullDisk) -> None:
+def test_frames_that_do_not_fit_leave_nothing(tmp_path: Path) -> None:
     shown = np.random.default_rng(1).integers(0, 2**60, (50_000, 5))
     with files_up_to(10_000), pytest.raises(StoreError, match="File too large"):
         write_frames(tmp_path / "frames.parquet", shown, FACTS)

@@ -23,7 +23,7 @@ from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.trials.presented_levels import LevelLimits, clipping, level_limits, levels, standard_of
 from tests.designer.document.grown import PROTOCOLS
-from tests.protocol.faulty_protocols import CASES, Case
+from tests.protocol.edited_studies import FAULTY, Case
 
 
 def study_of(name: str, *changes: tuple[str, str]) -> Study:
@@ -36,7 +36,7 @@ def study_of(name: str, *changes: tuple[str, str]) -> Study:
 
 @pytest.mark.slow
 def test_each_repair_of_the_known_faults_removes_its_fault() -> None:
-    repaired = {case.name for case in CASES if _repaired(case)}
+    repaired = {case.name for case in FAULTY if _repaired(case)}
     assert len(repaired) >= 30, sorted(repaired)
 
 
@@ -224,8 +224,8 @@ def test_a_question_without_a_sound_id_counts_and_another_fault_leaves_the_quest
 
 @pytest.mark.slow
 def test_something_can_be_measured_of_every_known_fault() -> None:
-    whole = sum(valid_part(read(case.text.encode())).protocol is not None for case in CASES)
-    assert whole > 0.95 * len(CASES)
+    whole = sum(valid_part(read(case.text.encode())).protocol is not None for case in FAULTY)
+    assert whole > 0.95 * len(FAULTY)
 
 
 CLIPPED = Set(("stimuli", "damping", "standards"), [32]), Set(("stimuli", "damping", "levels"), [0.02, 2.0])

@@ -14,7 +14,7 @@ from study_app.designer.form.rows import Form
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.problems import Fault, shown
-from tests.protocol.faulty_protocols import CASES, Case
+from tests.protocol.edited_studies import FAULTY, Case
 
 DEFS = schema()["$defs"]
 
@@ -109,7 +109,7 @@ def shown_at(study: Study, fault: Fault) -> str:
     return next((place for place, said in places if any(words.startswith(sentence) for words in said)), "")
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", FAULTY, ids=lambda case: case.name)
 def test_every_fault_is_shown_at_a_field(case: Case) -> None:
     study = read(case.text.encode())
     if study.is_toml:

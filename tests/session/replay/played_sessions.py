@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from study_app.errors import StoreError
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
@@ -18,7 +17,7 @@ from tests.protocol.trials.matching import text_of
 from tests.session.pairs import short_text
 from tests.session.replay.recorded_sessions import rewrite, troubled
 from tests.store.forging import Lines, change, forge, nothing
-from tests.transcripts import Files, value_of
+from tests.transcripts import Files, Play, acts
 
 NAMES = {"RECEIPT": "receipt.json", "FIRST": "recordings/trial-001.parquet", "SECOND": "recordings/trial-002.parquet"}
 
@@ -144,19 +143,11 @@ class Recorded(Files):
         (self.study / "blinding" / name).rename(self.study / "blinding" / to)
 
 
-def player(made: Callable[[str], Path], folder: Path) -> Callable[[str, list[str]], Iterator[str]]:
+def player(made: Callable[[str], Path], folder: Path) -> Play:
     """Return what plays transcripts of copies of sessions in a folder."""
 
-    def play(start: str, lines: list[str]) -> Iterator[str]:
+    def begun(start: str) -> Recorded:
         shutil.rmtree(folder / "study", ignore_errors=True)
-        recorded: Any = Recorded(Path(shutil.copytree(made(start) / "study", folder / "study")))
-        for line in lines:
-            yield line
-            name = line.partition("(")[0]
-            try:
-                told = list(value_of(line, {**NAMES, name: getattr(recorded, name)}) or ())
-            except StoreError as error:
-                told = [f"refused: {error}"]
-            yield from (f"> {one.replace(str(folder), 'FOLDER')}" for one in told)
+        return Recorded(Path(shutil.copytree(made(start) / "study", folder / "study")))
 
-    return play
+    return acts(begun, NAMES, lambda said: said.replace(str(folder), "FOLDER"))

@@ -10,11 +10,11 @@ from tests.compiled import needs_servo
 from tests.golden import compare
 from tests.session.replay.played_sessions import STARTS, player
 from tests.studies import once
-from tests.transcripts import played
+from tests.transcripts import every, played
 
 pytestmark = [needs_servo, pytest.mark.slow]
 
-FILES = sorted((Path(__file__).parent / "transcripts").glob("*.txt"))
+FILES = every(Path(__file__).parent / "transcripts", "changes levels")
 SECRET = re.compile(r"\b(thin|thick|prompt|late|200|1400|0\.[1248](?!\.\d))\b")
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.rig import Rig, open_rig, study_settings
-from study_app.errors import SessionError
 from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.model import Protocol
@@ -25,7 +24,7 @@ from tests.protocol.trials.matching import matching
 from tests.session import small
 from tests.session.fakes import FakeJournal
 from tests.session.transitions.transcribed import EVENTS
-from tests.transcripts import value_of
+from tests.transcripts import acts
 
 TO_AND_FRO_M = 0.03
 SWING_S = np.arange(0, 60, 0.005)
@@ -186,7 +185,7 @@ class Felt:
         self.bench.runner.post(EVENTS["Chosen"](self.bench.clock(), self.bench.state.items[0], value))
         self.bench.runner.post(EVENTS["Submitted"](self.bench.clock()))
 
-    def news(self) -> Iterator[str]:
+    def _news(self) -> Iterator[str]:
         """Tell new lines, and where the session is."""
         for line in self.bench.journal.lines[self.seen :]:
             told = {name: line[name] for name in TOLD if line.get(name) is not None}
@@ -206,18 +205,10 @@ def player(rig: Callable[[Protocol], Any]) -> Callable[[str, list[str]], Iterato
         with rig(protocol) as opened:
             felt = Felt(Bench(opened, protocol))
             felt.bench.swing()
-            list(felt.news())
-            names: dict[str, Any] = {name: getattr(felt, name) for name in dir(felt) if not name.startswith("_")}
-            names |= {"LESS": ANSWERS[0], "MORE": ANSWERS[1], "CONTINUE": CONTINUE, "STOP": BUTTON_STOP}
+            list(felt._news())
+            names: dict[str, Any] = {"LESS": ANSWERS[0], "MORE": ANSWERS[1], "CONTINUE": CONTINUE, "STOP": BUTTON_STOP}
             for kind, made in EVENTS.items():
                 names[kind] = lambda *told, made=made: felt.bench.runner.post(made(felt.bench.clock(), *told))
-            for line in lines:
-                yield line
-                try:
-                    said = value_of(line, names)
-                except SessionError as error:
-                    said = f"refused: {error}"
-                yield from (f"> {one}" for one in ([said] if said else []))
-                yield from (f"> {one}" for one in felt.news())
+            yield from acts(lambda _: felt, names)(start, lines)
 
     return play

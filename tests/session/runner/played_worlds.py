@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
-from study_app.errors import ServoFault, SessionError, StoreError
+from study_app.errors import ServoFault
 from study_app.haptics.model.layout import BUTTON_STOP, LIMITER_GLITCH
 from study_app.session.device_buttons import CONTINUE
 from study_app.session.pages import QuestionnairePage
@@ -12,7 +12,7 @@ from study_app.session.transitions.events import Chosen, ItemShown, Note
 from study_app.session.transitions.state import Phase
 from tests.session.fakes import AWAY, LEFT, RIGHT, World, step
 from tests.session.transitions.transcribed import EVENTS
-from tests.transcripts import value_of
+from tests.transcripts import acts, told, value_of
 
 SHOWN = ("trial", "force_off", "held", "chosen", "paragraph")
 """What is printed of a page."""
@@ -137,7 +137,7 @@ class Played(World):
         self.on_page = lambda page: self.post(Note(self.clock(), "mark", type(page).__name__))
 
     def _news(self) -> Iterator[str]:
-        """Yield what happened since the last time: what was asked for, in order, and lines, whatever is 0 left out."""
+        """Yield what happened since the last time: what was asked for, in order, lines without what is 0, the state."""
         words: list[str] = []
         log, lines, waited = self.seen
         pages = iter(self.pages[len(self.pages) - sum(name.endswith("Page") for name in self.log[log:]) :])
@@ -155,6 +155,7 @@ class Played(World):
                 words.append(_page(next(pages)) if name.endswith("Page") else name)
         yield from [", ".join(words)] if words else []
         self.seen = [len(self.log), lines, waited]
+        yield self._state()
 
     def _state(self) -> str:
         runner, state, task = self.runner, self.state, self.runner.task
@@ -176,19 +177,14 @@ def _rounded(value: Any) -> Any:
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
-def play(start: str, lines: list[str]) -> Iterator[str]:
-    """Yield each command with what came of it; a start is commands, which are not told."""
-    world: Any = value_of(f"world({start.partition(':')[0]})", {"world": Played, "True": True, "False": False})
-    for number, line in enumerate([*start.partition(":")[2].split(";"), *lines]):
-        name = line.strip().partition("(")[0]
-        said = None
-        if line.strip():
-            try:
-                said = value_of(line.strip(), NAMES | {name: getattr(world, name)})
-            except (SessionError, StoreError) as error:
-                said = f"refused: {error}"
-        news = list(world._news())
-        if number > start.count(";"):
-            yield line
-            yield from (f"> {one}" for one in ([said] if said else []) + news)
-            yield f"> {world._state()}"
+def begun(start: str) -> Played:
+    """Return a world after the commands of its start."""
+    made, _, commands = start.partition(":")
+    world: Played = value_of(f"world({made})", {"world": Played, "True": True, "False": False})
+    for command in filter(None, map(str.strip, commands.split(";"))):
+        list(told(world, command, NAMES))
+    list(world._news())
+    return world
+
+
+play = acts(begun, NAMES)

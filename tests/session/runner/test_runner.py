@@ -8,9 +8,9 @@ from study_app.session.transitions.events import Begin
 from tests.golden import compare
 from tests.session.fakes import World, step
 from tests.session.runner.played_worlds import play
-from tests.transcripts import played
+from tests.transcripts import every, played
 
-FILES = sorted((Path(__file__).parent / "transcripts").glob("*.txt"))
+FILES = every(Path(__file__).parent / "transcripts", "rows runner")
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

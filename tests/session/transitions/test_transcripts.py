@@ -25,10 +25,10 @@ from tests.golden import compare
 from tests.session import small
 from tests.session.transitions.states import LEFT, shown, state_in
 from tests.session.transitions.transcribed import FOLDER, play
-from tests.transcripts import played
+from tests.transcripts import every, played
 
 
-@pytest.mark.parametrize("file", sorted(FOLDER.glob("*.txt")), ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", every(FOLDER, "intervals reading settings table"), ids=lambda file: file.stem)
 def test_events_command_what_they_did(file: Path, pytestconfig: pytest.Config) -> None:
     compare(file, played(file, play), pytestconfig)
 

@@ -14,12 +14,13 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.store.journals.journal import Journal, read, scan
 from tests.journal_lines import event_of
-from tests.store.conftest import AWKWARD, FullDisk
+from tests.platforms import files_up_to
+from tests.store.conftest import AWKWARD
 
 
 @pytest.mark.parametrize("mended", [True, False], ids=["taken back at once", "taken back before the next line"])
 def test_after_a_full_disk_it_goes_on_where_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files_up_to: FullDisk, *, mended: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, mended: bool
 ) -> None:
     path = tmp_path / "journal.jsonl"
     journal = Journal.create(path)

@@ -13,7 +13,8 @@ from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.atomic import sync_folder
 from study_app.store.journals import journal
-from tests.store.conftest import FullDisk, Start, study_tables
+from tests.platforms import files_up_to
+from tests.store.conftest import Start, study_tables
 from tests.store.sessions.conftest import every_byte
 
 TABLES = study_tables()
@@ -114,9 +115,7 @@ def test_an_unwritable_results_folder_is_one_line(tmp_path: Path, start: Start) 
     assert names_in(tmp_path) == ["file"]
 
 
-def test_a_disk_that_fills_while_beginning_leaves_no_session(
-    tmp_path: Path, start: Start, files_up_to: FullDisk
-) -> None:
+def test_a_disk_that_fills_while_beginning_leaves_no_session(tmp_path: Path, start: Start) -> None:
     start("P001").finish("completed")
     before = every_byte(tmp_path / "study")
     with files_up_to(1000), pytest.raises(StoreError, match=r"receipt\.json cannot be written \(File too large\)"):

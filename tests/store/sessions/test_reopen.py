@@ -20,7 +20,8 @@ from study_app.store.recordings import read_samples, write_frames
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import SessionStore
 from tests.journal_lines import event_of
-from tests.store.conftest import FullDisk, Make, Start
+from tests.platforms import files_up_to
+from tests.store.conftest import Make, Start
 from tests.store.sessions.conftest import Again
 from tests.store.test_recorder import Disk
 
@@ -130,7 +131,7 @@ def test_the_receipt_tells_what_it_goes_on_with(start: Start, again: Again) -> N
 
 
 def test_a_disk_without_space_for_the_line_changes_nothing_and_it_can_be_tried_again(
-    start: Start, again: Again, files_up_to: FullDisk
+    start: Start, again: Again
 ) -> None:
     with start() as store:
         store.append(journal_events.Note(kind="note", text="x" * 3000))

@@ -1,6 +1,5 @@
 """Which limits an interval breaks, by its samples: level, clipping, pace, and the difference of two delays."""
 
-from collections.abc import Iterator
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,7 @@ from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store.delivered import delivered, delivered_error, judged, missed, undelivered
 from tests.golden import compare
 from tests.protocol.edited_studies import text_of
-from tests.transcripts import played, value_of
+from tests.transcripts import acts, played, value_of
 
 STUDY = text_of("delivered")
 SLOW = (
@@ -83,21 +82,16 @@ class Interval:
         return f"{told}; broken: {[*undelivered(self.protocol.limits, presented, task, found)]}"
 
 
-def play(start: str, lines: list[str]) -> Iterator[str]:
-    """Yield what happens to samples of an interval, and what is found."""
+def begun(start: str) -> Interval:
     protocol = parse((SLOW if start.startswith("slow") else STUDY).encode(), "delivered.toml")
-    interval: Any = value_of(f"made({start.partition(':')[2]})", {"made": partial(Interval, protocol)})
-    for line in lines:
-        yield line
-        name = line.partition("(")[0]
-        told = value_of(line, {name: getattr(interval, name)})
-        yield from [f"> {told}"] if told else []
+    interval: Interval = value_of(f"made({start.partition(':')[2]})", {"made": partial(Interval, protocol)})
+    return interval
 
 
 def test_what_is_found_of_an_interval(pytestconfig: pytest.Config) -> None:
     """100 ms late, a damper of 8 N·s/m would measure as 6.5 at 1 Hz, were its motion not taken as late."""
     file = Path(__file__).parent / "golden" / "delivered.txt"
-    compare(file, played(file, play), pytestconfig, rel=1e-3)
+    compare(file, played(file, acts(begun, {})), pytestconfig, rel=1e-3)
 
 
 @pytest.mark.parametrize(

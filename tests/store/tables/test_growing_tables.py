@@ -12,7 +12,8 @@ from study_app.store.sessions.open_session import SessionStore, table_files
 from study_app.store.sessions.recovery import check_can_go_on, rebuild
 from study_app.store.verification.verify_study import verify
 from tests.journal_lines import event_of
-from tests.store.conftest import SOURCE, FullDisk, Start
+from tests.platforms import files_up_to
+from tests.store.conftest import SOURCE, Start
 
 PAGES = 5_000
 NOTES = ("first, of two lines\nand a comma", "=1+2", '"quoted"')
@@ -127,9 +128,7 @@ def test_a_table_that_was_cut_off_is_accepted_and_completed(
         assert path.read_bytes() == whole
 
 
-def test_on_a_disk_that_fills_a_table_keeps_its_rows(
-    start: Start, summary: dict[str, Any], files_up_to: FullDisk
-) -> None:
+def test_on_a_disk_that_fills_a_table_keeps_its_rows(start: Start, summary: dict[str, Any]) -> None:
     with start() as store:
         start_trial(store, 1)
         store.write_tables()

@@ -6,15 +6,14 @@ from typing import Any
 
 import pytest
 
-from study_app.errors import StoreError
 from study_app.store.journals.journal_events import Event
 from study_app.store.progress import progress_of
 from study_app.store.tables.session_tables import SessionRows, participant
 from tests.golden import compare
 from tests.journal_lines import event_of
-from tests.transcripts import played, value_of
+from tests.transcripts import acts, every, played, value_of
 
-FILES = sorted((Path(__file__).parent / "transcripts").glob("*.txt"))
+FILES = every(Path(__file__).parent / "transcripts", "progress rows")
 OF_ALL = ("study", "participant", "session", "simulated", "pilot", "phase", "part", "device", "operator")
 PROGRESS = ("step", "page", "trial", "attempt", "task_done", "answers", "unconfirmed", "ended", "resumed", "language")
 
@@ -79,18 +78,11 @@ class Lines:
         yield ", ".join(f"{name} {value}" for name, value in told.items() if value)
 
 
-def play(start: str, lines: list[str]) -> Iterator[str]:
-    """Yield lines of a journal, and what is made of them."""
-    journal: Any = value_of(f"lines({start})", {"lines": Lines})
-    for line in lines:
-        yield line
-        name = line.partition("(")[0]
-        try:
-            yield from (f"> {one}" for one in value_of(line, {name: getattr(journal, name)}) or ())
-        except StoreError as error:
-            yield f"> refused: {error}"
+def begun(start: str) -> Lines:
+    journal: Lines = value_of(f"lines({start})", {"lines": Lines})
+    return journal
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_what_is_made_of_lines(file: Path, pytestconfig: pytest.Config) -> None:
-    compare(file, played(file, play), pytestconfig)
+    compare(file, played(file, acts(begun, {})), pytestconfig)

@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store import receipt
@@ -23,6 +22,7 @@ from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.sessions.recovery import check_can_go_on, rebuild, reopen
 from study_app.store.tables.study_files import write_participants
 from study_app.store.verification.proofs import proof_text
+from study_app.store.verification.verify_session import Findings
 from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals import Tombstone, add_tombstone, describe_session, withdraw
 from tests.golden import CHANGING
@@ -30,7 +30,7 @@ from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, attended, begun, choose, made_samples, study_tables, summary_of_trial
 from tests.store.forging import Lines, cover_up, forge
 from tests.studies import rehearsed
-from tests.transcripts import Files, value_of
+from tests.transcripts import Files, Play, acts
 
 MASK = re.compile(
     CHANGING.pattern + r"|\b(?:[a-z0-9]{4}-){2}[a-z0-9]{4}(?:-[a-z0-9]{2})?\b|line \d+ column .*?\)"
@@ -51,6 +51,14 @@ NAMES = {
     "KEY": "blinding/key.sealed",
     "REVEALS": "blinding/reveals.jsonl",
 }
+
+
+def told(found: Findings) -> str:
+    return "\n".join(map(str, found.errors))
+
+
+def warned(found: Findings) -> str:
+    return "\n".join(map(str, found.warnings))
 
 
 def recorded(folder: Path) -> Path:
@@ -337,20 +345,12 @@ class Changed(Files):
         (self.study / P007 / ".open-0123abcd.json").write_text(json.dumps(marker))
 
 
-def player(made: dict[str, Path], folder: Path) -> Callable[[str, list[str]], Iterator[str]]:
-    """Return what plays transcripts of copies of studies in a folder."""
+def player(made: dict[str, Path], folder: Path) -> Play:
+    """Return what plays transcripts of copies of studies in a folder, which holds nothing else."""
 
-    def play(start: str, lines: list[str]) -> Iterator[str]:
-        changed: Any = Changed(made[start], folder)
-        for line in lines:
-            yield line
-            name = line.partition("(")[0]
-            try:
-                told = value_of(line, {**NAMES, name: getattr(changed, name)})
-                yield from (f"> {MASK.sub('*', one.replace(str(folder), 'FOLDER'))}" for one in told or ())
-            except StoreError as error:
-                yield f"> refused: {MASK.sub('*', str(error).replace(str(folder), 'FOLDER'))}"
+    def begun(start: str) -> Changed:
         for path in folder.iterdir():
             shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+        return Changed(made[start], folder)
 
-    return play
+    return acts(begun, NAMES, lambda said: MASK.sub("*", said.replace(str(folder), "FOLDER")))

@@ -12,7 +12,10 @@ from study_app.store.sessions import recovery
 from study_app.store.verification.verify_study import verify
 from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Start
-from tests.store.verification.findings import PARTICIPANTS, SESSION, replace, told, warned
+from tests.store.verification.played_studies import NAMES, P007, told, warned
+from tests.transcripts import Files
+
+PARTICIPANTS = NAMES["PARTICIPANTS"]
 
 
 def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
@@ -33,9 +36,9 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
     (store.folder.recordings / "trial-002.parquet").write_bytes(b"PAR1")
     (study / "data" / "sub-P010" / "ses-01").mkdir(parents=True)
     open_one = start("P011")
-    (study / SESSION / "crash.txt").touch()
+    (study / P007 / "crash.txt").touch()
     assert "crash" not in warned(verify(study))
-    (study / SESSION / "crash.txt").write_text("Fatal Python error: Segmentation fault")
+    (study / P007 / "crash.txt").write_text("Fatal Python error: Segmentation fault")
     findings = verify(study)
     open_one.close()
     for sentence in (
@@ -88,7 +91,7 @@ def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     assert findings.errors == ()
     for path in (PARTICIPANTS, "sub-P000/ses-01/subject-P000_session-01_task-brackish_description-trials_data.csv"):
         assert f"{path}: differs from the journal, from line 2 on; rebuild renews it" in warned(findings)
-    replace("withdrawn", "completed")(study / PARTICIPANTS)
+    Files(study).replace(PARTICIPANTS, "withdrawn", "completed")
     assert f"{PARTICIPANTS}: differs from the journal" in told(verify(study))
 
 
