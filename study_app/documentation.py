@@ -124,7 +124,7 @@ def _has(text: str, stem: str, begins: re.Pattern[str]) -> bool:
 
 
 def anchor_of(heading: str) -> str:
-    """Return the anchor of a heading as it is shown, as GitHub makes it."""
+    """Return the anchor of a heading as it is shown, as GitHub and MyST make it."""
     return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 

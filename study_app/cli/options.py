@@ -208,10 +208,10 @@ def echo_files(written: Iterable[Path]) -> None:
 
 def prepare(to: Path | None) -> None:
     """Make the folder to write into, if one was given, before a long computation."""
-    from study_app.store.output_files import make_folder
+    from study_app.store.atomic import make_folder
 
     if to is not None:
-        make_folder(to)
+        make_folder(to, waits=False)
 
 
 class ShowProgress(Protocol):

@@ -96,7 +96,7 @@ def power(
     from study_app.analysis.planning.simulated_studies import compares_statements
     from study_app.analysis.planning.threshold_studies import plans
     from study_app.protocol.load import load
-    from study_app.store.output_files import make_folder
+    from study_app.store.atomic import make_folder
 
     study = load(protocol)
     planned = plans(study, trials)
@@ -105,7 +105,7 @@ def power(
             f"--trials: {study.study.name} has no main block of thresholds, d′, ratings or magnitude estimation"
         )
     if to is not None:
-        make_folder(to)
+        make_folder(to, waits=False)
     if looks := () if study.analysis is None else study.analysis.looks:
         if click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT:
             raise click.UsageError(f"--sizes: the study plans looks at {', '.join(map(str, looks))}: omit --sizes")

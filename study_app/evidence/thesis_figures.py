@@ -23,7 +23,8 @@ from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Given, Liquid, Scene
 from study_app.haptics.runtime.offline import Table, simulate
-from study_app.store.output_files import make_folder, write_files
+from study_app.store.atomic import make_folder
+from study_app.store.output_files import write_files
 
 RATE_HZ: Final = 1000.0
 LENGTH: Final = 5000
@@ -184,7 +185,7 @@ def figures(to: Path) -> tuple[Path, ...]:
     StoreError, AnalysisError
         The folder cannot be made, or written.
     """
-    make_folder(to)
+    make_folder(to, waits=False)
     files: dict[str, bytes] = {}
     for make in FIGURES:
         shown = make()

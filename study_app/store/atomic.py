@@ -254,7 +254,7 @@ def cannot_write(path: Path, error: OSError) -> StoreError:
     why = "a file is where a folder is needed" if blocked else cause(error)
     return StoreError(
         f"{path} cannot be written ({why}): free disk space, correct its permissions, close the program "
-        "that uses it, or choose another results folder"
+        "that uses it, or choose another folder"
     )
 
 

@@ -107,21 +107,6 @@ def _parts(copied: FileCopy) -> Iterator[bytes]:
         raise AnalysisError(f"{copied.source} changed while it was copied: nothing was written; repeat the command")
 
 
-def make_folder(to: Path) -> None:
-    """Create the folder for reports before the work, so that errors appear at once.
-
-    Raises
-    ------
-    StoreError
-        It cannot be made.
-    """
-    try:
-        to.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        why = "it is a file, not a folder" if to.is_file() else error.strerror or error
-        raise StoreError(f"cannot make the folder {to} ({why}): choose another with --to") from error
-
-
 @dataclass(frozen=True, slots=True)
 class Output:
     """Files of a study's results, written into the folder ``to`` at ``at`` (wall time with its zone)."""

@@ -21,7 +21,6 @@ from study_app.discovery import registry
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import block_codes, order_of
-from study_app.protocol.trials.stimuli import LEVEL_RULES
 from study_app.store.atomic import parse_json, read_own, study_root, write_file
 from study_app.store.journals.journal_events import SessionStarted, holds, plain, shortened
 
@@ -70,10 +69,9 @@ def without_conditions(protocol: Protocol) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of the program and its rules of levels, of Python, system and libraries."""
+    """Return the versions of the program, of Python, system and libraries."""
     return {
         "liquid-study": study_app.__version__,
-        "level rules": LEVEL_RULES,
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         **{library: library_version(library) for library in _LIBRARIES},

@@ -28,8 +28,7 @@ from study_app.evidence.cfd.stored_flows import (
 )
 from study_app.evidence.computer import machine
 from study_app.haptics.model.motion import Floats
-from study_app.store.atomic import write_file
-from study_app.store.output_files import make_folder
+from study_app.store.atomic import make_folder, write_file
 
 COMMAND: Final = "liquid-study cfd --solve"
 GRID: Final = Grid(ahead=40, behind=80, aside=40, ball=0.1, near=0.4, far=8)
@@ -70,7 +69,7 @@ def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tupl
     solved[to / STEADY_FILE] = executor.submit(steady_table)
     for number, (path, table) in enumerate(solved.items(), start=1):
         progress(f"{path.name}, {number} of {len(solved)} ...")
-        make_folder(path.parent)
+        make_folder(path.parent, waits=False)
         write_file(path, table.result())
     return tuple(solved)
 

@@ -25,8 +25,7 @@ from study_app.evidence.cfd.stored_flows import package, read, text
 from study_app.evidence.table import Evidence, Table
 from study_app.haptics.model.laws import HerschelBulkley, creeping_n
 from study_app.haptics.model.motion import Floats
-from study_app.store.atomic import write_file
-from study_app.store.output_files import make_folder
+from study_app.store.atomic import make_folder, write_file
 
 COMMAND: Final = "liquid-study cfd --materials --solve"
 FILE: Final = "herschel_bulkley.csv"
@@ -109,7 +108,7 @@ def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None
         NGSolve is not installed, no steady flow was found, or the file cannot be written.
     """
     library()
-    make_folder(to)
+    make_folder(to, waits=False)
     rows: list[tuple[float, ...]] = []
     for index, found in zip(INDICES, executor.map(_solved, INDICES), strict=True):
         rows += found

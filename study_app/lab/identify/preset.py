@@ -11,7 +11,8 @@ from study_app.lab.identify.fit import CurveFit, Fit
 from study_app.lab.identify.measured_force import FLOW_CURVE
 from study_app.lab.identify.parameters import Parameter
 from study_app.protocol.scene_file import for_new_file, scene_text
-from study_app.store.output_files import make_folder, write_files
+from study_app.store.atomic import make_folder
+from study_app.store.output_files import write_files
 from study_app.store.tables.csv_files import csv_text_of
 
 COLUMNS: Final = ("t_s", *(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz"))
@@ -41,7 +42,7 @@ def write(found: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
     StoreError, AnalysisError
         The folder cannot be made, or written.
     """
-    make_folder(to)
+    make_folder(to, waits=False)
     name = f"{found.liquid_id}-fit"
     if isinstance(found, CurveFit):
         residual_pa = found.curve.stress_pa - found.fitted_pa

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import CoreModeRef, DefsRef, GenerateJsonSchema
 from pydantic_core import to_jsonable_python
 
+from study_app.documentation import anchor_of
 from study_app.protocol.formats import relax
 from study_app.protocol.model import Protocol
 
@@ -169,8 +170,7 @@ def _values(node: Node, headings: Mapping[str, str]) -> str:
 def _alternatives(node: Node, headings: Mapping[str, str]) -> Iterator[str]:
     if "$ref" in node:
         heading = headings[node["$ref"].rsplit("/", 1)[-1]]
-        anchor = re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")  # as GitHub and MyST make it
-        yield f"table [{heading}](#{anchor})".replace("[]", "\\[\\]", 1)
+        yield f"table [{heading}](#{anchor_of(heading)})".replace("[]", "\\[\\]", 1)
     elif branches := node.get("anyOf") or node.get("oneOf"):
         for branch in branches:
             yield from _alternatives(branch, headings)

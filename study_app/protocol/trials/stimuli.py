@@ -207,8 +207,8 @@ class Stimulated:
     value: float = 0.0
 
 
-LEVEL_RULES: Final = "2"
-"""Version of the rules by which levels are chosen: in 2 all widths are equally likely."""
+LEVEL_RULES: Final = 2
+"""Version of the rules by which levels are chosen; receipts state it. In 2 all widths are equally likely."""
 RUNNING_THRESHOLDS: Final = 41
 RUNNING_WIDTHS: Final = 9
 WIDTHS: Final = (0.5, 4.0)

@@ -15,6 +15,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import unbundled
+from study_app.protocol.trials.stimuli import LEVEL_RULES
 from study_app.store import receipt
 from study_app.store.atomic import cannot_write, is_there, make_folder, sweep_old, sync_folder, temporary_path
 from study_app.store.blinded.allocation import Allocation, allocate, check_session
@@ -233,6 +234,7 @@ def surroundings(
     used = receipt.plug_ins_of(protocol, str(device.get("name")), outlets or ())
     return {
         "versions": receipt.versions(),
+        "level_rules": LEVEL_RULES,
         "device": dict(device),
         "screens": dict(screens),
         "clock": {"origin_ns": clock.origin_ns, "origin_at": clock.at(0)},

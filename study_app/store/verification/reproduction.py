@@ -65,10 +65,11 @@ def reproduced(session_folder: Path) -> Reproduced:
     if lines and events.start_of(lines).intervals:
         compared = _Compared(protocol, Key(key.codes, key.nonce), schedule)
         _levels(compared, lines, key, found)
-        version, rules = (ran["versions"].get(name) for name in ("liquid-study", "level rules"))
-        if compared.differences and rules != LEVEL_RULES:
+        versions = ran["versions"]  # where receipts of 0.2.1 may have the rules, as a text
+        if compared.differences and str(ran.get("level_rules", versions.get("level rules"))) != str(LEVEL_RULES):
             found.followed.append(
-                f"liquid-study {version} ran the session and chose levels by other rules: run reproduce of that version"
+                f"liquid-study {versions.get('liquid-study')} ran the session and chose levels by other rules: run "
+                "reproduce of that version"
             )
     return found
 
