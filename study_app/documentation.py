@@ -89,18 +89,24 @@ def sections() -> dict[str, tuple[str, ...]]:
 
 
 class Section(NamedTuple):
-    """A heading of a page with the text below it; `names` are the title, the heading and its synonyms."""
+    """A heading of a page with the text below it.
+
+    `names` are the title, the heading and its synonyms; `phrases` the synonyms, and the title at its own heading.
+    """
 
     page: str
     heading: str
     names: str
+    phrases: tuple[str, ...]
     text: str
 
 
 def search(words: str) -> tuple[Section, ...]:
     """Return the best section of each page that has some of the words, or words that begin alike, the best page first.
 
-    A word counts more the fewer pages have it, and most in a heading. Pages far below the best are left out.
+    A word counts more the fewer pages have it, and most in a heading. A section counts twice if one of
+    its phrases was typed: among others if it has several words, alone if it is one. Pages far below the best are left
+    out.
     """
     typed = _WORD.findall(words.casefold())
     stems = [_ENDING.sub("", word) for word in typed if word not in _NO_MATTER.split()] or typed
@@ -112,6 +118,9 @@ def search(words: str) -> tuple[Section, ...]:
         rarity = math.log(1 + len(names()) / max(1, len(pages)))
         for one, weight in weights.items():
             score[one] += rarity * (weight or 0.25 * (one.page in pages))
+    whole = " ".join(typed)
+    for one in score:
+        score[one] *= 2 if any(it == whole or (" " in it and it in whole) for it in one.phrases) else 1
     best: dict[str, Section] = {}
     for one in sorted(score, key=lambda one: -score[one]):
         if score[one] > 0.3 * max(score.values()):
@@ -153,5 +162,6 @@ def _sections() -> tuple[Section, ...]:
             anchor = "" if heading == title_of_page else anchor_of(heading)
             also = [said for page_, anchor_, said in synonyms() if (page_, anchor_) == (name, anchor)]
             shown = " ".join([title_of_page, heading, *also]).casefold()
-            made.append(Section(name, heading, shown, plain(text[found.end() : ends]).casefold()))
+            phrases = tuple(", ".join(also if anchor else [*also, title_of_page]).casefold().split(", "))
+            made.append(Section(name, heading, shown, phrases, plain(text[found.end() : ends]).casefold()))
     return tuple(made)

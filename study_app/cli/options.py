@@ -23,6 +23,7 @@ GROUPS: Final = {
     "Model": "scene simulate identify estimate figures",
     "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds",
     "Devices": "devices outlets plugins",
+    "Help": "docs",
 }
 REMOVED: Final = {"emulate-falcon": "--device falcon-emulated runs the Falcon's driver on an emulated Falcon"}
 RENAMED: Final = {"run": {"--by": "--operator"}, "resume": {"--by": "--operator"}, "merge": {"--site": ""}}

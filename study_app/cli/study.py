@@ -299,3 +299,14 @@ def _studies(results: Path) -> Iterator[Path]:
 
     if results.is_dir():
         yield from study_folders(results)
+
+
+@click.command()
+@click.argument("page", metavar="[PAGE]", required=False)
+def docs(page: str | None) -> None:
+    """Print a page of the documentation with its lists, such as data-dictionary, or the names of all pages."""
+    from study_app import documentation
+
+    if page is not None and page not in documentation.names():
+        raise click.UsageError(f"{page} is not a page of the documentation: liquid-study docs lists them")
+    click.echo(documentation.page(page) if page else "\n".join(documentation.names()))

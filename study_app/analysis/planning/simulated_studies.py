@@ -81,7 +81,7 @@ class Plan:
     @property
     def unknown(self) -> tuple[str, ...]:
         """The items that the answer model knows nothing of, so that no effect on them is simulated."""
-        return tuple(item.id for block in self.blocks for item in block.items if item.id not in OPINIONS)
+        return tuple(dict.fromkeys(it.id for block in self.blocks for it in block.items if it.id not in OPINIONS))
 
 
 def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:

@@ -1,9 +1,5 @@
-"""The column dictionary as text: the page Data dictionary of the documentation.
+"""The column dictionary as text: the page Data dictionary of the documentation."""
 
-``python -m study_app.store.tables.column_dictionary`` prints it.
-"""
-
-import sys
 from collections.abc import Sequence
 
 from study_app.store.journals.journal_events import EVENTS
@@ -73,7 +69,3 @@ def _journal() -> str:
         for name, event in EVENTS.items()
     ]
     return _section("Journal", "journal.jsonl", "one line per event", (*head, *rows))
-
-
-if __name__ == "__main__":
-    sys.stdout.write(dictionary_markdown())

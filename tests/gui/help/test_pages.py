@@ -19,6 +19,14 @@ def test_every_page_is_listed_once_below_the_heading_of_its_section() -> None:
 ASKED = [
     # A researcher, before the first participant
     ("How many people do I need?", "sample size", "power", "`power` simulates whole studies"),
+    ("How many participants?", "how many participants", "power", "`power` simulates whole studies"),
+    ("How many do others have?", "participants", "power", "`analysis.participants` is the planned number"),
+    ("Which effect is assumed?", "effect size", "power", "Other statements have no effect"),
+    ("What do I tell them?", "what to tell the participant", "participants", "What must not be said"),
+    ("What may the board ask?", "ethics board", "participants", "How large can the force be?"),
+    ("Liquid and delay at once: how?", "two factors interaction", "contrasts", "The report tests no interaction"),
+    ("Which interval is it?", "confidence interval of a threshold", "statistics", "equal-tailed, of the posterior"),
+    ("How is it cited?", "how to cite", "index", "Please cite the program"),
     ("A staircase, or always the same levels?", "staircase or constant", "methods", "**`updown`**: one step down"),
     ("Can a person come on two days?", "second visit another day", "groups", "`sequences` those of session 1, 2"),
     ("Which of three is different: how?", "3AFC odd one out", "trials", "the odd or repeated interval"),
@@ -52,9 +60,10 @@ ASKED = [
     ("He comes again.", "second session same participant", "run-a-session", "enter the same ID and *Session* 2"),
     # An analyst, with a folder of results
     ("Where are reaction times?", "reaction time", "level-results", "time to answer"),
+    ("What is in this column?", "what a column means", "data-dictionary", "Largest magnitude of the force sent"),
     ("How do I leave one trial out?", "exclude one trial", "commands", "Only this trial; default: the whole session"),
     ("How do I read recordings?", "open recordings in matlab", "export", "`parquetread` in MATLAB"),
-    ("Are p-values corrected?", "multiple comparisons", "statistics", "Holm over the statements"),
+    ("Are p-values corrected?", "multiple comparisons", "statistics", "Primary statements are corrected by Holm"),
     (
         "Do trials with valid = false count?",
         "invalid trials counted",
