@@ -64,10 +64,10 @@ def _setting() -> str | None:
     """Return what the settings file says; a file that cannot be used says nothing (`store.workstation` reports it)."""
     try:
         document = json.loads(settings_file().read_bytes())
+        folder = setting_of(document) if isinstance(document, dict) else None
+        return folder if isinstance(folder, str) and os.fsencode(folder) else None
     except (OSError, ValueError, RecursionError):
         return None
-    folder = setting_of(document) if isinstance(document, dict) else None
-    return folder if isinstance(folder, str) else None
 
 
 def setting_of(settings: Mapping[str, Any]) -> Any:

@@ -391,7 +391,7 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
             tracks=np.array([int(name.rpartition("/")[2]) for name in own["track"]], np.int64),
             levels=own["level"].to_numpy(dtype=float),
             successes=successes,
-            reversals=own["reversal"].fillna(False).to_numpy(dtype=bool),
+            reversals=own["reversal"].astype("boolean").to_numpy(dtype=bool, na_value=False),
             catches=own["catch"].fillna(False).to_numpy(dtype=bool),
             noises=~own["arrangement"].str.contains("C").to_numpy(dtype=bool),
             low=low,

@@ -250,11 +250,12 @@ def _by_thread(port: int, service: Service, pace_ns: int, seconds: float) -> dic
         slot[0].run = 1
         thread = threading.Thread(target=_run_thread, args=run, daemon=True)
         thread.start()
-        found = _measure(driver, service, seconds)
-        slot[0].run = 0
-        thread.join()
-    del clock
-    return found
+        try:
+            return _measure(driver, service, seconds)
+        finally:  # the thread uses the memory of all these, also when the servo gave up
+            slot[0].run = 0
+            thread.join()
+            del clock
 
 
 def _round_trips(device: Inverse3Device) -> tuple[Any, Any]:

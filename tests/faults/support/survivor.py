@@ -13,14 +13,14 @@ from typing import Any
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication, QPainter
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QLabel, QWidget
 
 from study_app import app
 from study_app.app.session import live_session
 from study_app.devices.rig import Rig
 from study_app.gui.application import application_here
 from study_app.gui.kit.dialogs import Question
-from study_app.gui.operator.session_panels import StepLine
+from study_app.gui.operator import session_panels
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.widgets.live_plots import TracePlot
@@ -129,7 +129,7 @@ class Scene:
     def break_panels(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         if isinstance(participant.page, TaskPage):
             self.told["force in the next attempt"] = self.rig.servo.force_is_on
-            self.painted, StepLine.paintEvent = StepLine.paintEvent, _Badly.paintEvent
+            self.painter, session_panels.smooth_painter = session_panels.smooth_painter, _begins_and_fails
             self.drawn, TracePlot.show_traces = TracePlot.show_traces, _fails
             operator.update()
             self.step = self.see_lines
@@ -149,7 +149,7 @@ class Scene:
         QGuiApplication.processEvents()
         self.picture("panels")
         participant.come_forward()
-        StepLine.paintEvent, TracePlot.show_traces = self.painted, self.drawn
+        session_panels.smooth_painter, TracePlot.show_traces = self.painter, self.drawn
         self.samples_file, recordings.SamplesFile = recordings.SamplesFile, _ends
         self.trial = participant.page.trial if isinstance(participant.page, TaskPage) else None
         self.step = self.lose_recording
@@ -183,11 +183,10 @@ class Scene:
         return False
 
 
-class _Badly(StepLine):
-    def paintEvent(self, _event: object) -> None:  # noqa: N802 - as Qt calls it
-        painter = QPainter(self)
-        painter.drawLine(0, 0, 10, 10)
-        raise ValueError("no such colour")
+def _begins_and_fails(widget: QWidget) -> QPainter:
+    painter = QPainter(widget)
+    painter.drawLine(0, 0, 10, 10)
+    raise ValueError("no such colour")
 
 
 def _fails(*_arguments: object) -> None:
