@@ -24,9 +24,9 @@ _LISTED: Final = re.compile(r"^- \[[^]]+\]\(([\w/-]+)\.md\)", re.MULTILINE)
 _TITLE: Final = re.compile(r"^# (.+)$", re.MULTILINE)
 
 SYNONYMS: Final = ("glossary", "Words of other programs")
-"""The page and heading of a table: words that no page has to contain, and links to the sections about them."""
+"""The page and heading of a list: words that no page has to contain, and links to the sections about them."""
 
-_ROW: Final = re.compile(r"^\| (.+?) \|.*\]\(([\w/-]+)\.md(?:#([\w-]+))?\)", re.MULTILINE)
+_ROW: Final = re.compile(r"^- ([^:]+):\s+\[[^]]*\]\(([\w/-]+)\.md(?:#([\w-]+))?\)", re.MULTILINE)
 _MARKS: Final = re.compile(r"[`*\\]|\[([^]]*)\]\([^)]*\)")
 _FENCED_OR_HEADING: Final = re.compile(r"^```.*?^```|^#+ ([^\n]+)$", re.MULTILINE | re.DOTALL)
 _WORD: Final = re.compile(r"\w[\w-]*")
@@ -144,10 +144,10 @@ def plain(text: str) -> str:
 
 @cache
 def synonyms() -> tuple[tuple[str, str, str], ...]:
-    """Return page, anchor and words of each row of the glossary's last table."""
-    page_of_table, heading = SYNONYMS
-    _, _, table = source(page_of_table).partition(f"## {heading}\n")
-    return tuple((page, anchor, said) for said, page, anchor in _ROW.findall(table))
+    """Return page, anchor and words of each entry of the glossary's last list."""
+    page_of_list, heading = SYNONYMS
+    _, _, rows = source(page_of_list).partition(f"## {heading}\n")
+    return tuple((page, anchor, " ".join(said.split())) for said, page, anchor in _ROW.findall(rows))
 
 
 @cache

@@ -27,6 +27,10 @@ ASKED = [
     ("Liquid and delay at once: how?", "two factors interaction", "contrasts", "The report tests no interaction"),
     ("Which interval is it?", "confidence interval of a threshold", "statistics", "equal-tailed, of the posterior"),
     ("How is it cited?", "how to cite", "index", "Please cite the program"),
+    ("We measured our syrup.", "own liquid measured viscosity", "liquid-files", "viscosity_pa_s = 3"),
+    ("Is ketchup possible?", "shear thinning", "materials", "Its parameters are those that a rheometer measures"),
+    ("A threshold at which percentage?", "threshold definition", "level-results", "75 % correct"),
+    ("Is anything sent?", "telemetry", "participants", "files on this computer"),
     ("A staircase, or always the same levels?", "staircase or constant", "methods", "**`updown`**: one step down"),
     ("Can a person come on two days?", "second visit another day", "groups", "`sequences` those of session 1, 2"),
     ("Which of three is different: how?", "3AFC odd one out", "trials", "the odd or repeated interval"),
@@ -61,8 +65,9 @@ ASKED = [
     # An analyst, with a folder of results
     ("Where are reaction times?", "reaction time", "level-results", "time to answer"),
     ("What is in this column?", "what a column means", "data-dictionary", "Largest magnitude of the force sent"),
-    ("How do I leave one trial out?", "exclude one trial", "commands", "Only this trial; default: the whole session"),
+    ("How do I leave one trial out?", "exclude one trial", "answers-to-report", "or one of its trials (`--trial N`)"),
     ("How do I read recordings?", "open recordings in matlab", "export", "`parquetread` in MATLAB"),
+    ("At how many hertz?", "sampling rate", "export", "a row per tick: 1,000 per second"),
     ("Are p-values corrected?", "multiple comparisons", "statistics", "Primary statements are corrected by Holm"),
     (
         "Do trials with valid = false count?",
