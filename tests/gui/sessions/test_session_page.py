@@ -105,7 +105,8 @@ def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot,
         page = page_of(qtbot, study)
         for row in range(page.model.rowCount()):
             page.trials.selectRow(row)
-            after = [line.replace(str(study), "STUDY") for line in told(page)]
+            # Qt before 6.12 tells the name of a table as its value, too.
+            after = [line.replace(str(study), "STUDY").removesuffix(" |  | =") for line in told(page)]
             lines += [f"== {hold.__name__}, trial {row + 1}", *changed(before, after)]
             before = after
     page.folder.click()
