@@ -151,8 +151,9 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
     """Measure a device in ten minutes: timing, noise, mass, friction, force on a scale, stable damping.
 
     Stay within reach of its power switch: the handle moves by itself, with at most 4 N. Enter, Ctrl+C and the handle's
-    button 4 end the force. The report (bench.md, bench.json) can be sent to others; receipts of later sessions on this
-    machine record what was measured. Exit code 3 if the handle was touched; nothing is saved then.
+    stop button, if it has one, end the force. The report (bench.md, bench.json) can be sent to others; receipts of
+    later sessions on this machine record what was measured. Exit code 3 if the handle was touched; nothing is saved
+    then.
     """
     from study_app.devices.registry import check_options, descriptor_of
 
