@@ -53,8 +53,6 @@ main()
 
 
 WINDOWS = {"home": ("MainWindow",), "run": ("OpeningWindow", "OperatorWindow", "ParticipantWindow")}
-BEGIN = "<!-- start-up: printed by python tests/benchmarks/windows/startup.py -->"
-END = "<!-- end of start-up -->"
 LIMITS_S = {"help": 0.3, "MainWindow": 2.0, "OpeningWindow": 2.0}
 NAMES = {
     "help": "`--help`, printed",
@@ -109,7 +107,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=5)
     runs = parser.parse_args().runs
-    print(f"{BEGIN}\n\n| from the start of the program until | median of {runs} | slowest | limit |")
+    print(f"| from the start of the program until | median of {runs} | slowest | limit |")
     print("| --- | --: | --: | --: |")
     for kind in ("help", *WINDOWS):
         once(kind)  # the first may compile
@@ -123,7 +121,6 @@ def main() -> None:
     print("| `--help` | home | `run` |\n| --- | --- | --- |")
     for row in zip(*tables.values(), strict=True):
         print(f"| {' | '.join(f'`{name}` {alone_ms:.1f}' for name, alone_ms, _ in row)} |")
-    print(f"\n{END}")
 
 
 if __name__ == "__main__":
