@@ -104,9 +104,9 @@ class Section(NamedTuple):
 def search(words: str) -> tuple[Section, ...]:
     """Return the best section of each page that has some of the words, or words that begin alike, the best page first.
 
-    A word counts more the fewer pages have it, and most in a heading. A section counts twice if one of
-    its phrases was typed: among others if it has several words, alone if it is one. Pages far below the best are left
-    out.
+    A word counts more the fewer pages have it, and most in a heading. A section counts twice if one of its phrases was
+    typed: among others if it has several words, alone if it is one. Decisions count half. Pages far below the best are
+    left out.
     """
     typed = _WORD.findall(words.casefold())
     stems = [_ENDING.sub("", word) for word in typed if word not in _NO_MATTER.split()] or typed
@@ -121,6 +121,7 @@ def search(words: str) -> tuple[Section, ...]:
     whole = " ".join(typed)
     for one in score:
         score[one] *= 2 if any(it == whole or (" " in it and it in whole) for it in one.phrases) else 1
+        score[one] *= 0.5 if one.page.split("/")[0] in FOLDERS else 1
     best: dict[str, Section] = {}
     for one in sorted(score, key=lambda one: -score[one]):
         if score[one] > 0.3 * max(score.values()):
