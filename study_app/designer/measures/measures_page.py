@@ -137,7 +137,7 @@ class ForcesCard(Card):
         self.offered: tuple[ProblemRow | None, str] = (None, "")
         self.unit = Elided("small", "text2")
         self.chips = [Chip(small=True), Chip(small=True)]
-        head = hbox(label("Force at each level", "card"), (self.unit, 1), *self.chips)
+        head = hbox(label("Force at each level", "card"), (self.unit, 1), *self.chips, spacing=8)
         self.bar = WarningBar()
         self.words = label("", "small", wraps=True)
         self.repair = small_button("", "Repair", height=34)

@@ -272,6 +272,7 @@ def _fields(t: Theme) -> str:
 {field} {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl}; border-radius: {RADIUS_CONTROL}px;
   padding: 7px 12px; min-height: 24px; selection-background-color: {t.accent}; selection-color: {t.on_accent}; }}
 {focused} {{ border: 2px solid {t.accent}; padding: 6px 11px; }}
+QSpinBox {{ max-height: 24px; }}
 QLineEdit[dense='true'], QComboBox[dense='true'] {{ padding: 3px 6px; min-height: 22px; }}
 QLineEdit[dense='true']:focus, QComboBox[dense='true']:focus {{ padding: 2px 5px; }}
 QPlainTextEdit[dense='true'] {{ padding: 6px 8px; min-height: 18px; }}

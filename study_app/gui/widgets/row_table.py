@@ -182,7 +182,7 @@ class Table(Themed, QTableView):
             body = self._row(row)
             chosen = self.selectionModel().isRowSelected(row, QModelIndex())
             if chosen or self.model().index(row, 0).data(CARE_ROLE):
-                fill_rounded(painter, body, RADIUS_CONTROL, self.theme.selected if chosen else self.theme.hover)
+                fill_rounded(painter, body, RADIUS_CONTROL, self.theme.selected if chosen else self.theme.window)
             painter.setPen(QPen(QColor(self.theme.grid), 1))
             under = body.bottom() + 1
             painter.drawLine(MARGIN, int(under), self.viewport().width() - MARGIN, int(under))

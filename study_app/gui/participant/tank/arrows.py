@@ -40,18 +40,20 @@ def arrows_place(camera: Camera, arrows: Sequence[Arrow]) -> QRectF:
 
 
 def paint_arrows(painter: QPainter, camera: Camera, arrows: Sequence[Arrow]) -> None:
-    """Paint arrows, none of their names on another; those that are too short to have a direction are left out."""
-    taken = QRectF()
+    """Paint arrows, their names above all of them; those that are too short to have a direction are left out."""
+    taken, shown = QRectF(), []
     for arrow in arrows:
         start, tip = arrow.ends(camera)
         along = tip - start
         length, ink = math.hypot(along.x(), along.y()), QColor(arrow.colour)
         if length < LEAST_PX:
             continue
+        shown.append((arrow, tip, along, length))
         for colour, width in ((QColor(TANK.shadow), 6.0), (ink, 3.2)):
             painter.setPen(QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
             painter.drawLine(start, tip - along * (5.0 / length))
         draw_head(painter, tip, math.atan2(along.y(), along.x()), ink, 13.0)
+    for arrow, tip, along, length in shown:
         ratio = painter.device().devicePixelRatio()
         letters = _name(arrow.name, arrow.colour, ratio)
         wide = letters.width() / ratio
