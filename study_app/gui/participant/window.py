@@ -27,7 +27,7 @@ from PySide6.QtWidgets import QWidget
 from study_app.gui.display.screens import place
 from study_app.gui.participant.intervals.answer_page import SettingControls
 from study_app.gui.participant.page_widgets import page_widget
-from study_app.gui.participant.pages.page_widget import PageWidget
+from study_app.gui.participant.pages.page_widget import PageContext, PageWidget
 from study_app.gui.participant.pages.text_page import ReadingPage
 from study_app.gui.participant.tank_widget import TankWidget, paint_ahead
 from study_app.gui.theme.theme import PARTICIPANT, font, load_fonts, stylesheet
@@ -414,7 +414,7 @@ class ParticipantWindow(QWidget):
 
     def _wait_page(self, words_said: str) -> ReadingPage:
         column = ("clock", words_said, (), PARTICIPANT.accent)
-        return ReadingPage(column, self._words, self._clock, parent=self, text_scale=self.text_scale)
+        return ReadingPage(column, self._context)
 
     def _show_if_painted(self) -> None:
         """Put the tank in place of the page that asks to wait, once it is painted."""
@@ -436,10 +436,14 @@ class ParticipantWindow(QWidget):
         above = self.strip.height() if self.strip is not None else 0
         return self.rect().adjusted(frame, frame + above, -frame, -frame)
 
+    @property
+    def _context(self) -> PageContext:
+        return PageContext(self._words, self._clock, self, self.text_scale, by_mouse=self._captures)
+
     def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
         if isinstance(page, TaskPage):
             return self._make_tank(page)
-        made = page_widget(page, self._words, self._clock, self, old, self.text_scale, by_mouse=self._captures)
+        made = page_widget(page, self._context, old)
         made.event_made.connect(self.event)
         return made
 

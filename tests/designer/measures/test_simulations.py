@@ -26,6 +26,7 @@ from study_app.designer.measures.simulation import (
     start_measure_worker,
 )
 from study_app.gui.participant.page_widgets import parts_of
+from study_app.gui.participant.pages.page_widget import PageContext
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.load import load
@@ -247,7 +248,7 @@ PATH = ("questionnaires", "liquid")
 def test_a_page_never_shown_has_the_parts_of_one_that_is(qtbot: Any, size: tuple[int, int], expected: int) -> None:
     protocol = load("rek2024")
     (page, language), _ = _pages(protocol, focus_of(protocol, PATH), PATH)
-    shown = QuestionnaireWidget(page, words(language), time.monotonic)
+    shown = QuestionnaireWidget(page, PageContext(words(language), time.monotonic))
     qtbot.addWidget(shown)
     shown.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
     shown.resize(QSize(*size))

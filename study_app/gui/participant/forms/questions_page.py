@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRect, QRectF, Qt, QTimer
@@ -14,6 +14,7 @@ from study_app.discovery import by_name
 from study_app.gui.participant.forms.question_field import MARGIN, QuestionField, question_of, target_px
 from study_app.gui.participant.pages.page_widget import (
     GoButton,
+    PageContext,
     PageWidget,
     ProgressLine,
     beginning,
@@ -175,16 +176,8 @@ class QuestionsPage(PageWidget):
     ``Submitted`` once, when nothing is missing. Questions that an answer shows or hides come and go at once.
     """
 
-    def __init__(
-        self,
-        page: QuestionnairePage,
-        words: Words,
-        clock: Callable[[], float],
-        parent: QWidget | None = None,
-        *,
-        text_scale: float = 1.0,
-    ) -> None:
-        super().__init__(words, clock, parent, text_scale=text_scale)
+    def __init__(self, page: QuestionnairePage, context: PageContext) -> None:
+        super().__init__(context)
         self._page = page
         self._part = 0
         self.parts: list[list[QuestionField]] = []
@@ -192,7 +185,7 @@ class QuestionsPage(PageWidget):
         self._unsent: list[ItemShown] = []
         self.setAccessibleName(page.title)
         self.setAccessibleDescription(page.intro)
-        self._progress = ProgressLine(page.progress, words, ANSWERING, self)
+        self._progress = ProgressLine(page.progress, context.words, ANSWERING, self)
         self._title, self._intro = HeadingLabel(page.title, self), QLabel(page.intro, self)
         self._intro.setWordWrap(True)
         self._intro.setVisible(bool(page.intro))
@@ -200,7 +193,7 @@ class QuestionsPage(PageWidget):
             label.setStyleSheet(f"color: {ink}; background: transparent;")
             label.setAlignment(beginning(self) | Qt.AlignmentFlag.AlignVCenter)
         self.fields = tuple(self.made_field(item) for item in page.items)
-        self.foot = Foot(words, self)
+        self.foot = Foot(context.words, self)
         self.foot.button.clicked.connect(self.submit)
         self.tabs: list[QPushButton] = []
         self._lay_out_once()

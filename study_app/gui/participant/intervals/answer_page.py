@@ -9,7 +9,14 @@ from PySide6.QtCore import QEvent, QObject, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QPainter, QPen, QShowEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QLineEdit, QPushButton, QWidget
 
-from study_app.gui.participant.pages.page_widget import DigitPad, GoButton, KeyCap, PageWidget, ProgressLine
+from study_app.gui.participant.pages.page_widget import (
+    DigitPad,
+    GoButton,
+    KeyCap,
+    PageContext,
+    PageWidget,
+    ProgressLine,
+)
 from study_app.gui.participant.pages.text_page import Badge
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import HeadingLabel, say
@@ -28,19 +35,11 @@ ASKING = 0.8  # share of the present trial's bar that is full
 class AnswerPage(PageWidget):
     """The progress, a question and room for its answer below it; ``answer`` answers and continues, once."""
 
-    def __init__(
-        self,
-        page: DesignPage,
-        words: Words,
-        clock: Callable[[], float],
-        parent: QWidget | None = None,
-        *,
-        text_scale: float = 1.0,
-    ) -> None:
-        super().__init__(words, clock, parent, text_scale=text_scale)
+    def __init__(self, page: DesignPage, context: PageContext) -> None:
+        super().__init__(context)
         self.page = page
         self._answered = False
-        self._progress = ProgressLine(page.progress, words, ASKING, self)
+        self._progress = ProgressLine(page.progress, context.words, ASKING, self)
         self.question = QLabel(page.item.text, self, wordWrap=True, alignment=Qt.AlignmentFlag.AlignCenter)
         self.setAccessibleName(page.item.text)
         self._column = vbox(self._progress, (STRETCH, 2), self.question, 36, parent=self)
@@ -84,16 +83,8 @@ class ChoiceWidget(AnswerPage):
     Enter presses.
     """
 
-    def __init__(
-        self,
-        page: ChoicePage,
-        words: Words,
-        clock: Callable[[], float],
-        parent: QWidget | None = None,
-        *,
-        text_scale: float = 1.0,
-    ) -> None:
-        super().__init__(page, words, clock, parent, text_scale=text_scale)
+    def __init__(self, page: ChoicePage, context: PageContext) -> None:
+        super().__init__(page, context)
         self.buttons: list[QPushButton] = []
         self._values = [value for value, _ in page.item.options]
         for value, text in page.item.options:
@@ -103,7 +94,7 @@ class ChoiceWidget(AnswerPage):
             button.pressed.connect(lambda value=value: self.answer(value))
             button.installEventFilter(self)
             self.buttons.append(button)
-        self._cap, self._hint = KeyCap(self), QLabel(words.key_answer, self)
+        self._cap, self._hint = KeyCap(self), QLabel(self._words.key_answer, self)
         self._hint.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
         row = hbox(STRETCH, *self.buttons, STRETCH, spacing=CHOICE_GAP_PX)
         add_parts(self._column, row, 28, hbox(STRETCH, self._cap, self._hint, STRETCH), (STRETCH, 3))
@@ -159,17 +150,9 @@ CENTRED = Qt.AlignmentFlag.AlignHCenter
 class FeedbackWidget(PageWidget):
     """A check mark and "Right", or a dash and "Not right"."""
 
-    def __init__(
-        self,
-        page: FeedbackPage,
-        words: Words,
-        clock: Callable[[], float],
-        parent: QWidget | None = None,
-        *,
-        text_scale: float = 1.0,
-    ) -> None:
-        super().__init__(words, clock, parent, text_scale=text_scale)
-        self._text = words.right if page.right else words.not_right
+    def __init__(self, page: FeedbackPage, context: PageContext) -> None:
+        super().__init__(context)
+        self._text = self._words.right if page.right else self._words.not_right
         self.setAccessibleName(self._text)
         sign, colour = ("check", PARTICIPANT.ok) if page.right else ("minus", PARTICIPANT.text2)
         self._badge, self._word = Badge(sign, colour, self), HeadingLabel(self._text)
@@ -241,26 +224,18 @@ LONGEST = 12
 class NumberWidget(AnswerPage):
     """A field for a number, with point or comma; anything but a number above 0 is reported and not accepted."""
 
-    def __init__(
-        self,
-        page: NumberPage,
-        words: Words,
-        clock: Callable[[], float],
-        parent: QWidget | None = None,
-        *,
-        text_scale: float = 1.0,
-    ) -> None:
-        super().__init__(page, words, clock, parent, text_scale=text_scale)
+    def __init__(self, page: NumberPage, context: PageContext) -> None:
+        super().__init__(page, context)
         self._permits = page.item.permits
         self.field = QLineEdit(self, maxLength=LONGEST, alignment=Qt.AlignmentFlag.AlignCenter)
         self.field.setAccessibleName(page.item.text)
-        self.field.setAccessibleDescription(words.number_wanted)
+        self.field.setAccessibleDescription(self._words.number_wanted)
         self.wrong = QLabel("", self)
         self.wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self.field.textChanged.connect(lambda _text: self.wrong.clear())
-        self._pad = DigitPad(self.field, (".",), ACROSS, words.delete_digit, self)
+        self._pad = DigitPad(self.field, (".",), ACROSS, self._words.delete_digit, self)
         self.keys = self._pad.keys
-        self.button = GoButton(words.continue_, words.enter_key, self)
+        self.button = GoButton(self._words.continue_, self._words.enter_key, self)
         self.button.clicked.connect(self._confirm)
         above = ((widget, 0, CENTRED) for widget in (self.field, self.wrong, self._pad))
         add_parts(self._column, *above, 24, (self.button, 0, CENTRED), (STRETCH, 3))

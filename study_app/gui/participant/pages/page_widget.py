@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
@@ -79,23 +80,38 @@ def page_painter(widget: QWidget) -> QPainter:
     return painter
 
 
+@dataclass(frozen=True, slots=True)
+class PageContext:
+    """What a page is shown with.
+
+    Attributes
+    ----------
+    clock : returns the time of an event, at the moment of the key or the click [s]
+    text_scale : how much larger than designed words must be at least, for this screen at this distance
+    by_mouse : whether the mouse is the device
+    """
+
+    words: Words
+    clock: Callable[[], float]
+    parent: QWidget | None = None
+    text_scale: float = 1.0
+    by_mouse: bool = False
+
+
 class PageWidget(QWidget):
     """A page that fills the participant's window, mirrored in a language that is read from right to left.
 
-    ``event_made`` carries the session's events; their times are ``clock()`` [s] at the moment of the key or the click.
-    ``text_scale`` is how much larger than designed words must be at least, for this screen at this distance.
+    ``event_made`` carries the session's events.
     """
 
     event_made = Signal(object)
 
-    def __init__(
-        self, words: Words, clock: Callable[[], float], parent: QWidget | None = None, *, text_scale: float = 1.0
-    ) -> None:
-        super().__init__(parent)
-        self._words = words
-        self._clock = clock
-        self._text_scale = text_scale
-        self.setLayoutDirection(direction(words))
+    def __init__(self, context: PageContext) -> None:
+        super().__init__(context.parent)
+        self._words = context.words
+        self._clock = context.clock
+        self._text_scale = context.text_scale
+        self.setLayoutDirection(direction(context.words))
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
 
     @property

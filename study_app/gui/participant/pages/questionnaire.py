@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from study_app.gui.participant.forms.question_field import NO_WORDS, QuestionField, ScaleField
 from study_app.gui.participant.forms.questions_page import QuestionsPage
-from study_app.gui.participant.pages.page_widget import page_painter, page_scale, words_scale
+from study_app.gui.participant.pages.page_widget import PageContext, page_painter, page_scale, words_scale
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.boxes import add_layout
 from study_app.protocol.questions import ItemView
@@ -353,16 +353,8 @@ class QuestionnaireWidget(QuestionsPage):
 
     fields: tuple[StatementField, ...]
 
-    def __init__(
-        self,
-        page: QuestionnairePage,
-        words: Words,
-        clock: Callable[[], float],
-        parent: QWidget | None = None,
-        *,
-        text_scale: float = 1.0,
-    ) -> None:
-        super().__init__(page, words, clock, parent, text_scale=text_scale)
+    def __init__(self, page: QuestionnairePage, context: PageContext) -> None:
+        super().__init__(page, context)
         self._heading = Heading(page.labels, page.cannot_judge, self._row_shown, self)
         self.questions.insertWidget(0, self._heading)
         for field in self.fields:

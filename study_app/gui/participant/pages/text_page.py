@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, Qt, QTimer
@@ -14,6 +13,7 @@ from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QScrollArea, QScrolle
 from study_app.gui.participant.pages.page_widget import (
     GoButton,
     LanguageSwitch,
+    PageContext,
     PageWidget,
     ProgressLine,
     page_painter,
@@ -27,7 +27,7 @@ from study_app.session.pages import EndPage, PausePage, TextPage, TroublePage
 from study_app.session.transitions.events import Continue, EndRequested, LanguageChosen, ResumeRequested
 
 if TYPE_CHECKING:
-    from study_app.protocol.wording.languages import Words
+    pass
 
 COLUMN = 700.0  # a line that reads well [logical px at scale 1]
 LINE_PERCENT = 140
@@ -110,15 +110,11 @@ class ReadingPage(PageWidget):
     def __init__(
         self,
         column: tuple[str, str, tuple[str, ...], str],
-        words: Words,
-        clock: Callable[[], float],
-        *,
+        context: PageContext,
         button: tuple[str, str] | None = None,
         progress: ProgressLine | None = None,
-        parent: QWidget | None = None,
-        text_scale: float = 1.0,
     ) -> None:
-        super().__init__(words, clock, parent, text_scale=text_scale)
+        super().__init__(context)
         icon, title, paragraphs, colour = column
         self.setAccessibleName(title)
         self.setAccessibleDescription("\n".join(paragraphs))
@@ -231,22 +227,13 @@ class TextWidget(ReadingPage):
     time counts it down in the place of its button. Before the consent another language can be chosen.
     """
 
-    def __init__(
-        self,
-        page: TextPage,
-        words: Words,
-        clock: Callable[[], float],
-        parent: QWidget | None = None,
-        *,
-        text_scale: float = 1.0,
-    ) -> None:
+    def __init__(self, page: TextPage, context: PageContext) -> None:
+        words = context.words
         self._consent = page.kind == "consent"
         key = words.enter_key if self._consent else words.space_key
         progress = ProgressLine(page.progress, words, 0.0) if page.progress is not None else None
         column = (ICONS[page.kind], page.title, page.paragraphs, PARTICIPANT.accent)
-        super().__init__(
-            column, words, clock, button=(page.button, key), progress=progress, parent=parent, text_scale=text_scale
-        )
+        super().__init__(column, context, (page.button, key), progress)
         self._stays_until_s = page.stays_until_s
         self.count_label = QLabel(self)
         self.count_label.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
@@ -386,19 +373,9 @@ class PauseWidget(ReadingPage):
     never speaks of one.
     """
 
-    def __init__(
-        self,
-        page: PausePage,
-        words: Words,
-        clock: Callable[[], float],
-        *,
-        under: QPixmap | None = None,
-        parent: QWidget | None = None,
-        text_scale: float = 1.0,
-        by_mouse: bool = False,
-    ) -> None:
-        self.under = under
-        if page.force_off and not by_mouse:
+    def __init__(self, page: PausePage, context: PageContext, under: QPixmap | None = None) -> None:
+        self.under, words = under, context.words
+        if page.force_off and not context.by_mouse:
             title = words.force_held_title if page.held == "force" else words.force_off_title
             body = words.force_off_body if page.held is None else words.force_held_body
             column = ("stop", title, (body,), PARTICIPANT.bad)
@@ -408,7 +385,7 @@ class PauseWidget(ReadingPage):
             column = ("pause", words.pause_title, (body,), PARTICIPANT.accent)
             label = words.resume
         button = (label, words.enter_key) if page.held is None else None
-        super().__init__(column, words, clock, button=button, parent=parent, text_scale=text_scale)
+        super().__init__(column, context, button)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Go on with Enter; Space alone could still be the key of the page before."""
@@ -442,22 +419,13 @@ class NoticeWidget(ReadingPage):
     Where the mouse is the device, the last page does not ask to let go of it.
     """
 
-    def __init__(
-        self,
-        page: TroublePage | EndPage,
-        words: Words,
-        clock: Callable[[], float],
-        parent: QWidget | None = None,
-        *,
-        text_scale: float = 1.0,
-        by_mouse: bool = False,
-    ) -> None:
-        ended = isinstance(page, EndPage)
+    def __init__(self, page: TroublePage | EndPage, context: PageContext) -> None:
+        ended, words = isinstance(page, EndPage), context.words
         icon, colour = ("check", PARTICIPANT.ok) if ended else ("info", PARTICIPANT.warn)
-        said = f"{page.paragraph} {words.let_go}" if ended and not by_mouse else page.paragraph
+        said = f"{page.paragraph} {words.let_go}" if ended and not context.by_mouse else page.paragraph
         column = (icon, page.title, (said,), colour)
         button = (words.close, words.space_key) if ended else None
-        super().__init__(column, words, clock, button=button, parent=parent, text_scale=text_scale)
+        super().__init__(column, context, button)
 
     def focus_first(self) -> None:
         (self.button or self).setFocus()
