@@ -53,7 +53,6 @@ from study_app.lab.programmed_paths import TITLES
 from study_app.protocol.quantities import QUANTITIES
 
 if TYPE_CHECKING:
-    pass
     from study_app.lab.estimation.live_estimation import LiveEstimation
     from study_app.lab.live import Live
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QPixmap, QResizeEvent
@@ -15,6 +15,7 @@ from study_app.gui.participant.intervals.answer_page import ChoiceWidget, Feedba
 from study_app.gui.participant.pages.page_widget import PageContext, PageWidget
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.pages.text_page import NoticeWidget, PauseWidget, TextWidget
+from study_app.protocol.wording.languages import Words
 from study_app.session.pages import (
     ChoicePage,
     EndPage,
@@ -25,9 +26,6 @@ from study_app.session.pages import (
     TextPage,
     TroublePage,
 )
-
-if TYPE_CHECKING:
-    from study_app.protocol.wording.languages import Words
 
 WithoutTank = TextPage | QuestionnairePage | ChoicePage | NumberPage | FeedbackPage | PausePage | TroublePage | EndPage
 WIDGETS: Final[Mapping[type[WithoutTank], Callable[[Any, PageContext], PageWidget]]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import ClassVar, Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QKeyEvent, QMouseEvent, QPaintEvent, QPen, QWheelEvent
@@ -37,9 +37,7 @@ from study_app.protocol.questions import (
     plain_number,
 )
 from study_app.protocol.table import UNPRINTABLE
-
-if TYPE_CHECKING:
-    from study_app.protocol.wording.languages import Words
+from study_app.protocol.wording.languages import Words
 
 SHORT = 12  # letters of options of which three stand side by side
 MEDIUM = 28  # of which two do

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from threading import Thread
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QRegion, QResizeEvent, QShowEvent
@@ -46,12 +45,9 @@ from study_app.gui.participant.tank.layers import (
 )
 from study_app.gui.theme.theme import TANK
 from study_app.gui.widgets.accessible import say
+from study_app.protocol.wording.languages import Words
 from study_app.session.pages import TaskPage
-from study_app.session.tasks import track
-
-if TYPE_CHECKING:
-    from study_app.protocol.wording.languages import Words
-    from study_app.session.tasks import TankView
+from study_app.session.tasks import TankView, track
 
 # Where the tank lies in the window, in shares of it.
 AREA = (0.075, 0.122, 0.85, 0.712)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from threading import Thread
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
@@ -44,10 +43,8 @@ from study_app.session.pages import (
     TaskPage,
     TextPage,
 )
+from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Continue, ForceStopped, PauseRequested
-
-if TYPE_CHECKING:
-    from study_app.session.tasks import TankView
 
 SHARE_OF_SCREEN = 0.6  # of the screen's height that moves the hand through the height of the workspace
 NOTCHES = 24  # of the wheel through the depth of the workspace

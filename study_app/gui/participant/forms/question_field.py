@@ -31,10 +31,9 @@ from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
 from study_app.gui.widgets.accessible import give_role, say
 from study_app.gui.widgets.boxes import grid
 from study_app.protocol.questions import ItemView, Value
+from study_app.protocol.wording.languages import Words
 
 if TYPE_CHECKING:
-    from study_app.protocol.wording.languages import Words
-
     Widget = QWidget
 else:
     Widget = object

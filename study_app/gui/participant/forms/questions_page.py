@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRect, QRectF, Qt, QTimer
 from PySide6.QtGui import QAccessible, QColor, QFont, QFontMetrics, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent
@@ -28,11 +27,9 @@ from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import HeadingLabel, give_role, say
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.protocol.questions import ItemView, shown
+from study_app.protocol.wording.languages import Words
 from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import Chosen, ItemShown, Retracted, Submitted
-
-if TYPE_CHECKING:
-    from study_app.protocol.wording.languages import Words
 
 MARK = 22.0
 MOVE_KEYS = "↑ ↓"

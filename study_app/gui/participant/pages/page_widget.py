@@ -31,8 +31,6 @@ from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import Progress
 
 if TYPE_CHECKING:
-    from study_app.protocol.wording.languages import Words
-
     Button = QAbstractButton
 else:
     Button = object  # Qt permits one class of its own in a class

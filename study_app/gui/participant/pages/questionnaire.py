@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFocusEvent, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
@@ -18,10 +18,8 @@ from study_app.gui.participant.pages.page_widget import PageContext, page_painte
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.boxes import add_layout
 from study_app.protocol.questions import ItemView
+from study_app.protocol.wording.languages import Words
 from study_app.session.pages import QuestionnairePage
-
-if TYPE_CHECKING:
-    from study_app.protocol.wording.languages import Words
 
 LEAST_CELL = 44.0
 NARROW = 900.0

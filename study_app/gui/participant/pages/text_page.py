@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import math
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, Qt, QTimer
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QPaintEvent, QPen, QPixmap
@@ -25,9 +24,6 @@ from study_app.gui.widgets.accessible import HeadingLabel, say
 from study_app.gui.widgets.boxes import STRETCH, vbox
 from study_app.session.pages import EndPage, PausePage, TextPage, TroublePage
 from study_app.session.transitions.events import Continue, EndRequested, LanguageChosen, ResumeRequested
-
-if TYPE_CHECKING:
-    pass
 
 COLUMN = 700.0  # a line that reads well [logical px at scale 1]
 LINE_PERCENT = 140

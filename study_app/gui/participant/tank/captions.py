@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QRegion
@@ -19,10 +18,8 @@ from study_app.gui.participant.pages.page_widget import (
 )
 from study_app.gui.participant.tank.frame import Placed, TaskShown
 from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.protocol.wording.languages import Words
 from study_app.session.pages import TaskPage
-
-if TYPE_CHECKING:
-    from study_app.protocol.wording.languages import Words
 
 DESIGNED_FOR = (1920, 1080)
 LEAST_SCALE = 0.72
