@@ -44,6 +44,7 @@ from study_app.gui.lab.lab_state import (
     Now,
 )
 from study_app.gui.lab.view import LabPlace
+from study_app.gui.widgets.background import Background, delayed
 from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting, Side, Workbench
@@ -153,20 +154,17 @@ class LabOpening(QObject):
     opened = Signal(object)
     failed = Signal(object)
     said = Signal(str)
-    _done = Signal(object)
 
     def __init__(self, open_live: Callable[..., Live] | None = None, options: Mapping[str, Path] | None = None) -> None:
         super().__init__()
         self._open_live = open_live
         self._options = options
         self._wanted: str | None = None
-        self._opening: str | None = None
         self._cancelled = threading.Event()
-        self._thread: threading.Thread | None = None
         self._began_s = 0.0
-        self._start = QTimer(self, singleShot=True, interval=STARTS_AFTER_MS)
-        self._start.timeout.connect(self._begin)
-        self._done.connect(self._end, Qt.ConnectionType.QueuedConnection)
+        self._start = delayed(self, STARTS_AFTER_MS, self._begin)
+        self._background = Background(self)
+        self._background.done.connect(self._end)
 
     @property
     def busy_with(self) -> str | None:
@@ -176,13 +174,13 @@ class LabOpening(QObject):
     @property
     def lasts_s(self) -> float:
         """How long a device has been opened so far [s]; 0 where none is."""
-        return 0.0 if self._thread is None or self._wanted is None else time.monotonic() - self._began_s
+        return time.monotonic() - self._began_s if self._background.busy and self._wanted is not None else 0.0
 
     def want(self, name: str) -> None:
         """Open a device; one that is being opened is given up first."""
         self.cancel()
         self._wanted = name
-        if self._thread is None:
+        if not self._background.busy:
             self._start.start()
 
     def cancel(self) -> None:
@@ -193,20 +191,16 @@ class LabOpening(QObject):
 
     def wait(self, patience_s: float = PATIENCE_S) -> None:
         """Wait for what is being opened: it must be let go of in the windows' thread, not in its own."""
-        if self._thread is not None:
-            self._thread.join(patience_s)
-            QCoreApplication.sendPostedEvents(self)
+        self._background.wait(patience_s)
+        QCoreApplication.sendPostedEvents()
 
     def _begin(self) -> None:
         assert self._wanted is not None  # noqa: S101 - begun only where something is wanted
-        self._opening, self._cancelled, self._began_s = self._wanted, threading.Event(), time.monotonic()
-        self._thread = threading.Thread(
-            target=self._open, args=(self._wanted, self._cancelled), name="lab opening", daemon=True
-        )
-        self._thread.start()
+        self._cancelled, self._began_s = threading.Event(), time.monotonic()
+        self._background.run(partial(self._open, self._wanted, self._cancelled))
 
-    def _open(self, name: str, cancelled: threading.Event) -> None:
-        """Compile, open and start, in a thread of its own; whatever comes of it goes to ``_end``."""
+    def _open(self, name: str, cancelled: threading.Event) -> tuple[object, threading.Event]:
+        """Compile, open and start, in a thread of its own; return whatever comes of it for ``_end``."""
         try:
             loads = self._open_live is None
             if self._open_live is None:
@@ -218,12 +212,11 @@ class LabOpening(QObject):
                 gc.freeze()  # the windows' thread need not look through all that was loaded here
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             made = error
-        self._done.emit((made, cancelled))
+        return made, cancelled
 
     def _end(self, done: tuple[object, threading.Event]) -> None:
         """Hand over what was opened, or let go of it where it is not wanted any more."""
         made, cancelled = done
-        self._thread = None
         if not cancelled.is_set():
             self._wanted = None
             (self.failed if isinstance(made, Exception) else self.opened).emit(made)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal, TypeAlias
 
 from pydantic import ValidationError
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import (
     QBrush,
     QColor,
@@ -181,10 +181,9 @@ class End(Themed, QSlider):
         if self.held:
             return
         self.span, self.level = span, level
-        self.blockSignals(True)
-        self.setRange(0, span.steps)
-        self.setValue(round(span.share(level) * span.steps))
-        self.blockSignals(False)
+        with QSignalBlocker(self):
+            self.setRange(0, span.steps)
+            self.setValue(round(span.share(level) * span.steps))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = KEYS.get(Qt.Key(event.key()))

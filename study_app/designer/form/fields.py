@@ -26,7 +26,7 @@ from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
-from study_app.gui.widgets.labels import Elided, label
+from study_app.gui.widgets.labels import Elided, label, set_property
 from study_app.number_text import number_of, typed_numbers
 
 HAND_ON_MS = 150
@@ -127,11 +127,7 @@ class _Typed(_Base):
 
     def show_refused(self, yes: bool) -> None:
         """Give the field the edge of one whose text is refused, or take it away."""
-        state = "refused" if yes else ""
-        if (self.property("state") or "") != state:
-            self.setProperty("state", state)
-            self.style().unpolish(self)
-            self.style().polish(self)
+        set_property(self, "state", "refused" if yes else "")
 
     def leaves_to_place(self, event: QEvent) -> bool:
         """Return whether a key is the place's, whose undo is for the whole study."""

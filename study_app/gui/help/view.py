@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from PySide6.QtCore import QEvent, QObject, QSize, Qt, QUrl, Signal
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, QSize, Qt, QUrl, Signal
 from PySide6.QtGui import (
     QColor,
     QDesktopServices,
@@ -356,27 +356,25 @@ class HelpPlace(Place):
         self.back.setEnabled(bool(self._before))
 
     def _show_rows(self, rows: tuple[HelpEntry, ...]) -> None:
-        self.list.blockSignals(True)
-        self.list.clear()
-        for row in rows:
-            item = QListWidgetItem(row.title)
-            item.setData(PAGE, row.page)
-            item.setData(ANCHOR, row.anchor)
-            item.setToolTip(row.title)
-            item.setFont(font("label", weight=600 if row.heads else 400))
-            item.setSizeHint(QSize(LIST_WIDTH - 60, HEAD_PX if row.heads else ROW_PX))
-            self.list.addItem(item)
-        self.list.blockSignals(False)
+        with QSignalBlocker(self.list):
+            self.list.clear()
+            for row in rows:
+                item = QListWidgetItem(row.title)
+                item.setData(PAGE, row.page)
+                item.setData(ANCHOR, row.anchor)
+                item.setToolTip(row.title)
+                item.setFont(font("label", weight=600 if row.heads else 400))
+                item.setSizeHint(QSize(LIST_WIDTH - 60, HEAD_PX if row.heads else ROW_PX))
+                self.list.addItem(item)
         self.nothing.setVisible(not rows)
         self._select("" if self.words.text().strip() else self.reader.page)
 
     def _select(self, name: str) -> None:
         rows = [row for row in range(self.list.count()) if self.list.item(row).data(PAGE) == name]
-        self.list.blockSignals(True)
-        self.list.setCurrentRow(rows[0] if rows else -1)
-        if not rows:
-            self.list.clearSelection()
-        self.list.blockSignals(False)
+        with QSignalBlocker(self.list):
+            self.list.setCurrentRow(rows[0] if rows else -1)
+            if not rows:
+                self.list.clearSelection()
 
     def _chosen(self, item: QListWidgetItem | None) -> None:
         if item is not None:

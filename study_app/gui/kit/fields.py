@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QAbstractButton, QButtonGroup, QComboBox, QFileDia
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number, Radio, Toggle
-from study_app.gui.widgets.labels import label, set_ink
+from study_app.gui.widgets.labels import label, set_ink, set_property
 from study_app.gui.widgets.numbers import read_number, write_number
 from study_app.session.start import MAX_SEED
 
@@ -233,9 +233,7 @@ class Editor(QWidget):
         self.below.setText(why or self._hint)
         self.below.setVisible(bool(why or self._hint))
         set_ink(self.below, "bad" if why else "text2")
-        self.control.setProperty("state", "refused" if why else "")
-        self.control.style().unpolish(self.control)
-        self.control.style().polish(self.control)
+        set_property(self.control, "state", "refused" if why else "")
 
     def _show_text(self, text: str) -> None:
         assert isinstance(self.control, QLineEdit)  # noqa: S101 - only lines are typed

@@ -13,7 +13,7 @@ from study_app.gui.theme.themed import Themed, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, CompactStop, IconButton, Toggle
-from study_app.gui.widgets.labels import Clamped, label
+from study_app.gui.widgets.labels import Clamped, label, set_property
 from study_app.gui.widgets.numbers import NumberField, Range, Slider, read_number, write_number
 from study_app.haptics.model.effect import Parameter, Value
 from study_app.lab.ab_comparison import Setting, Side, other
@@ -447,11 +447,7 @@ class ChoiceRow(ParameterRow):
             self.show_refused("")
         self._value = row.value
         self.choice.setCurrentIndex(self.choice.findData(row.value))
-        state = "changed" if row.changed else ""
-        if self.choice.property("state") != state:
-            self.choice.setProperty("state", state)
-            self.choice.style().unpolish(self.choice)
-            self.choice.style().polish(self.choice)
+        set_property(self.choice, "state", "changed" if row.changed else "")
         for part in (self.name, self.choice):
             part.setFont(font("label", weight=600 if row.changed else None))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 from typing import ClassVar, Final
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QKeyEvent, QMouseEvent, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import QLabel, QLineEdit, QPlainTextEdit, QPushButton, QSizePolicy, QSlider, QWidget
 
@@ -25,6 +25,7 @@ from study_app.gui.participant.pages.page_widget import DigitPad, page_painter, 
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
+from study_app.gui.widgets.labels import set_property
 from study_app.gui.widgets.numbers import read_number, write_number
 from study_app.protocol.questions import (
     ChoiceView,
@@ -215,9 +216,8 @@ class NumberField(TypedField):
         return ("-",) if below else ()
 
     def _write(self, text: str) -> None:
-        self.entry.blockSignals(True)
-        self.entry.setText(text)
-        self.entry.blockSignals(False)
+        with QSignalBlocker(self.entry):
+            self.entry.setText(text)
 
     def _edit(self) -> None:
         self._say("")
@@ -246,9 +246,7 @@ class NumberField(TypedField):
     def _say(self, problem: str) -> None:
         self._wrong.setText(problem)
         self._wrong.setVisible(bool(problem))
-        self.entry.setProperty("state", "refused" if problem else "")
-        self.entry.style().unpolish(self.entry)
-        self.entry.style().polish(self.entry)
+        set_property(self.entry, "state", "refused" if problem else "")
         self.entry.setAccessibleDescription(problem)
         if problem:
             say(self.entry, problem)
@@ -357,9 +355,8 @@ class Line(QSlider):
     def show_step(self, step: int) -> None:
         """Put the handle at a step without a signal."""
         self.touched = True
-        self.blockSignals(True)
-        self.setValue(step)
-        self.blockSignals(False)
+        with QSignalBlocker(self):
+            self.setValue(step)
         self.update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -429,9 +426,8 @@ class Line(QSlider):
 
     def _move(self, step: int) -> None:
         self.touched = True
-        self.blockSignals(True)
-        self.setValue(step)
-        self.blockSignals(False)
+        with QSignalBlocker(self):
+            self.setValue(step)
         self.update()
         self.set_to.emit(self.value())
 
@@ -537,14 +533,12 @@ class TextField(TypedField):
 
     def show_answer(self, value: Value) -> None:
         self.kept(value)
-        self.entry.blockSignals(True)
-        self.entry.setPlainText(str(value))
-        self.entry.blockSignals(False)
+        with QSignalBlocker(self.entry):
+            self.entry.setPlainText(str(value))
 
     def clear(self) -> None:
-        self.entry.blockSignals(True)
-        self.entry.clear()
-        self.entry.blockSignals(False)
+        with QSignalBlocker(self.entry):
+            self.entry.clear()
         self._timer.stop()
 
     def set_scale(self, scale: float) -> None:
@@ -576,9 +570,8 @@ class TextField(TypedField):
             kept = kept.replace("\n", " ")
         if kept != text:
             place = min(self.entry.textCursor().position(), len(kept))
-            self.entry.blockSignals(True)
-            self.entry.setPlainText(kept)
-            self.entry.blockSignals(False)
+            with QSignalBlocker(self.entry):
+                self.entry.setPlainText(kept)
             cursor = self.entry.textCursor()
             cursor.setPosition(place)
             self.entry.setTextCursor(cursor)

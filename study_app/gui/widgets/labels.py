@@ -4,7 +4,7 @@ from typing import Literal, TypeAlias
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAccessible, QFont, QFontMetrics, QFontMetricsF, QResizeEvent, QTextLayout
-from PySide6.QtWidgets import QLabel, QSizePolicy
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.widgets.accessible import HeadingLabel, give_role
@@ -139,8 +139,13 @@ def clamped(text: str, most: int, font: QFont, width: int) -> list[str]:
 
 
 def set_ink(widget: QLabel, ink: Ink) -> None:
-    """Give a label the colour of another role, and apply the style sheet again."""
-    if widget.property("role") != ink:
-        widget.setProperty("role", ink)
+    """Give a label the colour of another role."""
+    set_property(widget, "role", ink)
+
+
+def set_property(widget: QWidget, name: str, value: str) -> None:
+    """Set a property that the style sheet goes by, and apply that again."""
+    if (widget.property(name) or "") != value:
+        widget.setProperty(name, value)
         widget.style().unpolish(widget)
         widget.style().polish(widget)

@@ -3,13 +3,14 @@
 import math
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent, QKeySequence, QMouseEvent, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QSlider
 
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import smooth_painter
+from study_app.gui.widgets.labels import set_property
 from study_app.number_text import MINUS, number_of
 
 NUMERALS = set("0123456789.,+-eE \u00a0\u2009\u202f" + MINUS)
@@ -67,10 +68,8 @@ class NumberField(QLineEdit):
         if state == self._state:
             return
         self._state = state
-        self.setProperty("state", state)
         self.setFont(font("label", weight=600 if state else None, tabular=True))
-        self.style().unpolish(self)
-        self.style().polish(self)
+        set_property(self, "state", state)
 
     def put_back(self) -> None:
         self.setText(self._shown)
@@ -326,7 +325,6 @@ class Slider(Themed, QSlider):
         self._move(self._span.value(step / self._span.steps), held=False)
 
     def _tell(self) -> None:
-        self.blockSignals(True)
-        self.setRange(0, self._span.steps)
-        self.setValue(round(self._span.share(self._value) * self._span.steps))
-        self.blockSignals(False)
+        with QSignalBlocker(self):
+            self.setRange(0, self._span.steps)
+            self.setValue(round(self._span.share(self._value) * self._span.steps))

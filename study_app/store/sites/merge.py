@@ -58,7 +58,7 @@ class _Source:
     begun: Mapping[str, Path]
 
 
-def merge(given: Mapping[str, Path], to: Path, *, now: datetime | None = None) -> Merged:
+def merge(given: Mapping[str, Path], to: Path) -> Merged:
     """Copy the results folders of sites into the merged study ``to``, which is made, or gets further sites.
 
     Parameters
@@ -67,8 +67,6 @@ def merge(given: Mapping[str, Path], to: Path, *, now: datetime | None = None) -
         The sites' folders by the sites' names, which precede the participants' IDs.
     to : Path
         The merged study's folder.
-    now : datetime, optional
-        Wall time with its zone; by default the system's.
 
     Raises
     ------
@@ -87,7 +85,7 @@ def merge(given: Mapping[str, Path], to: Path, *, now: datetime | None = None) -
     ran = new[0].protocol_hash if merged is None else merged.protocol_hash
     _check_alike((*there, *new), ran)
     _check_sessions((*there, *new))
-    at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
+    at = datetime.now().astimezone().isoformat(timespec="seconds")
     sites = tuple(Site(one.name, at, one.key.hash, len(one.begun)) for one in new)
     if merged is None:
         made = Merged(to, new[0].study, ran, sites)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, TypeAlias
 
-from PySide6.QtCore import QEvent, QPoint, QRect, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QPoint, QRect, QRectF, QSignalBlocker, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAccessible,
     QColor,
@@ -658,10 +658,9 @@ class OptionsField(QuestionField):
         event.accept()
 
     def _check(self) -> None:
-        self._group.blockSignals(True)
-        for place, option in enumerate(self.options):
-            option.setChecked(place in self.chosen)
-        self._group.blockSignals(False)
+        with QSignalBlocker(self._group):
+            for place, option in enumerate(self.options):
+                option.setChecked(place in self.chosen)
 
     def _click(self, place: int) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
