@@ -221,9 +221,6 @@ def _trial(axes: Axes, trial: Shown, at: float, top_ms: float) -> None:
     axes.plot([at], [np.clip(trial.mean_ms, 0, top_ms)], markersize=4.5, zorder=5, clip_on=False, **look)
 
 
-BEGIN: Final = "<!-- delays: printed by liquid-study timing --delays --to DIR -->"
-END: Final = "<!-- end of delays -->"
-
 COLUMNS: Final = (
     "screen", "frames_follow", "load", "requested_ms", "achieved_ms", "frames", "error_mean_ms", "error_p50_ms",
     "error_p95_ms", "error_p99_ms", "error_max_ms", "error_mean_frames", "error_p50_frames", "error_p95_frames",
@@ -271,7 +268,7 @@ def evidence(found: Delayed) -> Evidence:
     limits = "\n".join(f"- {limit}" for limit in found.limits())
     files = {
         "delays.txt": text,
-        "delays.md": f"{BEGIN}\n\n{head} Errors in ms.\n\n{table}\n\n{limits}\n\n{END}\n",
+        "delays.md": f"{head} Errors in ms.\n\n{table}\n\n{limits}\n",
         "delays.csv": Table(COLUMNS, [_values(trial) for trial in found.shown]).csv(),
     }
     return Evidence(text, files, plot_files("delays", "Accuracy of visual delays", draw, found))

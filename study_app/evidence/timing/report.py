@@ -143,9 +143,6 @@ def _tails(axes: Axes, loops: list[LoopTiming], least: float) -> None:
         )
 
 
-BEGIN: Final = "<!-- timing: printed by liquid-study timing --to DIR -->"
-END: Final = "<!-- end of timing -->"
-
 COLUMNS: Final = (
     "priority", "granted", "loop", "ticks", "overruns", "over_1_ms", "p50_us", "p90_us", "p99_us", "p99_9_us",
     "max_us", "p50_against_bare", "p99_against_bare", "tick_p50_us", "tick_p99_us",
@@ -170,7 +167,7 @@ def evidence(found: Timed) -> Evidence:
     text = "\n".join((head, what, "", table.text(), "", *map(str, found.limits()), "", *notes)) + "\n"
     limits = "\n".join(f"- {limit}" for limit in found.limits())
     said = " ".join(f"{note[0].upper()}{note[1:]}." for note in notes)
-    markdown = f"{BEGIN}\n\n{head} Lateness in µs.\n\n{table.markdown()}\n\n{limits}\n\n{said}\n\n{END}\n"
+    markdown = f"{head} Lateness in µs.\n\n{table.markdown()}\n\n{limits}\n\n{said}\n"
     csv = Table(COLUMNS, [_values(found, loop) for loop in found.loops]).csv()
     files = {"timing.txt": text, "timing.md": markdown, "timing.csv": csv}
     return Evidence(text, files, plot_files("timing", "Lateness of ticks", draw, found))

@@ -2,7 +2,6 @@
 
 import sys
 import threading
-from pathlib import Path
 
 import numba
 import pytest
@@ -13,7 +12,6 @@ if numba.config.DISABLE_JIT:
 
 from study_app.cli import main
 from study_app.evidence.timing.measurement import FULL, LEAD_IN, PERIOD_NS, PlayedHand, granted, ticks_at, timing
-from study_app.evidence.timing.report import BEGIN, END
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
@@ -79,17 +77,6 @@ def test_a_race_times_every_loop_in_every_class_it_is_granted():
     assert lines[-1] == "100 %"
     assert raced.frames_hz is None
     assert not any(thread.name in {"servo", "timed"} for thread in threading.enumerate())
-
-
-def test_the_page_of_timing_has_such_a_table_to_be_replaced_whole():
-    page = (Path(__file__).resolve().parents[3] / "docs" / "timing.md").read_text(encoding="utf-8")
-    assert page.count(BEGIN) == page.count(END) == 1
-    held = page.split(BEGIN)[1].split(END, maxsplit=1)[0]
-    ours = (Path(__file__).parents[1] / "golden" / "timing_report-write.txt").read_text(encoding="utf-8")
-    headings = list(dict.fromkeys(line for line in ours.splitlines() if line.startswith("| priority")))
-    assert [line for line in held.splitlines() if line.startswith("| priority")] == headings
-    for words in ("this servo", "bare compiled loop", "Python thread", "Qt timer", "cores", "of each loop at 1 kHz"):
-        assert words in held, "put DIR/timing.md, as timing --load gui --to DIR writes it, in place of the table"
 
 
 @pytest.fixture
