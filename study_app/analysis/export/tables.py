@@ -71,7 +71,8 @@ def level_tables(study: Study) -> Iterator[Delivered]:
     if not study.revealed:
         return
     frame = tracks(study).rename(columns={"level": "level_asked"})
-    yield delivered("tracks", (*TRACKS, *_of_intervals(study)), frame)
+    of_tracks = (*TRACKS, *_of_intervals(study))  # of an interval that no trial reached, the frame has no column
+    yield delivered("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
     found = level_results(study, frame.rename(columns={"level_asked": "level"}))
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
     groups = dict(zip(frame["participant"], frame["group"], strict=True))

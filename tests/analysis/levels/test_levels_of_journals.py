@@ -3,10 +3,12 @@
 import csv
 import json
 import re
+import shutil
 from collections import defaultdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import pandas as pd
 import pytest
 
 from study_app.analysis.export.export import export
@@ -61,6 +63,16 @@ def answered(folder: Path, block: str) -> list[Answered]:
 def rows(folder: Path, name: str) -> list[dict[str, str]]:
     with (folder / f"study-levels_description-{name}_data.csv").open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
+
+
+def test_an_interval_that_no_trial_reached_has_empty_cells(opened_levels: Path, tmp_path: Path) -> None:
+    shutil.copytree(opened_levels, tmp_path / "study")
+    for name, kept in {"responses": "participant == ''", "intervals": "interval == '1'"}.items():
+        for path in (tmp_path / "study").rglob(f"*{name}_data.csv"):
+            pd.read_csv(path, dtype=str, keep_default_na=False).query(kept).to_csv(path, index=False)
+    export(tmp_path / "study", tmp_path / "tables")
+    tracks = rows(tmp_path / "tables", "tracks")
+    assert [row["force_mean_n_2"] for row in tracks] == ["n/a"] * 3 * 54
 
 
 def test_tracks_have_a_row_per_trial_with_what_it_presented(opened_levels: Path, tmp_path: Path) -> None:
