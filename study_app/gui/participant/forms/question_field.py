@@ -443,7 +443,10 @@ class OptionLook(Button):
 
     place = -1
 
-    def prepare(self, text: str, name: str, description: str, look: Look = "words") -> None:
+    def __init__(
+        self, text: str, name: str, description: str, parent: QWidget | None = None, *, look: Look = "words"
+    ) -> None:
+        super().__init__(parent)
         self._words = text
         self._look = look
         self._scale = 1.0
@@ -544,21 +547,9 @@ class OptionLook(Button):
 class RadioOption(OptionLook, QRadioButton):
     """One of several answers."""
 
-    def __init__(
-        self, text: str, name: str, description: str, parent: QWidget | None = None, *, look: Look = "words"
-    ) -> None:
-        super().__init__(parent)
-        self.prepare(text, name, description, look)
-
 
 class CheckOption(OptionLook, QCheckBox):
     """One of several answers that can be given together."""
-
-    def __init__(
-        self, text: str, name: str, description: str, parent: QWidget | None = None, *, look: Look = "words"
-    ) -> None:
-        super().__init__(parent)
-        self.prepare(text, name, description, look)
 
 
 MOST_DIGITS = 9
