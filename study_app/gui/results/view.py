@@ -457,6 +457,7 @@ class ResultsPlace(Place):
         self._panel.setMinimumSize(least if stacked else QSize(width, 0))
         self._panel.setMaximumSize(most if stacked else QSize(width, QWIDGETSIZE_MAX))
         self.exclusions.setMaximumWidth(EXCLUSIONS if stacked else QWIDGETSIZE_MAX)
+        self._left.setAlignment(self.exclusions, Qt.AlignmentFlag.AlignTop if stacked else Qt.AlignmentFlag(0))
         self.figures.show_whole(stacked)
         self._head.removeWidget(self._chips_there)
         self._below.removeWidget(self._chips_there)
