@@ -221,7 +221,8 @@ def listen(window: QWidget) -> list[str]:
             if method.methodType() == QMetaMethod.MethodType.Signal and declared:
 
                 def hear(*values: Any, name: str = name) -> None:
-                    heard.append(f"{name}({', '.join(repr(value)[:200] for value in values)})")
+                    said = ", ".join(repr(value)[:200] for value in values)
+                    heard.append(f"{name}({re.sub(r'[( ](?:at )?0x[0-9a-f]+[)]?', '', said)})")
 
                 getattr(part, name).connect(hear)
     return heard

@@ -117,6 +117,8 @@ def change(opened: Participant, page: Page) -> list[QImage]:
 def test_the_screen_shows_the_old_page_and_then_the_new_one(opening: Opening) -> None:
     opened = opening(size=SMALL)
     for page, _ in PAGES:
+        if opened.window.painting is not None:
+            opened.window.painting.join()  # else a page asks to wait for the tank
         pictures = change(opened, page)
         whole = opened.window.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
         assert len(pictures) == 2, f"{len(pictures) - 2} pictures that are neither page, before {page}"
