@@ -1,6 +1,7 @@
 """Results on what behaves as a network drive, as far as one computer can simulate it."""
 
 import errno
+import glob
 import os
 import stat
 from collections.abc import Callable, Iterator
@@ -141,6 +142,9 @@ def hide(monkeypatch: pytest.MonkeyPatch) -> Hide:
             patched.setattr(os, "stat", stat_of)
             patched.setattr(os, "listdir", lambda of=".": [it for it in names(of) if Path(of) / it != path])
             patched.setattr(os, "scandir", scanned)
+            globber = getattr(glob, "_StringGlobber", None)
+            if getattr(globber, "scandir", None) is entries:  # Path.glob of Python 3.13
+                patched.setattr(globber, "scandir", staticmethod(scanned))
             yield
 
     return hidden
