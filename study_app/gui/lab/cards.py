@@ -173,23 +173,40 @@ FORCE_SENTENCE = f"Magnitude of the force of settings A and B on the same motion
 SPEED_SENTENCE = f"Speed of the body, and of the wake in settings A and B, over the last {SPAN_S:g} s, in m/s."
 
 
-class PlotCard(Card):
-    """A plot under its heading and its curves' names; while blind, nothing of it in the same place."""
+class ReadingCard(Card):
+    """A card whose content is hidden, in the same place, while the comparison is blind."""
+
+    def __init__(self, title: str, aside: QLabel, why: str, *, padding: int = 15, gap: int = 6) -> None:
+        super().__init__(title, aside, padding=padding, gap=gap)
+        self.aside = aside
+        self._shown = QWidget()
+        self.content = vbox(spacing=4, margins=0, parent=self._shown)
+        self.stack = QStackedLayout()
+        self.stack.addWidget(self._shown)
+        self.stack.addWidget(MaskedPanel(HIDDEN, why))
+        add_layout(self.column, self.stack, 1)
+
+    def show_blind(self, blind: bool) -> bool:
+        """Show the content, or that it is hidden; return which.
+
+        Hidden content stays as it was before: its size would tell when another setting is felt.
+        """
+        self.stack.setCurrentIndex(int(blind))
+        self.aside.setVisible(not blind)
+        return blind
+
+
+class PlotCard(ReadingCard):
+    """A plot under its heading and its curves' names."""
 
     def __init__(self, title: str, unit: str, plot: Plot, sentence: str) -> None:
-        super().__init__(title, label(unit, "small", "text2"), padding=14, gap=4)
+        why = "A trace would reveal which is which."
+        super().__init__(title, label(unit, "small", "text2"), why, padding=14, gap=4)
         self.plot, self.legend = plot, Legend()
         describe_plot(plot, title, sentence)
-        shown = QWidget()
-        vbox(self.legend, (plot, 1), spacing=2, margins=0, parent=shown)
-        self.stack = QStackedLayout()
-        self.stack.addWidget(shown)
-        self.stack.addWidget(MaskedPanel(HIDDEN, "A trace would reveal which is which."))
-        add_layout(self.column, self.stack, 1)
+        self.content.setSpacing(2)
+        add_parts(self.content, self.legend, (plot, 1))
         self.setMinimumHeight(226)
-
-    def show_blind(self, blind: bool) -> None:
-        self.stack.setCurrentIndex(int(blind))
 
 
 class ForceCard(PlotCard):
@@ -199,8 +216,7 @@ class ForceCard(PlotCard):
         super().__init__("Force on the hand", f"N, last {SPAN_S:g} s", CurvePlot((B, A), 1.0), FORCE_SENTENCE)
 
     def show_view(self, view: LabView) -> None:
-        self.show_blind(view.workbench.blind)
-        if view.workbench.blind:
+        if self.show_blind(view.workbench.blind):
             return
         limit = view.workbench.in_hand.scene.force_limit_n
         a, b = ("A, felt now", "B, same motion") if view.felt == "A" else ("A, same motion", "B, felt now")
@@ -220,8 +236,7 @@ class SpeedCard(PlotCard):
         self.legend.show_entries(((BODY, "body"), (A, "wake of A"), (B, "wake of B")))
 
     def show_view(self, view: LabView) -> None:
-        self.show_blind(view.workbench.blind)
-        if view.workbench.blind:
+        if self.show_blind(view.workbench.blind):
             return
         trace = view.trace
         if trace is None:
@@ -247,29 +262,6 @@ COST_HEIGHT, ERROR_HEIGHT = 252, 3 * LINE + 6  # of what is usual, kept free unt
 UNKNOWN = "–"
 LEAST_NS = 1.0  # the smallest cost that a measurement next to a running servo resolves
 LimiterState = Literal["acting", "acted", "quiet"]
-
-
-class ReadingCard(Card):
-    """A card whose content is hidden, in the same place, while the comparison is blind."""
-
-    def __init__(self, title: str, aside: QLabel, why: str) -> None:
-        super().__init__(title, aside, padding=15, gap=6)
-        self.aside = aside
-        self._shown = QWidget()
-        self.content = vbox(spacing=4, margins=0, parent=self._shown)
-        self.stack = QStackedLayout()
-        self.stack.addWidget(self._shown)
-        self.stack.addWidget(MaskedPanel(HIDDEN, why))
-        add_layout(self.column, self.stack, 1)
-
-    def show_blind(self, blind: bool) -> bool:
-        """Show the content, or that it is hidden; return which.
-
-        Hidden content stays as it was before: its size would tell when another setting is felt.
-        """
-        self.stack.setCurrentIndex(int(blind))
-        self.aside.setVisible(not blind)
-        return blind
 
 
 class CostLine(QWidget):
@@ -359,42 +351,41 @@ class CostCard(ReadingCard):
         self.sum.setText(UNKNOWN)
 
 
+class ErrorLine(QWidget):
+    """A measure, and its value."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.name, self.value = Elided("label", "text2"), figures("", "label", weight=600)
+        self.name.setFixedHeight(LINE)
+        hbox((self.name, 1), self.value, margins=0, parent=self)
+
+    def show_error(self, error: ErrorRow) -> None:
+        self.name.show_text(error.measure)
+        self.value.setText(error.value)
+        self.value.setToolTip(error.note)
+
+
 class ErrorCard(ReadingCard):
     """How far the felt setting is from its reference."""
 
     def __init__(self) -> None:
         why = "Errors would reveal which is which."
         super().__init__("Error against the reference", label("", "small", "text2"), why)
-        self._grid = QGridLayout()
-        self._grid.setColumnStretch(0, 1)
-        self._grid.setVerticalSpacing(2)
-        self.lines: list[tuple[Elided, QLabel]] = []
-        add_parts(self.content, self._grid, STRETCH)
+        self.lines: list[ErrorLine] = []
+        self._lines = vbox(spacing=2)
+        add_parts(self.content, self._lines, STRETCH)
         self.stack.widget(0).setMinimumHeight(ERROR_HEIGHT)
 
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):
             return
         rows = view.errors or (ErrorRow("Not measured yet", ""),)
-        if view.measuring and not view.errors and self.lines and self.lines[0][1].text():
-            for name, value in self.lines:
-                value.setText(UNKNOWN if name.isVisibleTo(self) else "")
-            return
-        while len(self.lines) < len(rows):
-            name, value = Elided("label", "text2"), figures("", "label")
-            value.setFont(font("label", weight=600, tabular=True))
-            name.setFixedHeight(LINE)
-            self._grid.addWidget(name, len(self.lines), 0)
-            self._grid.addWidget(value, len(self.lines), 1, Qt.AlignmentFlag.AlignRight)
-            self.lines.append((name, value))
-        for at, (name, value) in enumerate(self.lines):
-            shown = at < len(rows)
-            name.setVisible(shown)
-            value.setVisible(shown)
-            if shown:
-                name.show_text(rows[at].measure)
-                value.setText(rows[at].value)
-                value.setToolTip(rows[at].note)
+        if view.measuring and not view.errors and self.lines and self.lines[0].value.text():
+            rows = tuple(ErrorRow(line.name.whole, UNKNOWN) for line in self.lines)
+        _fit(self.lines, len(rows), ErrorLine, self._lines, self)
+        for line, row in zip(self.lines, rows, strict=True):
+            line.show_error(row)
 
 
 class LimiterLine(Themed, QWidget):
