@@ -720,9 +720,7 @@ class ChosenCard(Card):
             )
         for old, new in zip(before, (self.about, self.details), strict=True):
             name_bars(new)
-            at = self.inside.indexOf(old)
-            self.inside.removeWidget(old)
-            self.inside.insertWidget(at, new)
+            self.inside.insertWidget(self.inside.indexOf(old), new)
             remove_widget(old)
         self.questions.show_choice(choice)
 

@@ -13,7 +13,7 @@ from study_app.devices.doctor_worker import ExaminationClient, start_examination
 from study_app.devices.registry import descriptor_of, doctor_of, title_of
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, Tone, font
-from study_app.gui.theme.themed import Themed, apply_theme
+from study_app.gui.theme.themed import Themed, apply_theme, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton
@@ -87,9 +87,7 @@ class FindingRow(Themed, QWidget):
     def _show(self, state: tuple[Tone, str, str], finding: Finding, *, found: bool) -> None:
         body, self.body = self.body, None
         if body is not None:
-            self._column.removeWidget(body)
-            body.hide()
-            body.deleteLater()
+            remove_widget(body)
         self.finding, self.found = finding, found
         self.chip.show_state(*state)
         self.words.setFont(font("strong" if found else "body"))

@@ -24,7 +24,7 @@ from study_app.gui.lab.lab_state import (
 )
 from study_app.gui.lab.parameters import HIDDEN
 from study_app.gui.theme.theme import LIGHT, RADIUS_CONTROL, Theme, font
-from study_app.gui.theme.themed import Themed
+from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Icon, MaskedPanel, Rule, fill_rounded, smooth_painter
@@ -334,8 +334,8 @@ class CostCard(ReadingCard):
         here = [row for row in view.cost if row.ns is not None]
         away = [row for row in view.cost if row.ns is None]
         most_ns = max((row.ns or 0.0 for row in here), default=0.0)
-        _fit(self.lines, len(here), CostLine, self._costs, self)
-        _fit(self.absent, len(away), AbsentLine, self._absent, self)
+        _fit(self.lines, len(here), CostLine, self._costs)
+        _fit(self.absent, len(away), AbsentLine, self._absent)
         for line, row in zip(self.lines, here, strict=True):
             line.show_cost(row, most_ns)
         for gone, row in zip(self.absent, away, strict=True):
@@ -383,7 +383,7 @@ class ErrorCard(ReadingCard):
         rows = view.errors or (ErrorRow("Not measured yet", ""),)
         if view.measuring and not view.errors and self.lines and self.lines[0].value.text():
             rows = tuple(ErrorRow(line.name.whole, UNKNOWN) for line in self.lines)
-        _fit(self.lines, len(rows), ErrorLine, self._lines, self)
+        _fit(self.lines, len(rows), ErrorLine, self._lines)
         for line, row in zip(self.lines, rows, strict=True):
             line.show_error(row)
 
@@ -444,7 +444,7 @@ class LimiterCard(ReadingCard):
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):
             return
-        _fit(self.lines, len(view.limiters), LimiterLine, self._lines, self)
+        _fit(self.lines, len(view.limiters), LimiterLine, self._lines)
         for line, limiter in zip(self.lines, view.limiters, strict=True):
             line.show_limiter(limiter)
 
@@ -455,16 +455,12 @@ def _aside(view: LabView) -> str:
     return f"{view.felt}, measured" if view.cost else ""
 
 
-def _fit(lines: list, count: int, kind: type, layout: QVBoxLayout, whole: ReadingCard) -> None:
+def _fit(lines: list, count: int, kind: type, layout: QVBoxLayout) -> None:
     while len(lines) > count:
-        gone = lines.pop()
-        layout.removeWidget(gone)
-        gone.hide()
-        gone.deleteLater()
+        remove_widget(lines.pop())
     while len(lines) < count:
-        line = kind()
-        layout.addWidget(line)
-        lines.append(line)
+        lines.append(kind())
+        layout.addWidget(lines[-1])
 
 
 BUTTON: Final = 32

@@ -458,8 +458,7 @@ class ComputerWindow(Question):
 
     def show_checks(self, checks: tuple[Check, ...]) -> None:
         for row in self.rows:
-            row.hide()
-            row.deleteLater()
+            remove_widget(row)
         self.rows = [CheckRow(check, last=check is checks[-1]) for check in checks]
         for place, row in enumerate(self.rows):
             self._rows.insertWidget(place, row)

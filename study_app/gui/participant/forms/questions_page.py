@@ -24,6 +24,7 @@ from study_app.gui.participant.pages.page_widget import (
 from study_app.gui.participant.questions import FIELDS
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.accessible import HeadingLabel, give_role, say
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.protocol.questions import ItemView, shown
@@ -350,10 +351,7 @@ class QuestionsPage(PageWidget):
     def _tab_parts(self) -> None:
         wanted = self.parts if len(self.parts) > 1 else []
         while len(self.tabs) > len(wanted):
-            tab = self.tabs.pop()
-            self._tab_row.removeWidget(tab)
-            tab.hide()
-            tab.deleteLater()
+            remove_widget(self.tabs.pop())
         while len(self.tabs) < len(wanted):
             self.tabs.append(self._new_tab(len(self.tabs)))
         text = self.words_scale
