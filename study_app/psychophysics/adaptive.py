@@ -14,13 +14,15 @@ Levels are in the coordinate u; answers follow from uniform numbers that the cal
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, TypeAlias
+from itertools import count
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from study_app.psychophysics.detection import preferred
 from study_app.psychophysics.families import Family, Floats, success
 from study_app.psychophysics.grid import Grid, Values, fit, quantile, tables
 
@@ -178,6 +180,53 @@ def _weighted_entropy(joint: NDArray[np.float64], axis: int) -> NDArray[np.float
 Counts: TypeAlias = tuple[Floats, Floats]
 
 
+class Answers(NamedTuple):
+    """The levels presented and the answers.
+
+    Attributes
+    ----------
+    levels : (tracks, trials) array
+        In u; NaN after the end of a track.
+    successes : (tracks, trials) array of bool
+        False after the end of a track.
+    towards, before : (tracks, trials) array
+        The correct answer, and the one before: 1 the first of two intervals, −1 the second, 0 none of them.
+    """
+
+    levels: Floats
+    successes: NDArray[np.bool_]
+    towards: Floats
+    before: Floats
+
+    def first(self, trials: int | None) -> Answers:
+        """Return the answers to the first trials of each track; None: to all."""
+        levels, successes, towards, before = self
+        return Answers(levels[:, :trials], successes[:, :trials], towards[:, :trials], before[:, :trials])
+
+    def nearest(self, places: Sequence[float]) -> NDArray[np.int64]:
+        """Return the index of the nearest of ``places`` to each level, (tracks, trials).
+
+        Parameters
+        ----------
+        places : sequence of float
+            Levels, in u, ascending.
+        """
+        ascending = np.asarray(places, float)
+        return np.asarray(np.searchsorted((ascending[1:] + ascending[:-1]) / 2, self.levels), np.int64)
+
+    def counts(self, places: Sequence[float]) -> Counts:
+        """Return the successes and failures of each track at each of ``places``, counted at the `nearest` one."""
+        nearest = self.nearest(places)
+        row, trial = np.nonzero(~np.isnan(self.levels))
+        found = np.zeros((2, len(self.levels), len(places)))
+        np.add.at(found, (np.where(self.successes[row, trial], 0, 1), row, nearest[row, trial]), 1.0)
+        return found[0], found[1]
+
+
+# The level of the next trial of each track, and whether the track goes on; followed by whether answers are successes.
+Choice: TypeAlias = Generator[tuple[Floats, NDArray[np.bool_]], NDArray[np.bool_], None]
+
+
 @dataclass(frozen=True, eq=False)
 class Observers:
     """The observers: one for each track.
@@ -196,6 +245,10 @@ class Observers:
         Maps requested to presented levels, both in u; by default they are equal.
     moves : float or (tracks,) array
         By how much the threshold rises from the first trial to the last, in u.
+    criterion, repeats : float or (tracks,) array
+        Preference for the first of two intervals, and for the last answer [SD of the decision].
+    towards : (tracks, trials) array, optional
+        1 where the first interval is the correct one, otherwise −1; None: there are not two intervals.
     """
 
     family: Family
@@ -205,6 +258,9 @@ class Observers:
     lapse: float | Floats
     presented: Callable[[Floats], Floats] | None = None
     moves: float | Floats = 0.0
+    criterion: float | Floats = 0.0
+    repeats: float | Floats = 0.0
+    towards: Floats | None = None
 
     def probability(self, levels: ArrayLike, done: ArrayLike = 0.5) -> Floats:
         """Return the probability of a success at ``levels``, one for each track or one for all.
@@ -216,40 +272,21 @@ class Observers:
         thresholds = self.thresholds + np.asarray(self.moves, float) * (np.asarray(done, float) - 0.5)
         return success(self.family, levels, thresholds, self.width, self.guess, self.lapse)
 
-
-@dataclass(frozen=True, eq=False)
-class Answers:
-    """The levels presented and the answers.
-
-    Attributes
-    ----------
-    levels : (tracks, trials) array
-        In u; NaN after the end of a track.
-    successes : (tracks, trials) array of bool
-        False after the end of a track.
-    """
-
-    levels: Floats
-    successes: NDArray[np.bool_]
-
-    def first(self, trials: int) -> Answers:
-        """Return the answers to the first trials of each track."""
-        return Answers(self.levels[:, :trials], self.successes[:, :trials])
-
-    def counts(self, places: Sequence[float]) -> Counts:
-        """Return the successes and failures of each track at each of ``places``, counted at the nearest one.
-
-        Parameters
-        ----------
-        places : sequence of float
-            Levels, in u, ascending.
-        """
-        ascending = np.asarray(places, float)
-        nearest = np.searchsorted((ascending[1:] + ascending[:-1]) / 2, self.levels)
-        row, trial = np.nonzero(~np.isnan(self.levels))
-        found = np.zeros((2, len(self.levels), len(ascending)))
-        np.add.at(found, (np.where(self.successes[row, trial], 0, 1), row, nearest[row, trial]), 1.0)
-        return found[0], found[1]
+    def answers(self, draws: Floats, chosen: Choice) -> Answers:
+        """Return the answers to levels that are chosen by the answers before, with uniform numbers (tracks, trials)."""
+        tracks, trials = draws.shape
+        levels, successes, before = np.full(draws.shape, np.nan), np.zeros(draws.shape, bool), np.zeros(draws.shape)
+        towards = np.zeros(draws.shape) if self.towards is None else self.towards
+        said, (now, running) = np.zeros(tracks), next(chosen)
+        for trial in range(trials):
+            psi = self.probability(now, trial / max(1, trials - 1))
+            psi = preferred(psi, self.lapse, towards[:, trial] * (self.criterion + self.repeats * said))
+            right, before[:, trial] = draws[:, trial] < psi, said
+            levels[running, trial], successes[:, trial] = now[running], right & running
+            said = np.where(right, towards[:, trial], -towards[:, trial])
+            if trial + 1 < trials:
+                now, running = chosen.send(right)
+        return Answers(levels, successes, towards, before)
 
 
 def constant_tracks(levels: Sequence[float], repetitions: int, observers: Observers, draws: Floats) -> Answers:
@@ -266,9 +303,13 @@ def constant_tracks(levels: Sequence[float], repetitions: int, observers: Observ
     draws : (tracks, trials) array
         Uniform numbers in [0, 1).
     """
-    presented = np.tile(np.asarray(levels, float), (len(draws), repetitions))
-    done = np.linspace(0.0, 1.0, presented.shape[1])[:, None]
-    return Answers(presented, draws < observers.probability(presented.T, done).T)
+    tracks = len(draws)
+
+    def chosen() -> Choice:
+        for level in np.tile(np.asarray(levels, float), repetitions):
+            yield np.full(tracks, level), np.ones(tracks, bool)
+
+    return observers.answers(draws, chosen())
 
 
 def staircase_tracks(
@@ -287,23 +328,24 @@ def staircase_tracks(
     stop : tuple of int, optional
         Number of reversals after which a track ends, and its least number of answers.
     """
-    tracks, trials = draws.shape
-    levels, successes = np.full(draws.shape, np.nan), np.zeros(draws.shape, bool)
-    now, running = np.full(tracks, staircase.begin), np.ones(tracks, bool)
-    in_a_row, reversals, before = np.zeros(tracks, int), np.zeros(tracks, int), np.zeros(tracks)
-    for trial in range(trials):
-        right = draws[:, trial] < observers.probability(now, trial / max(1, trials - 1))
-        levels[running, trial], successes[:, trial] = now[running], right & running
-        in_a_row = np.where(right, in_a_row + 1, 0)
-        steps_down = in_a_row == staircase.down_after
-        move = np.where(right, np.where(steps_down, -staircase.ratio * staircase.step_up, 0.0), staircase.step_up)
-        in_a_row[steps_down] = 0
-        reversals += move * before < 0.0
-        before = np.where(move != 0.0, move, before)
-        now = np.clip(now + move, staircase.low, staircase.high)
-        if stop is not None:
-            running &= (trial + 1 < stop[1]) | (reversals < stop[0])
-    return Answers(levels, successes)
+    tracks = len(draws)
+
+    def chosen() -> Choice:
+        now, running = np.full(tracks, staircase.begin), np.ones(tracks, bool)
+        in_a_row, reversals, before = np.zeros(tracks, int), np.zeros(tracks, int), np.zeros(tracks)
+        for answered in count(1):
+            right = yield now, running
+            in_a_row = np.where(right, in_a_row + 1, 0)
+            steps_down = in_a_row == staircase.down_after
+            move = np.where(right, np.where(steps_down, -staircase.ratio * staircase.step_up, 0.0), staircase.step_up)
+            in_a_row[steps_down] = 0
+            reversals += move * before < 0.0
+            before = np.where(move != 0.0, move, before)
+            now = np.clip(now + move, staircase.low, staircase.high)
+            if stop is not None:
+                running = running & ((answered < stop[1]) | (reversals < stop[0]))
+
+    return observers.answers(draws, chosen())
 
 
 def search_tracks(
@@ -331,24 +373,24 @@ def search_tracks(
     stop : tuple, optional
         Width of the 95 % interval [u] at which a track ends, and its least number of answers.
     """
-    tracks, trials = draws.shape
-    levels, running = np.full(draws.shape, np.nan), np.ones(tracks, bool)
-    successes = np.zeros(draws.shape, bool)
-    at = np.asarray(search.levels, float)
-    psi = search.psi.reshape(len(at), len(search.grid.thresholds), -1)
-    posterior = np.tile(search.grid.prior.reshape(1, *psi.shape[1:]), (tracks, 1, 1))
-    if noise is not None:
-        yes = (noise < observers.guess).sum(axis=1)[:, None, None]
-        log_likelihood = yes * np.log(psi[0]) + (noise.shape[1] - yes) * np.log1p(-psi[0])
-        posterior *= np.exp(log_likelihood - log_likelihood.max(axis=(1, 2), keepdims=True))
-    for trial in range(trials):
-        posterior /= posterior.sum(axis=(1, 2), keepdims=True)
-        if stop is not None and trial >= stop[1]:
-            ends = [[quantile(search.grid.thresholds, one, p) for p in (0.025, 0.975)] for one in posterior.sum(axis=2)]
-            running &= np.diff(np.asarray(ends, float), axis=1)[:, 0] > stop[0]
-        place = search.next_of(posterior) if trial or begin is None else np.full(tracks, begin)
-        right = draws[:, trial] < observers.probability(at[place], trial / max(1, trials - 1))
-        levels[running, trial], successes[:, trial] = at[place[running]], right & running
-        answered = psi[place]
-        posterior *= np.where(right[:, None, None], answered, 1.0 - answered)
-    return Answers(levels, successes)
+    tracks, at = len(draws), np.asarray(search.levels, float)
+
+    def chosen() -> Choice:
+        running = np.ones(tracks, bool)
+        psi = search.psi.reshape(len(at), len(search.grid.thresholds), -1)
+        posterior = np.tile(search.grid.prior.reshape(1, *psi.shape[1:]), (tracks, 1, 1))
+        if noise is not None:
+            yes = (noise < observers.guess).sum(axis=1)[:, None, None]
+            log_likelihood = yes * np.log(psi[0]) + (noise.shape[1] - yes) * np.log1p(-psi[0])
+            posterior *= np.exp(log_likelihood - log_likelihood.max(axis=(1, 2), keepdims=True))
+        for trial in count():
+            posterior /= posterior.sum(axis=(1, 2), keepdims=True)
+            if stop is not None and trial >= stop[1]:
+                thresholds, of_each = search.grid.thresholds, posterior.sum(axis=2)
+                ends = [[quantile(thresholds, one, p) for p in (0.025, 0.975)] for one in of_each]
+                running = running & (np.diff(np.asarray(ends, float), axis=1)[:, 0] > stop[0])
+            place = search.next_of(posterior) if trial or begin is None else np.full(tracks, begin)
+            right = yield at[place], running
+            posterior *= np.where(right[:, None, None], psi[place], 1.0 - psi[place])
+
+    return observers.answers(draws, chosen())

@@ -177,22 +177,22 @@ def fit(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid
     grid : Grid
         The cells and their prior.
     """
-    _, log_success, log_failure = tables(
+    _, *logarithms = tables(
         replace(grid, width_prior=None, session_sd=(0.0, 0.0)), tuple(np.asarray(levels, float).tolist())
     )
-    return posterior(grid, successes, failures, log_success, log_failure)
+    return posterior(grid, log_likelihood(successes, failures, *logarithms))
 
 
-def posterior(
-    grid: Grid,
-    successes: ArrayLike,
-    failures: ArrayLike,
-    log_success: NDArray[np.float64],
-    log_failure: NDArray[np.float64],
-) -> Posterior:
-    """Return the posterior from counts of answers, shape (k,), and log ψ and log(1 − ψ) in each cell, (k, …)."""
-    log_likelihood = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
-    log_likelihood += np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure)
+def log_likelihood(
+    successes: ArrayLike, failures: ArrayLike, log_success: NDArray[np.float64], log_failure: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return that of each cell from counts of answers, shape (k,), and log ψ and log(1 − ψ) in each cell, (k, …)."""
+    found = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
+    return np.asarray(found + np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure), float)
+
+
+def posterior(grid: Grid, log_likelihood: NDArray[np.float64]) -> Posterior:
+    """Return the posterior from the logarithm of the likelihood in each cell."""
     weights = grid.prior * np.exp(log_likelihood - log_likelihood.max())
     return Posterior(grid, np.asarray(weights / weights.sum(), float))
 

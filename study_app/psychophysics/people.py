@@ -75,7 +75,7 @@ KINDS: Final = {
 }
 """People who differ in one respect each."""
 ALONE: Final = {name: one for name, one in KINDS.items() if not one.criterion and not one.repeats}
-"""Those whom counts of answers describe: preferences are removed from the answers of the others."""
+"""Those without a preference: where there are not two intervals, one of them correct."""
 MIXED: Final = "all of these"
 """Of a group of people drawn at random."""
 
@@ -108,7 +108,7 @@ _COVERED: Final = 0.95
 class Estimates(NamedTuple):
     """Thresholds of many observers, (observers,) arrays [u]: medians, ends of 95 % intervals, variances.
 
-    ``shared`` is the variance of their group's mean that is due to the width that its people share.
+    ``shared``, (groups,), is the variance of a group's mean that is due to the width that its people share.
     """
 
     medians: Floats
@@ -136,6 +136,8 @@ class Expected:
         Standard deviation of the estimate's error, in u; infinite if nothing is measured.
     threshold : float
         Approximate threshold, as a level; or the assumed d′, d_a or exponent.
+    shared : float
+        Variance of a group's mean at one standard that is due to the width that its people share, times their number.
     """
 
     spacing: Literal["log", "linear"]
@@ -144,6 +146,7 @@ class Expected:
     halves: Mapping[str, float]
     spread: float
     threshold: float
+    shared: float = 0.0
 
     @property
     def measured(self) -> bool:
@@ -168,14 +171,15 @@ class Expected:
         participants : int
             Their number; the result is infinite below two.
         trials : float, optional
-            Of each standard; the variance of the error is taken to be inversely proportional to their number.
+            Of each standard; variances of errors are taken to be inversely proportional to their number.
         """
         if participants < 2:
             return math.inf
         log = self.spacing == "log"
         between = math.log10(BETWEEN_PEOPLE) if log else self.threshold * math.log(BETWEEN_PEOPLE)
-        own = self.spread**2 / self.standards * (self.trials / (trials or self.trials))
-        half = student_975(participants - 1) * math.sqrt((own + between**2) / participants)
+        fewer = self.trials / (trials or self.trials) / self.standards
+        half = student_975(participants - 1) * math.sqrt(self.spread**2 * fewer + between**2)
+        half = math.hypot(half, Z_95 * math.sqrt(self.shared * fewer)) / math.sqrt(participants)
         return 10.0**half - 1.0 if log else half / self.threshold
 
     def participants_for(self, precision: float, most: int = 1000) -> int | None:

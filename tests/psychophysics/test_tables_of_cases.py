@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -61,16 +62,24 @@ def lines() -> Iterator[str]:
     for down, ratio, begin in ((1, 1.0, -0.3), (2, 0.5488, -1.0), (3, 0.7393, 0.0)):
         rule = adaptive.Staircase(down, 0.4, ratio, -2.0, 0.0, begin)
         found = [adaptive.staircase_tracks(rule, one, draws) for one in (observers, later)]
-        yield f"{rule}: {rule.converges_to:.7g} {told(found)} {told(found[0].first(5).counts(LEVELS))}"
+        counted = found[0].first(5).counts(LEVELS)
+        yield f"{rule}: {rule.converges_to:.7g} {told([one[:2] for one in found])} {told(counted)}"
         for levels, right in zip(found[0].levels.tolist(), found[0].successes.tolist(), strict=True):
             given = list(zip(levels, right, strict=True))
             means = [rule.mean_of_reversals(given, most) for most in (1, 2, 4, 8)]
             yield f"  {rule.reversals_at(given)} {told(rule.reversals(given))} {told(means)} {rule.next(given):.7g}"
-        yield f"  {told(adaptive.staircase_tracks(rule, observers, draws, (4, 6)))} {rule.next([])}"
-    yield told(adaptive.constant_tracks(LEVELS, 3, observers, draws))
+        yield f"  {told(adaptive.staircase_tracks(rule, observers, draws, (4, 6))[:2])} {rule.next([])}"
+    yield told(adaptive.constant_tracks(LEVELS, 3, observers, draws)[:2])
     search = adaptive.Search(SMALL, LEVELS, "threshold")
     for more in ({}, {"begin": 2}, {"stop": (0.9, 5)}):
-        yield f"search {more}: {told(adaptive.search_tracks(search, observers, draws, **more))}"
+        yield f"search {more}: {told(adaptive.search_tracks(search, observers, draws, **more)[:2])}"
+    prefers = replace(observers, criterion=2.5, repeats=0.4, towards=np.tile((1.0, -1.0), (2, 6)))
+    yield f"prefers: {told(found := adaptive.search_tracks(search, prefers, draws))}"
+    answers = (found.towards[1], found.successes[1], found.before[1])
+    moved = detection.preferences(*answers, grid.fit(LEVELS, RIGHT, WRONG, SMALL), found.levels[1])
+    right, wrong = found.successes[1].astype(float), (~found.successes[1]).astype(float)
+    fitted = detection.fit_preferring(found.levels[1], right, wrong, 0.5 * found.towards[1], SMALL)
+    yield f"  {told(moved)} {told(detection.preferred(right, 0.05, (-0.5, 0.5) * 6))} {told(fitted.marginal)}"
     yield from of_delivery()
 
 
@@ -90,7 +99,7 @@ def of_delivery() -> Iterator[str]:
     for errors in ([0.1, 0.3], [None, 0.2], [None, None], [0.1, 0.2, 0.5, None]):
         yield f"difference {errors} {told(delivery.difference(errors, [bool(one % 2) for one in range(len(errors))]))}"
     for spacing, half in product(("log", "linear"), (0.2, math.inf)):
-        one = people.Expected(spacing, 40, 2, {"": half}, half / 2, 0.3)
+        one = people.Expected(spacing, 40, 2, {"": half}, half / 2, 0.3, half**2 / 9)
         groups = [one.of_group(people, trials) for people in (1, 2, 8) for trials in (None, 80.0)]
         yield f"{told(one)}: {one.measured} {told(groups)}"
         for within in (0.05, 0.3):

@@ -38,7 +38,6 @@ from study_app.analysis.levels.tracks import TRACK, answers_of, setting_of
 from study_app.analysis.results import LevelsResult, counted, listed, number
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.thresholds import (
-    BEYOND_CHANCE,
     CHANGE_PRIOR,
     CHANGED,
     FEWEST,
@@ -46,14 +45,12 @@ from study_app.analysis.statistics.thresholds import (
     WORST,
     change_score,
     drift,
-    fit_preferring,
     group_mean,
     p_of_fit,
-    preferences,
-    preferred,
 )
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
+from study_app.psychophysics.detection import BEYOND_CHANCE, PASSES, fit_preferring, preferences, preferred
 from study_app.psychophysics.families import level_at
 from study_app.psychophysics.grid import ALIKE, Grid, Posterior, group_widths
 
@@ -65,8 +62,6 @@ SHIFT: Final = 0.1
 FEW_ANSWERS: Final = 40
 """The fewest answers for which the coverage of the intervals was tested."""
 MOST_NAMED: Final = 6
-PASSES: Final = 2
-"""Fits after which preferences are estimated: the first threshold is too high."""
 REMOVED: Final = (
     "A preference for an interval or for the previous answer, by probit regression, {} removed where it {} more than "
     f"{BEYOND_CHANCE:g} standard errors."
@@ -136,12 +131,30 @@ class Counts:
         """Return the share of successes that the function through all medians expects."""
         return preferred(found.success(self.levels), found.others[2], self.shifts)
 
+    def steadied(self, successes: NDArray[np.bool_], change: float) -> "Counts":
+        """Return counts at the levels that would be answered as these if the threshold were that of the middle trial.
+
+        ``successes`` (n,) are those of the rows; the threshold of either half is the mean in it, if it rises evenly by
+        ``change`` from the first trial to the last [u].
+        """
+        n = len(successes)
+        later = np.where(np.arange(n) < n / 2, -change / 4, change / 4)
+        cells = np.column_stack([self.levels[self.places] - later, self.shifts[self.places]])
+        (levels, shifts), places = _cells(cells)
+        right, wrong = (np.bincount(places, one, len(levels)).astype(float) for one in (successes, ~successes))
+        return Counts(levels, right, wrong, shifts, places)
+
+
+def _cells(rows: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Return the columns of the different rows, and the place of each row among them."""
+    cells, places = np.unique(rows, axis=0, return_inverse=True)
+    return cells.T, np.asarray(places, np.int64)
+
 
 def counts_of(stimulus: Stimulus, rows: pd.DataFrame, moved: ArrayLike = 0.0) -> Counts:
     """Return counts from rows of tracks, each at the mean of its delivered levels; preferences ``moved`` decisions."""
     shifts = np.broadcast_to(np.asarray(moved, float), len(rows))
-    cells, places = np.unique(np.column_stack([rows["level"], shifts]).astype(float), axis=0, return_inverse=True)
-    asked = cells[:, 0]
+    (asked, moves), places = _cells(np.column_stack([rows["level"], shifts]).astype(float))
     each = rows["level_delivered"].astype("Float64").to_numpy(dtype=float, na_value=math.nan)
     known, k = np.isfinite(each), len(asked)
     measured = np.bincount(places[known], minlength=k)
@@ -153,8 +166,8 @@ def counts_of(stimulus: Stimulus, rows: pd.DataFrame, moved: ArrayLike = 0.0) ->
         levels=np.array([stimulus.coordinate(float(level)) for level in placed]),
         successes=successes,
         failures=np.asarray(np.bincount(places, minlength=k) - successes, float),
-        shifts=cells[:, 1],
-        places=np.asarray(places, np.int64),
+        shifts=moves,
+        places=places,
     )
 
 
@@ -176,11 +189,11 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
     if assumed is None or stimulus is None:
         return
     for standard, at_standard in _answered(block, opened).groupby("standard", dropna=False, sort=True):
-        fits = _fits(block, stimulus, assumed, at_standard[at_standard["analysed"]])
+        fits, shared = _fits(block, stimulus, assumed, at_standard[at_standard["analysed"]])
         heard = dict(list(at_standard.groupby("participant")))
         own = [_own(block, stimulus, standard, one, heard[one.person]) for one in fits]
         if own:
-            yield _group(stimulus, standard, own, fits[0].shared)
+            yield _group(stimulus, standard, own, shared)
         yield from own
 
 
@@ -198,68 +211,69 @@ def thresholds_of(trials: pd.DataFrame, stimulus: Stimulus, design: Design) -> I
     )
 
 
-def fit_answers(stimulus: Stimulus, rows: pd.DataFrame, grid: Grid, *, two_intervals: bool) -> tuple[Counts, Posterior]:
-    """Return answers and what they say; a preference for one of two intervals is removed: it makes answers worse."""
-    counts = counts_of(stimulus, rows)
+def fit_answers(
+    stimulus: Stimulus, rows: pd.DataFrame, grid: Grid, *, two_intervals: bool
+) -> tuple[Counts, Counts, float]:
+    """Return answers, those to be fitted, and by how much the threshold changes from first to last trial [decades].
+
+    A preference for one of two intervals is removed, and so is the change that is most probable: both make answers
+    worse. A change that may be chance is 0.
+    """
+    counts, successes = counts_of(stimulus, rows), rows["success"].to_numpy(dtype=bool)
     found = counts.fit(grid)
     for _ in range(PASSES if two_intervals else 0):
-        given = (rows["towards"].to_numpy(), rows["success"].to_numpy(dtype=bool), rows["before"].to_numpy())
+        given = (rows["towards"].to_numpy(), successes, rows["before"].to_numpy())
         counts = counts_of(stimulus, rows, preferences(*given, found, counts.levels[counts.places]))
         if not counts.shifts.any():
             break
         found = counts.fit(grid)
-    return counts, found
+    at = counts.places
+    score, information = change_score(successes, counts.levels[at], found, counts.shifts[at])
+    decade = 1.0 if stimulus.spacing == "log" else abs(found.threshold) * math.log(10)
+    change = score * decade / (information * decade**2 + math.log10(CHANGE_PRIOR) ** -2)
+    beyond_chance = score**2 > CHANGED**2 * information
+    return counts, counts.steadied(successes, change * decade), change if beyond_chance else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class PersonFit:
     """What the ``rows`` of a participant at a standard say, and how the threshold changes over them [decades].
 
-    ``flat`` is the posterior under a flat prior on the width, ``width_prior`` the prior of the other one, ``shared``
-    the variance of the group's mean that is due to the width that people share [u²].
+    ``steadied`` are the counts that are fitted, ``flat`` is the posterior under a flat prior on the width,
+    ``width_prior`` the prior of the other one.
     """
 
     person: Any
     rows: pd.DataFrame
     counts: Counts
+    steadied: Counts
     flat: Posterior
     width_prior: Array
     posterior: Posterior
     change: float
-    shared: float
 
 
-def _fits(block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.DataFrame) -> list[PersonFit]:
+def _fits(block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.DataFrame) -> tuple[list[PersonFit], float]:
     """Return the fit of each participant from the analysed rows of one standard.
 
     A threshold that changed is uncertain by the standard deviation of one that changes evenly, in addition to how far
-    it is from one session to the next.
+    it is from one session to the next. Followed by the variance of the group's mean that is due to the width that
+    people share [u²].
     """
     two = block.design.kind == "2ifc" and block.has_correct_answer
     grid = analysis_grid(stimulus, block.design, assumed)
-    of_people = list(rows.groupby("participant"))
-    counts = [fit_answers(stimulus, own, grid, two_intervals=two)[0] for _, own in of_people]
-    flat = [one.fit(replace(grid, width_prior=None)) for one in counts]
+    of_people = [
+        (person, own, *fit_answers(stimulus, own, grid, two_intervals=two))
+        for person, own in rows.groupby("participant")
+    ]
+    flat = [one.fit(replace(grid, width_prior=None)) for _, _, _, one, _ in of_people]
     found = []
     priors, shared = group_widths(flat, assumed.width_prior) if flat else ((), 0.0)
-    for (person, own), one, unknown, prior in zip(of_people, counts, flat, priors, strict=True):
-        session_sd = SESSION_SD / math.sqrt(own["session"].nunique())
-        widened = unknown.with_widths(prior)
-        change = _change(stimulus, own, one, widened)
-        session_sd = math.hypot(session_sd, change / math.sqrt(12))
-        widened = replace(widened, grid=analysis_grid(stimulus, block.design, assumed, session_sd))
-        found.append(PersonFit(person, own, one, unknown, prior, widened, change, shared))
-    return found
-
-
-def _change(stimulus: Stimulus, rows: pd.DataFrame, counts: Counts, found: Posterior) -> float:
-    """Return by how much the threshold changes from first to last trial [decades]; 0 where that may be chance."""
-    at = counts.places
-    score, information = change_score(rows["success"].to_numpy(dtype=bool), counts.levels[at], found, counts.shifts[at])
-    if score**2 <= CHANGED**2 * information:
-        return 0.0
-    decade = 1.0 if stimulus.spacing == "log" else abs(found.threshold) * math.log(10)
-    return score * decade / (information * decade**2 + math.log10(CHANGE_PRIOR) ** -2)
+    for (person, own, counts, steadied, change), unknown, prior in zip(of_people, flat, priors, strict=True):
+        session_sd = math.hypot(SESSION_SD / math.sqrt(own["session"].nunique()), change / math.sqrt(12))
+        widened = replace(unknown.with_widths(prior), grid=analysis_grid(stimulus, block.design, assumed, session_sd))
+        found.append(PersonFit(person, own, counts, steadied, unknown, prior, widened, change))
+    return found, shared
 
 
 def _own(
@@ -338,7 +352,7 @@ def psychometric_bands(
         return {}
     u = np.linspace(*ends, PLACES)
     rows = _answered(block, opened)
-    fits = _fits(block, stimulus, assumed, rows[rows["analysed"]])
+    fits, _ = _fits(block, stimulus, assumed, rows[rows["analysed"]])
     return {str(one.person): np.array([u, *one.posterior.band(u)]) for one in fits if one.person in people}
 
 
@@ -351,7 +365,7 @@ class TrackCourse:
 
     ``levels`` were requested; ``tracks`` count from 1; ``catches`` are catch trials, ``noises`` presented the standard
     alone: neither has a level that its track chose; ``low`` and ``high`` are the ends, as levels, of the 95 %
-    interval of the threshold from the answers so far.
+    interval of the threshold from the answers so far, without the change over all of them.
     """
 
     participant: str
@@ -374,10 +388,10 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
     rows = _answered(block, opened)
     at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
     fits: list[tuple[Any, PersonFit]] = [
-        (standard, one) for standard, own in at_standards for one in _fits(block, stimulus, assumed, own)
+        (standard, one) for standard, own in at_standards for one in _fits(block, stimulus, assumed, own)[0]
     ]
     for standard, fitted in sorted(fits, key=lambda one: one[1].person)[:most]:
-        own, counts, grid = fitted.rows, fitted.counts, fitted.flat.grid
+        own, counts, grid = fitted.rows, fitted.steadied, fitted.flat.grid
         successes, ends = own["success"].to_numpy(dtype=bool), []
         so_far = np.zeros((2, len(counts.levels)))
         for place, right in zip(counts.places, successes, strict=True):
@@ -592,7 +606,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 f"{SETS} simulated sets of answers, and drift is the correlation of trial number and deviance residual "
                 "(Wichmann & Hill 2001). Intervals include that a person’s threshold differs between sessions by a "
                 f"factor of {10**SESSION_SD:.2f} (one standard deviation; from data of Jäkel & Wichmann 2006), and "
-                f"how far it changed over the trials where that exceeded {CHANGED:g} standard errors. Of the standard "
+                f"how far it changed over the trials where that exceeded {CHANGED:g} standard errors. The most "
+                f"probable change (prior: a factor of {CHANGE_PRIOR:g}) was removed: the threshold is that in the "
+                "middle of the trials. Of the standard "
                 f"deviation of log widths {100 * ALIKE:.0f} % was taken to be between participants, so that each "
                 "participant’s width follows from the answers of all. Group means are "
                 "random-effects means with the between-person variance of Paule and Mandel (1982) and, from "

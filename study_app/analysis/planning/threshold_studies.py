@@ -31,7 +31,7 @@ from study_app.protocol.checks.expected_precision import (
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.table import text_in
 from study_app.protocol.trials.tracks import standards_of
-from study_app.psychophysics.people import ALONE, BETWEEN_PEOPLE, ESTIMATE_NOISE, Person
+from study_app.psychophysics.people import BETWEEN_PEOPLE, ESTIMATE_NOISE, Estimates, Person
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
 BATCH: Final = 10
@@ -114,22 +114,20 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
     apart = math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people, 1))
     log = plan.stimulus.spacing == "log"
     own = means + apart / math.log(10) if log else means * np.exp(apart)
-    shape = (BATCH, people, plan.standards)
-    each, truth = plan.each_standard(), np.broadcast_to(own, shape)
+    each, truth = plan.each_standard(), np.broadcast_to(own, (BATCH, people, plan.standards))
     first = case.seed[-1] * BATCH
-    kinds = [_kind_of(first + place)[1] for place in range(BATCH)]
-    parts = [_estimates(one, part, kinds, rng) for one, part in zip(each, np.split(truth, len(each), 2), strict=True)]
-    medians, variances, shared = (np.concatenate(it, 2) for it in zip(*parts, strict=True))
-    errors = (medians - truth) * (math.log(10) if log else 1 / truth)
-    found = PrecisionResult()
-    full = plan.measures(means)
-    common = shared[:, 0].sum(axis=1) / plan.standards**2
-    each_study = zip(errors, medians, variances, common.tolist(), full.ravel().tolist(), strict=True)
-    for one, median, variance, of_all, measured in each_study:
-        of_people, of_variances = median.mean(axis=1), variance.sum(axis=1) / plan.standards**2
+    kinds = [_kind_of(plan, first + place) for place in range(BATCH)]
+    parts = zip(each, np.split(truth, len(each), 2), strict=True)
+    of_sizes = zip(*(_estimates(one, part, kinds, sizes, rng) for one, part in parts), strict=True)
+    by_size = [tuple(np.concatenate(it, 2) for it in zip(*of_size, strict=True)) for of_size in of_sizes]
+    found, full = PrecisionResult(), plan.measures(means).ravel().tolist()
+    errors = (by_size[-1][0] - truth) * (math.log(10) if log else 1 / truth)
+    for study, measured in enumerate(full):
         halves = []
-        for n in sizes:
-            group = group_mean(of_people[:n].tolist(), of_variances[:n].tolist(), of_all) if n >= FEWEST else None
+        for n, (medians, variances, shared) in zip(sizes, by_size, strict=True):
+            of_people, of_variances = medians[study].mean(axis=1), variances[study].sum(axis=1) / plan.standards**2
+            of_all = float(shared[study].sum()) / plan.standards**2
+            group = group_mean(of_people.tolist(), of_variances.tolist(), of_all) if n >= FEWEST else None
             if group is None or group.low is None or group.high is None:
                 halves.append(math.nan)
             elif not measured:
@@ -137,7 +135,7 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
             else:
                 half = (group.high - group.low) / 2
                 halves.append(10.0**half - 1 if log else half / abs(group.mean))
-        found.errors.append(one if measured else np.full_like(one, math.inf))
+        found.errors.append(errors[study] if measured else np.full_like(errors[study], math.inf))
         found.halves.append(np.array(halves))
     return found
 
@@ -157,27 +155,31 @@ def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Pr
     return found
 
 
-def _kind_of(study: int) -> tuple[str, Person]:
+def _kind_of(plan: ThresholdPlan, study: int) -> Person:
     """Return the kind of people of a study: kinds take turns."""
-    return [*ALONE.items()][study % len(ALONE)]
+    return [*plan.kinds.values()][study % len(plan.kinds)]
 
 
 def _estimates(
-    plan: ThresholdPlan, truth: Array, kinds: Sequence[Person], rng: np.random.Generator
-) -> tuple[Array, ...]:
-    """Return medians, variances and what is shared of observers with these thresholds (studies, people, standards) [u].
+    plan: ThresholdPlan, truth: Array, kinds: Sequence[Person], sizes: Sequence[int], rng: np.random.Generator
+) -> Iterator[tuple[Array, ...]]:
+    """Yield for each size medians and variances, (studies, people, standards), and what is shared, (studies, 1, …).
 
-    In each study all observers are of one of ``kinds``.
+    Observers have thresholds ``truth`` (studies, people, standards) [u]; in each study all are of one of ``kinds``. The
+    first of them are the people of the smaller studies, who have their own widths.
     """
     studies, people, standards = truth.shape
     own, at_once = truth.transpose(0, 2, 1).reshape(-1), max(1, TRACKS_AT_ONCE // people) * people
     who = [kind for kind in kinds for _ in range(people * standards)]
-    starts = range(0, len(own), at_once)
-    found = [plan.simulate(own[first : first + at_once], rng, who[first : first + at_once], people) for first in starts]
-    return tuple(
-        np.concatenate(it).reshape(studies, standards, people).transpose(0, 2, 1)
-        for it in zip(*((one.medians, one.variances, one.shared) for one in found), strict=True)
-    )
+    found: list[list[Estimates]] = [[] for _ in sizes]
+    for first in range(0, len(own), at_once):
+        fits = plan.fits(plan.answers(own[first : first + at_once], rng, who[first : first + at_once]))
+        for n, of_size in zip(sizes, found, strict=True):
+            some = [one for start in range(0, len(fits), people) for one in fits[start : start + n]]
+            of_size.append(plan.grouped(some, n))
+    for of_size in found:
+        values = zip(*((one.medians, one.variances, one.shared) for one in of_size), strict=True)
+        yield tuple(np.concatenate(it).reshape(studies, standards, -1).transpose(0, 2, 1) for it in values)
 
 
 def sweep(
@@ -325,15 +327,16 @@ def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
     """Yield how wide the largest group's interval is with the most trials, over kinds of people: median and worst."""
     trials = max(trials for of_block, trials in precisions.found if of_block == block)
     halves = [one[-1] for one in precisions.found[block, trials].halves]
-    if not isinstance(plans(precisions.protocol, (trials,))[block][trials], ThresholdPlan) or len(halves) < len(ALONE):
+    plan = plans(precisions.protocol, (trials,))[block][trials]
+    if not isinstance(plan, ThresholdPlan) or len(halves) < len(plan.kinds):
         return
-    medians = {name: float(np.median(halves[place :: len(ALONE)])) for place, name in enumerate(ALONE)}
+    medians = {name: float(np.median(halves[place :: len(plan.kinds)])) for place, name in enumerate(plan.kinds)}
     worst = max(medians, key=lambda name: medians[name])
     if math.isfinite(medians[worst]):
         yield ""
         yield (
             f"By kind of people, {precisions.sizes[-1]} participants and {trials} trials: ±"
-            f"{sorted(medians.values())[len(ALONE) // 2]:.0%} (median), ±{medians[worst]:.0%} at worst ({worst})."
+            f"{sorted(medians.values())[len(medians) // 2]:.0%} (median), ±{medians[worst]:.0%} at worst ({worst})."
         )
 
 
@@ -372,9 +375,10 @@ def _assumed(plans_of_block: Mapping[int, Plan]) -> str:
     if isinstance(plan, ThresholdPlan):
         return (
             "The people of a study are of one kind; kinds take turns: psychometric functions as wide as the prior's "
-            "median, half, 1.5 and 2.5 times as wide, 2 or 5 % of answers at random, thresholds that fall or rise. "
-            "The mean of their thresholds is in the middle half of the levels. The group's interval is that of the "
-            "mean over all standards (Hartung–Knapp)."
+            "median, half, 1.5 and 2.5 times as wide, 2 or 5 % of answers at random, "
+            f"{'a preference for an interval or for the last answer, ' if plan.two_intervals else ''}thresholds that "
+            "fall or rise. The mean of their thresholds is in the middle half of the levels. The group's interval is "
+            "that of the mean over all standards (Hartung–Knapp)."
         )
     group = "The group's interval is that of the mean (Student)."
     if isinstance(plan, SensitivityPlan):

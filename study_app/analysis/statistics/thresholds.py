@@ -11,19 +11,19 @@ participants differ. A number is given only where the levels presented hold it.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
-from scipy.special import log_ndtr, ndtr, ndtri, xlogy
+from scipy.special import xlogy
 from scipy.stats import t as student
 
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked
-from study_app.psychophysics.families import CLIP, success
-from study_app.psychophysics.grid import Z_95, Grid, Posterior, Values, evenly, fit, geometric, posterior, tables
+from study_app.psychophysics.detection import preferred
+from study_app.psychophysics.families import success
+from study_app.psychophysics.grid import Z_95, Grid, Posterior, Values, evenly, fit, geometric, tables
 
 NOTICED_FROM: Final = 5.0
 """Agreement from "somewhat agree" on counts as having noticed."""
@@ -300,75 +300,6 @@ def change_score(
     time = time - np.average(time, weights=information)
     score = float((slope * (y - psi) / (psi * (1.0 - psi)) * time).sum())
     return score, float((information * time**2).sum())
-
-
-PREFERENCE_SD: Final = 1.0
-"""Standard deviation of preferences between people [SD of the decision]. [choice]"""
-BEYOND_CHANCE: Final = 2.0
-"""A preference is one from so many standard errors on."""
-NEWTON_STEPS: Final = 10
-
-
-def preferences(
-    towards: ArrayLike, successes: ArrayLike, before: ArrayLike, found: Posterior, levels: ArrayLike
-) -> Array:
-    """Return how far preferences move each decision between two intervals towards the correct one (n,) [SD].
-
-    A probit regression of the answers, with what the levels contribute fixed, has the preference for the first interval
-    and that for the answer before as coefficients; those within `BEYOND_CHANCE` standard errors count as none.
-
-    Parameters
-    ----------
-    towards : (n,) array
-        1 where the first interval is the correct one, otherwise −1.
-    successes : (n,) array
-        Whether answers are correct.
-    before : (n,) array
-        1 where the first interval was the answer before, otherwise −1; 0 where there was none before.
-    found : Posterior
-        Of these answers.
-    levels : (n,) array
-        In u.
-    """
-    first, lapse = np.asarray(towards, float), found.others[2]
-    unbiased = (found.success(levels) - lapse) / (1.0 - 2.0 * lapse)
-    sensed, said = first * ndtri(np.clip(unbiased, 0.5, 0.999)), np.where(successes, first, -first)
-    causes, weights = np.column_stack([np.ones_like(first), np.asarray(before, float)]), np.zeros(2)
-    for _ in range(NEWTON_STEPS):
-        agreed = said * (sensed + causes @ weights)
-        hazard = np.exp(-0.5 * agreed**2 - log_ndtr(agreed)) / math.sqrt(2 * math.pi)
-        information = (causes.T * (hazard * (hazard + agreed))) @ causes + np.eye(2) / PREFERENCE_SD**2
-        weights += np.linalg.solve(information, causes.T @ (said * hazard) - weights / PREFERENCE_SD**2)
-    errors = np.sqrt(np.diag(np.linalg.inv(information)))
-    return np.asarray(first * (causes @ np.where(np.abs(weights) > BEYOND_CHANCE * errors, weights, 0.0)), float)
-
-
-def preferred(psi: ArrayLike, lapse: ArrayLike, shift: ArrayLike) -> Array:
-    """Return ψ of two intervals where a preference moves the decision by ``shift`` towards the correct one [SD]."""
-    psi, lapse = np.asarray(psi, float), np.asarray(lapse, float)
-    if not np.any(shift):
-        return psi
-    unbiased = np.clip((psi - lapse) / (1.0 - 2.0 * lapse), CLIP, 1.0 - CLIP)
-    return np.asarray(np.clip(lapse + (1.0 - 2.0 * lapse) * ndtr(ndtri(unbiased) + shift), CLIP, 1.0 - CLIP), float)
-
-
-def fit_preferring(
-    levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, shifts: ArrayLike, grid: Grid
-) -> Posterior:
-    """Return the posterior as `grid.fit` does, where preferences moved decisions by ``shifts`` (k,) [SD]."""
-    if not np.any(shifts):
-        return fit(levels, successes, failures, grid)
-    known = (tuple(np.asarray(one, float).tolist()) for one in (levels, shifts))
-    flat = replace(grid, width_prior=None, session_sd=(0.0, 0.0))
-    return posterior(grid, successes, failures, *_moved_tables(flat, *known))
-
-
-@lru_cache(maxsize=8)
-def _moved_tables(grid: Grid, levels: Values, shifts: Values) -> tuple[Array, Array]:
-    """Return log ψ and log(1 − ψ) at each level in each cell."""
-    lapses, moved = np.array(grid.lapses)[:, None], np.array(shifts)[:, None, None, None, None]
-    psi = preferred(grid.success(levels), lapses, moved)
-    return np.log(psi), np.log1p(-psi)
 
 
 FEWEST: Final = 3

@@ -8,7 +8,7 @@ that of the mean by Student's t.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar, Final, TypeAlias
@@ -33,10 +33,10 @@ from study_app.protocol.trials.tracks import (
     tracks_of,
 )
 from study_app.psychophysics.adaptive import Answers, Observers
-from study_app.psychophysics.detection import NORMAL, rating
+from study_app.psychophysics.detection import NORMAL, PASSES, fit_preferring, preferences, rating
 from study_app.psychophysics.families import Floats
 from study_app.psychophysics.grid import Z_95, Posterior, fit, group_widths
-from study_app.psychophysics.people import ALONE, ASSUMED, ESTIMATE_NOISE, Estimates, Expected, Person
+from study_app.psychophysics.people import ALONE, ASSUMED, ESTIMATE_NOISE, KINDS, Estimates, Expected, Person
 
 D_PRIME: Final = 1.0
 """Of simulated participants. [choice]"""
@@ -196,13 +196,13 @@ MOST_TRIALS: Final = 200
 class ObserverAnswers:
     """What observers answered in a block, one each: the ``tracks`` of one standard, and counts of other answers.
 
-    ``catch`` (2, observers) are correct and incorrect answers to catch trials, which present the highest level,
-    ``noise`` (2, observers) successes and failures where the standard alone was presented, None where it never was.
+    ``catch`` are answers to catch trials, which present the highest level, ``noise`` (2, observers) successes and
+    failures where the standard alone was presented, None where it never was.
     """
 
     observers: Observers
     tracks: tuple[Answers, ...]
-    catch: Floats
+    catch: Answers
     noise: Floats | None
 
 
@@ -234,6 +234,16 @@ class ThresholdPlan:
         changed = {"trials": each * method.tracks} if method.adaptive else {"repetitions": each}
         catch = round(self.catch * each / max(1, self.trials // least))
         return replace(self, method=method.model_copy(update=changed), catch=catch)
+
+    @property
+    def two_intervals(self) -> bool:
+        """Whether one of two intervals is correct, so that people may prefer one."""
+        return self.design.kind == "2ifc" and has_correct_answer(self.design, self.stimulus)
+
+    @property
+    def kinds(self) -> Mapping[str, Person]:
+        """The people who are simulated."""
+        return KINDS if self.two_intervals else ALONE
 
     @property
     def unit(self) -> str:
@@ -271,63 +281,108 @@ class ThresholdPlan:
         """Return what observers with thresholds (n,) [u] answer: ``people``, one for each or one for all."""
         stimulus, design = self.stimulus, self.design
         assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
-        columns = np.array([(one.width, one.lapse, one.change) for one in people]).T
-        width, lapse, change = columns if len(people) > 1 else columns[:, 0]
+        columns = np.array([(it.width, it.lapse, it.change, it.criterion, it.repeats) for it in people]).T
+        width, lapse, change, *preferred = columns if len(people) > 1 else columns[:, 0]
         if guess is None:
             guess = lapse if guesses_of(stimulus, design) is None else FALSE_ALARMS
         presented = None if self.clipping is None else self.presented
         moves = np.log10(change) if stimulus.spacing == "log" else thresholds * np.log(change)
         observers = Observers(
-            assumed.family, thresholds, assumed.width_prior[0] * width, guess, lapse, presented, moves
+            assumed.family, thresholds, assumed.width_prior[0] * width, guess, lapse, presented, moves, *preferred
         )
         noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
         tracks, yes = [], np.zeros(len(thresholds))
         for number in range(1, self.method.tracks + 1):
             noise = random.random((len(thresholds), noise_trials)) if noise_trials else None
+            if np.any(preferred) and self.two_intervals:
+                trials = self.method.presentations(stimulus)
+                towards = random.permuted(np.tile((1.0, -1.0), (len(thresholds), (trials + 1) // 2)), axis=1)
+                observers = replace(observers, towards=towards[:, :trials])
             tracks.append(self.method.simulated(TrackSetting(stimulus, design, number), observers, random, noise))
             yes += 0 if noise is None else (noise < guess).sum(axis=1)
         caught = observers.probability(high) > random.random((self.catch * len(tracks), len(thresholds)))
-        right = caught.sum(axis=0)
+        none = np.zeros(caught.T.shape)
         return ObserverAnswers(
-            observers, tuple(tracks), np.array([right, len(caught) - right]),
+            observers, tuple(tracks), Answers(none + high, caught.T, none, none),
             np.array([yes, noise_trials * len(tracks) - yes]) if noise_trials else None,
         )  # fmt: skip
 
-    def estimates(self, answered: ObserverAnswers, most: int | None = None, together: int = PEOPLE) -> Estimates:
-        """Return what the analysis estimates from answers, of each track the first ``most`` if that is given.
+    def fits(self, answered: ObserverAnswers, most: int | None = None) -> list[Posterior]:
+        """Return what answers say about each observer, all widths being equally likely.
 
-        So many consecutive ones ``together`` are the people of a study, from whose answers each width is estimated.
+        Of each track the first ``most`` are taken, if that is given, without catch trials. Preferences are removed as
+        in the report, where anybody has any.
         """
-        stimulus, design = self.stimulus, self.design
-        tracks = [one if most is None else one.first(most) for one in answered.tracks]
+        stimulus, tracks = self.stimulus, answered.tracks if most else (*answered.tracks, answered.catch)
         high = stimulus.domain[1]
-        presented = np.unique(np.concatenate([one.levels[~np.isnan(one.levels)] for one in tracks]))
+        levels, successes, towards, before = (
+            np.concatenate(it, axis=1) for it in zip(*(one.first(most) for one in tracks), strict=True)
+        )
+        answers = Answers(levels, successes, towards, before)
+        presented = np.unique(answers.levels[~np.isnan(answers.levels)])
         if len(presented) > OBSERVERS:
             presented = np.linspace(*stimulus.domain, OBSERVERS)
         places = np.append(presented[presented < high], high)
-        counts = np.sum([one.counts(places.tolist()) for one in tracks], axis=0)
-        if most is None:
-            counts[:, :, -1] += answered.catch
+        counts = np.array(answers.counts(places.tolist()))
         if answered.noise is not None:
             counts = np.concatenate((answered.noise[:, :, None], counts), axis=2)
             places = np.append(stimulus.coordinate(0.0), places)
-        assumed = self.method.assumed(stimulus, design)
-        grid = analysis_grid(stimulus, design, assumed)
+        grid = analysis_grid(stimulus, self.design, self.method.assumed(stimulus, self.design))
         flat = replace(grid, width_prior=None)
-        fits = [replace(fit(places, right, wrong, flat), grid=grid) for right, wrong in counts.transpose(1, 0, 2)]
-        found = []
+        fits = [fit(places, right, wrong, flat) for right, wrong in counts.transpose(1, 0, 2)]
+        if towards.any():
+            at, known = answers.nearest(places.tolist()), ~np.isnan(levels)
+            for one, own in enumerate(known):
+                given = successes[one, own], towards[one, own], before[one, own]
+                fits[one] = _without_preferences(fits[one], places, at[one, own], given, grid.prior[0, :, 0, 0])
+        return [replace(one, grid=grid) for one in fits]
+
+    def estimates(self, answered: ObserverAnswers, most: int | None = None, together: int = PEOPLE) -> Estimates:
+        """Return what the analysis estimates from answers; see `fits` and `grouped`."""
+        return self.grouped(self.fits(answered, most), together)
+
+    def grouped(self, fits: Sequence[Posterior], together: int = PEOPLE) -> Estimates:
+        """Return estimates from `fits`, of which so many consecutive ones ``together`` are the people of a study."""
+        prior = self.method.assumed(self.stimulus, self.design).width_prior
+        found, of_groups = list[tuple[float, ...]](), list[float]()
         for first in range(0, len(fits), together):
             group = fits[first : first + together]
-            priors, shared = group_widths(group, assumed.width_prior)
+            priors, shared = group_widths(group, prior)
             fitted = map(Posterior.with_widths, group, priors)
-            found += [(own.threshold, *own.interval, own.variance, shared) for own in fitted]
-        return Estimates(*np.array(found).T)
+            found += [(own.threshold, *own.interval, own.variance) for own in fitted]
+            of_groups.append(shared)
+        medians, lows, highs, variances = np.array(found).T
+        return Estimates(medians, lows, highs, variances, np.array(of_groups))
 
     def simulate(
         self, thresholds: Floats, random: Generator, people: Sequence[Person] = (ASSUMED,), together: int = PEOPLE
     ) -> Estimates:
         """Return what the analysis estimates of observers with these thresholds [u], as in `answers`."""
         return self.estimates(self.answers(thresholds, random, people), together=together)
+
+
+def _without_preferences(
+    found: Posterior,
+    places: Floats,
+    at: NDArray[np.int64],
+    given: tuple[NDArray[np.bool_], Floats, Floats],
+    widths: Floats,
+) -> Posterior:
+    """Return the fit of one observer's answers at ``places[at]``, of which ``found`` is the one with preferences.
+
+    ``given`` are successes, and the answers that are correct and those before; ``widths`` is the prior of the width.
+    Preferences are rounded, so that observers have tables in common.
+    """
+    with_them, (successes, towards, before) = found, given
+    for _ in range(PASSES):
+        moved = preferences(towards, successes, before, found.with_widths(widths), places[at])
+        shifts, of_each = np.unique(np.round(moved, 1), return_inverse=True)
+        if not shifts.any():
+            return with_them
+        cells, shape = of_each * len(places) + at, len(shifts) * len(places)
+        right, wrong = (np.bincount(cells, one, shape) for one in (successes, ~successes))
+        found = fit_preferring(np.tile(places, len(shifts)), right, wrong, np.repeat(shifts, len(places)), found.grid)
+    return found
 
 
 def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
@@ -346,7 +401,7 @@ def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
 
 @lru_cache(maxsize=32)
 def expected(plan: ThresholdPlan) -> Expected:
-    """Return how precise thresholds are expected to be, of each kind of people that counts of answers describe.
+    """Return how precise thresholds are expected to be, of each kind of people.
 
     Only thresholds below the highest level that is presented in full have estimates; where those are not the larger
     half of all, none is expected.
@@ -355,29 +410,32 @@ def expected(plan: ThresholdPlan) -> Expected:
     per_trial = cells * plan.stimulus.steps
     trials = min(plan.trials, MOST_TRIALS, max(10, MOST_WORK // (per_trial * FEWEST)))
     simulated = plan if trials == plan.trials else plan.with_trials(trials)
-    observers = max(FEWEST, min(OBSERVERS, MOST_WORK // (per_trial * simulated.trials))) // len(ALONE)
+    kinds = plan.kinds
+    observers = max(FEWEST, min(OBSERVERS, MOST_WORK // (per_trial * simulated.trials))) // len(kinds)
     together = min(PEOPLE, observers)
     observers = observers // together * together
     low, high = plan.stimulus.domain
     own = low + (high - low) * (0.25 + 0.5 * (np.arange(observers) + 0.5) / observers)  # the middle half
-    truth, people = np.tile(own, len(ALONE)), [one for one in ALONE.values() for _ in own]
-    halves, variances = [], []
+    truth, people = np.tile(own, len(kinds)), [one for one in kinds.values() for _ in own]
+    halves, variances, shared = [], [], []
     for one in simulated.each_standard():
         found = one.simulate(truth, np.random.default_rng(SEED), people, together)
         full = one.measures(own)
-        ends = ((found.highs - found.lows) / 2).reshape(len(ALONE), -1)[:, full]
-        errors = (found.medians - truth).reshape(len(ALONE), -1)[:, full]
+        ends = ((found.highs - found.lows) / 2).reshape(len(kinds), -1)[:, full]
+        errors = (found.medians - truth).reshape(len(kinds), -1)[:, full]
         measured = full.mean() > 0.5
-        halves.append(ends.mean(axis=1) if measured else np.full(len(ALONE), math.inf))
+        halves.append(ends.mean(axis=1) if measured else np.full(len(kinds), math.inf))
         variances.append(float(errors.var()) if measured else math.inf)
+        shared.append(together * float(found.shared.mean()))
     shrunk = (simulated.trials / plan.trials) ** 0.5
     return Expected(
         spacing=plan.stimulus.spacing,
         trials=plan.trials,
         standards=plan.standards,
-        halves=dict(zip(ALONE, (shrunk * np.mean(halves, axis=0)).tolist(), strict=True)),
+        halves=dict(zip(kinds, (shrunk * np.mean(halves, axis=0)).tolist(), strict=True)),
         spread=shrunk * (sum(variances) / len(variances)) ** 0.5,
         threshold=plan.stimulus.level_of(float(np.median(own))),
+        shared=shrunk**2 * sum(shared) / len(shared),
     )
 
 

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from itertools import count
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, TypeAlias
 
@@ -38,6 +39,7 @@ from study_app.protocol.trials.stimuli import (
 from study_app.psychophysics.adaptive import (
     RATIOS,
     Answers,
+    Choice,
     Observers,
     Search,
     Staircase,
@@ -162,20 +164,23 @@ class Method(Table):
         ``noise`` (tracks, noise trials) are the uniform numbers of the answers to noise trials. Levels are asked for
         one after the other here, as a session does; a kind that can compute all tracks at once does so, much faster.
         """
-        stimulus, trials = track.stimulus, self.presentations(track.stimulus)
-        draws = random.random((len(observers.thresholds), trials))
-        levels, successes = np.full(draws.shape, np.nan), np.zeros(draws.shape, bool)
-        for one, of_track in enumerate(draws):
-            seeds, heard = random.integers(2**32, size=max(1, self.rounds(stimulus))), list[TrialResult]()
-            while len(heard) < trials and not self.ended(track, heard):
-                number, sources = len(heard), [np.random.default_rng(seed).random for seed in seeds]
-                level = self.level(track, number, heard, sources)
-                levels[one, number] = stimulus.coordinate(level)
-                done = number / max(1, trials - 1)
-                right = bool(of_track[number] < observers.probability(levels[one, number], done)[one])
-                successes[one, number] = right
-                heard.append(TrialResult(number, "", level, right, right))
-        return Answers(levels, successes)
+        stimulus = track.stimulus
+        draws = random.random((len(observers.thresholds), self.presentations(stimulus)))
+        seeds = [random.integers(2**32, size=max(1, self.rounds(stimulus))) for _ in draws]
+
+        def chosen() -> Choice:
+            heard: list[list[TrialResult]] = [[] for _ in draws]
+            levels, running = np.zeros(len(draws)), np.ones(len(draws), bool)
+            for number in count():
+                for one in np.flatnonzero(running):
+                    running[one] = not self.ended(track, heard[one])
+                    sources = [np.random.default_rng(seed).random for seed in seeds[one]]
+                    levels[one] = self.level(track, number, heard[one], sources)
+                right = yield np.array([stimulus.coordinate(level) for level in levels]), running
+                for of_track, level, success in zip(heard, levels.tolist(), right.tolist(), strict=True):
+                    of_track.append(TrialResult(number, "", level, success, success))
+
+        return observers.answers(draws, chosen())
 
     def rounds(self, stimulus: Stimulus) -> int:
         """Return how many rounds of drawn levels a track has."""

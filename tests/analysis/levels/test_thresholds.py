@@ -73,7 +73,7 @@ def test_levels_that_are_evenly_spaced_have_widths_and_thresholds_in_their_unit(
         ],
         columns=["participant", "block", "standard", "level", "level_delivered", "analysed", "success"],
     )
-    frame = arranged(frame.assign(session="01", trial=range(1, len(frame) + 1)))
+    frame = arranged(frame.sample(frac=1, random_state=1).assign(session="01", trial=range(1, len(frame) + 1)))
     _, one = thresholds(block(stimulus=stimulus), frame)
     assert one.beyond == beyond
     assert one.threshold == pytest.approx(planted, rel=0.03)
@@ -115,7 +115,7 @@ def test_family_and_prior_on_the_width_are_those_that_questplus_states() -> None
     assert wide.width == pytest.approx(3.5, rel=0.1)
     _, narrow = thresholds(replace(block(), method=QuestPlus(widths=(0.1, 0.3), width_prior=(0.2, 1.05))), plain)
     assert narrow.width == pytest.approx(0.2, rel=0.1)
-    assert wide.flat_width == default.flat_width
+    assert wide.flat_width == pytest.approx(default.flat_width, rel=0.05)  # the change removed depends on the prior
 
 
 def test_a_function_that_does_not_fit_and_answers_that_drift_are_said_to() -> None:
@@ -151,6 +151,10 @@ def test_a_threshold_that_changes_is_named_with_its_size_and_widens_the_interval
     assert one.change == pytest.approx(-0.75, abs=0.15)
     assert (other.drifts, other.change) == (False, 0.0)
     assert math.log(one.high / one.low) > 1.3 * math.log(other.high / other.low)
+    moved = counts_of(STIMULUS, learns).steadied(learns["success"].to_numpy(dtype=bool), -0.6)
+    in_middle = np.log10(learns["level"]) + np.repeat([-0.15, 0.15], len(learns) // 2)  # a fallen threshold: easier
+    assert moved.levels[moved.places] == pytest.approx(in_middle)
+    assert moved.successes.sum() == learns["success"].sum()
 
 
 @pytest.mark.parametrize(("criterion", "repeats"), [(0.0, 0.0), (0.6, 0.0), (0.0, 0.6)])

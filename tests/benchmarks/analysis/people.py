@@ -60,7 +60,7 @@ def fitted(own: pd.DataFrame, correct: np.ndarray, stimulus: Stimulus, grid: Gri
     rows = pd.DataFrame({"level": own["stimulus"], "success": correct, "towards": towards})
     before = np.concatenate(([0.0], np.where(correct, towards, -towards)[:-1]))
     rows = rows.assign(level_delivered=rows["level"], before=before)
-    return fit_answers(stimulus, rows, grid, two_intervals=True)[1]
+    return fit_answers(stimulus, rows, grid, two_intervals=True)[1].fit(grid)
 
 
 def pairs(trials: pd.DataFrame, size: int, draw: np.random.Generator | None = None) -> Iterator[Pair]:
