@@ -11,8 +11,8 @@ from tests.haptics.scenes import COMPILED
 pytestmark = [pytest.mark.skipif(not COMPILED, reason="many thousands of ticks"), pytest.mark.slow]
 
 LIMITERS = LIMITER_SLOPE | LIMITER_ENERGY | LIMITER_NORM | LIMITER_SLEW | LIMITER_FADE
-SHAKEN = {"Tool_5_Maryland_L_3/29", "Tool_4_Maryland_L_4/07"}
-"""Recordings in which the spindle shakes or the motor runs away: the passivity controller acts."""
+SHAKEN = {"Tool_5_Maryland_L_3/29", "Tool_4_Maryland_L_4/07", "Tool_4_Maryland_L_Pitch_1/103"}
+"""Recordings in which the spindle shakes, jumps 1 mm after it stuck, or the motor runs away: the controller acts."""
 
 
 @pytest.mark.parametrize("encoder", COUNTS_M)

@@ -17,7 +17,7 @@ from tests.haptics.scenes import COMPILED, HONEY, THESIS, WATER, Hand, examples,
 
 STRONG = scene(liquid(10_000), scale=30)
 RHO_V = 1400 * 4 / 3 * np.pi * 0.034**3
-STOKES_LAYER_KG = 3 * np.pi * 0.034**2 * np.sqrt(2 * 10.0 * 1400 / (2 * np.pi))
+STOKES_LAYER_KG = 3 * np.pi * 0.034**2 * np.sqrt(2 * 10.0 * 1400 / (2 * np.pi * 50))  # at 50 Hz
 SCENES = {**THESIS, "strong": STRONG}
 
 

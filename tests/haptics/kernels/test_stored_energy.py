@@ -14,7 +14,7 @@ compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 
 MEASURED = Dynamics(delay_s=1e-3, count_m=38e-6, mass_kg=0.1)
 RHO_V = 1400 * 4 / 3 * np.pi * 0.034**3
-STOKES_LAYER_KG = 3 * np.pi * 0.034**2 * np.sqrt(2 * 10.0 * 1400 / (2 * np.pi))
+STOKES_LAYER_KG = 3 * np.pi * 0.034**2 * np.sqrt(2 * 10.0 * 1400 / (2 * np.pi * 50))  # at 50 Hz
 
 
 def inert(velocity=None, effects=("added_mass", "history"), **fields):

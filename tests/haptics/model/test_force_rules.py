@@ -19,6 +19,7 @@ RELEASED = {
     "hand_mps2": math.inf,
     "gap_ticks": math.inf,
     "quiet_s": math.inf,
+    "history_period_s": 1.0,
 }
 
 

@@ -36,7 +36,6 @@ WEIGHTS = (
     0.63661146557001,
 )  # a_i
 NOTHING = 1e-30
-PERIOD_S = 1.0  # oscillation whose inertia counts as stored energy
 ROUNDING_S = 1e-9  # a window of n ticks holds n of them, however their sum is rounded
 
 
@@ -47,7 +46,7 @@ def basset_force(
     """Add the history force, (3,) [N], to the force; φ is the share of the volume in the liquid.
 
     w is first smoothed, as for the added mass. Only the share that keeps the loop stable is sent. It stores the
-    energy of its inertia in an oscillation of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24).
+    energy of its inertia, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24), in an oscillation of the period in the rules.
     """
     history, tracks = liquid.history, local.history
     intervals, exponentials = rows.intervals, rows.exponentials
@@ -68,7 +67,7 @@ def basset_force(
     for axis in range(3):
         force_n[axis] *= -history.factor_kg_rs * local.share
         state.force_n[axis] += force_n[axis]
-    inertia_kg = 0.5 * history.factor_kg_rs * local.share * math.sqrt(PERIOD_S)
+    inertia_kg = 0.5 * history.factor_kg_rs * local.share * math.sqrt(parameters.rules.history_period_s)
     state.returnable_j += (
         0.5 * liquid.inertia_share[delay_ticks] * inertia_kg * _storing_square(parameters, local, tracks)
     )

@@ -39,7 +39,6 @@ RATES_PER_S = (0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902)
 WEIGHTS_RPS = (0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937)  # b_i [1/√s]
 SHORT = 4.0  # `_mean` needs no exp up to this value
 NOTHING = 1e-30
-PERIOD_S = 1.0  # oscillation whose history force counts as stored energy
 
 _over_stokes = part(laws.finite_reynolds)
 
@@ -82,7 +81,8 @@ def unsteady_drag_force(
     local.late_mps = LATE_SHARE * u_mps
     local.prompt_nspm = law.stokes_nspm * local.frontal
     state.growth = max(state.growth, GROWS_AS_SPEED)
-    inertia_kg = (law.mass_kg + 0.5 * law.factor_kg_rs * math.sqrt(PERIOD_S)) * local.share
+    of_history_kg = 0.5 * law.factor_kg_rs * math.sqrt(parameters.rules.history_period_s)
+    inertia_kg = (law.mass_kg + of_history_kg) * local.share
     square_m2ps2 = storing_square(parameters, local, tracks.smoothed_mps2, of_mass_per_s)
     state.returnable_j += 0.5 * liquid.inertia_share[delay_ticks] * inertia_kg * square_m2ps2
 

@@ -171,7 +171,7 @@ def test_the_reserve_is_that_of_added_mass_and_history_together():
     hand = Hand(tank("glycerin"))
     hand.sweep(0.2, 500)
     state, liquid_state = hand.model.state[0], hand.model.liquid_states[0]
-    mass_kg = 1261 * ADDED_M3 + 0.5 * 1.5 * 0.068**2 * np.sqrt(np.pi * 1261 * 1.41)
+    mass_kg = 1261 * ADDED_M3 + 0.5 * 1.5 * 0.068**2 * np.sqrt(np.pi * 1261 * 1.41 / 50)
     share = hand.model.liquids[0].inertia_share[hand.safety[0].delay_ticks]
     assert state.returnable_j == pytest.approx(0.5 * share * mass_kg * (liquid_state.motion_mps**2).sum())
 
