@@ -167,9 +167,11 @@ def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) ->
         "never means, except in the test of equivalence, which concerns the mean difference, and in mixed models."
     )
     for found in blocks:
-        yield from said_of_presentations(found)
-        for finding in all_findings():
-            yield from finding(found, results).methods()
+        of_findings = (sentence for finding in all_findings() for sentence in finding(found, results).methods())
+        said = [sentence for sentence in (*said_of_presentations(found), *of_findings) if sentence]
+        if said and len(blocks) > 1:
+            yield f"{lead(found)}:"
+        yield from said
     yield from _common(results, blocks)
 
 
@@ -179,13 +181,13 @@ def _sample(study: Study) -> str:
     out = study.left_out + len(study.excluded_sessions)
     gone = f"; {counted(out, 'further session')} {'was' if out == 1 else 'were'} left out" if out else ""
     under = ""
-    if study.blocks:
+    if study.blocks and study.n:
         whole = all(set(people_a_setting(study, block).values()) == {study.n} for block in study.blocks)
         some = ", some of them under fewer than all settings, single trials being left out"
         under = ", each under all settings" if whole else some
     return (
         f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, "
-        f"{version_words(study)}){gone}{under}."
+        f"{version_words(study)}){under}{gone}."
     )
 
 
