@@ -45,6 +45,13 @@ ASKED = [
     ("Is the force safe?", "maximum force safe", "safety", "the force limit (8 N)"),
     # A researcher, after five participants
     ("A word in a question is wrong.", "typo after five participants", "designer", "proposes the next version"),
+    ("The study file is wrong: edit it?", "mistake in the study file", "designer", "proposes the next version"),
+    (
+        "May I change the liquids now?",
+        "change protocol after first participant",
+        "designer",
+        "With changed liquids, conditions, stimuli or blocks, sessions are refused there",
+    ),
     ("There is a new version: take it?", "update in the middle of a study", "year", "Do not update if you can stay."),
     ("May questions come in any order?", "shuffled questions", "questions", "`shuffled`: drawn each time"),
     # An assistant, with a participant in the room
@@ -57,6 +64,7 @@ ASKED = [
     ("I see no taskbar any more.", "not full screen", "run-a-session", "On a single one use `--windowed`"),
     ("I typed P12 instead of P21.", "wrong participant number", "run-a-session", "A wrong participant ID"),
     ("She has to go to the toilet.", "participant needs a break", "run-a-session", "P pauses"),
+    ("Honey buzzes, but the device is sound.", "buzzing", "run-a-session", "If only a thick liquid vibrates, lower"),
     ("The handle shakes.", "device starts buzzing", "run-a-session", "If the handle vibrates or pulls"),
     ("May I put it online?", "share data without personal data", "files", "Before you share"),
     ("The power failed.", "power cut during a trial", "run-a-session", "No answer is lost."),
@@ -104,7 +112,7 @@ def test_a_search_finds_words_that_begin_alike_the_best_page_first_at_its_headin
     assert not any(row.heads for row in found("photodiode"))
     assert (found("new versions")[0].page, found("new versions")[0].anchor) == (
         "year",
-        "a-new-version-in-the-middle-of-a-study",
+        "a-new-version-of-the-program-in-the-middle-of-a-study",
     )
     assert next(row.page for row in found("spss")) == "export"  # a list of pages comes after them
 
