@@ -65,7 +65,7 @@ def _setting() -> str | None:
     try:
         document = json.loads(settings_file().read_bytes())
         folder = setting_of(document) if isinstance(document, dict) else None
-        return folder if isinstance(folder, str) and os.fsencode(folder) else None
+        return folder if isinstance(folder, str) and os.fsencode(folder) and "\0" not in folder else None
     except (OSError, ValueError, RecursionError):
         return None
 

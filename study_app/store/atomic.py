@@ -108,10 +108,10 @@ def make_folder(path: Path, *, waits: bool = True) -> None:
         It cannot be made.
     """
     path = path.absolute()
-    missing = [level for level in (path, *path.parents) if not is_there(level)]
+    missing = [level for level in (path, *path.parents) if waits and not is_there(level)]
     try:
         path.mkdir(parents=True, exist_ok=True)
-        for level in missing if waits else ():
+        for level in missing:
             sync_folder(level.parent)
     except OSError as error:
         raise cannot_write(path, error) from error

@@ -69,6 +69,11 @@ def test_forces_are_those_of_the_servo() -> None:
 TRIALS = pd.DataFrame({"level": [0.05, 0.1, 0.4, 0.4], "success": [False, True, True, True]})
 
 
+def test_a_participant_who_met_the_lowest_level_alone_has_a_threshold() -> None:
+    found = api.fit(TRIALS.assign(level=0.0), levels=(0.02, 1.0), design="yesno")
+    assert np.isfinite(found.threshold).all()
+
+
 def opened(**options: Any) -> None:
     with api.open_force("rek2024", **options):
         pytest.fail("it was opened")

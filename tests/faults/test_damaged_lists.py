@@ -118,3 +118,12 @@ def test_a_damaged_file_is_an_error_for_people_and_never_a_traceback(
                 errors.append(error)
                 raise
     assert all(len(str(error)) < 1000 and "\n" not in str(error) for error in errors), max(map(str, errors), key=len)
+
+
+def test_a_workspace_that_no_folder_can_be_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("LIQUID_STUDY_WORKSPACE", raising=False)
+    monkeypatch.chdir(tmp_path)
+    settings_file().parent.mkdir(parents=True, exist_ok=True)
+    for folder in ("a\0b", "\ud83c"):
+        settings_file().write_text(json.dumps({"workspace": folder}), encoding="utf-8")
+        assert folder not in str(workspace.workspace().results)

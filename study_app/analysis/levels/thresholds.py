@@ -299,7 +299,7 @@ def _own(
         lapse=lapse,
         guess=guess,
         flat_width=level_of(fitted.flat.threshold),
-        beyond="above" if threshold > shown.max() else "below" if threshold < shown.min() else None,
+        beyond="above" if threshold > shown.max(initial=-math.inf) else "below" if threshold < shown.min() else None,
         variance=found.variance,
         fit_p=p_of_fit(counts.successes, counts.successes + counts.failures, psi),
         drift=drift(rows["success"].to_numpy(dtype=bool), psi[counts.places]),

@@ -187,7 +187,7 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
         if first is None:
             first, course = answered, _course(plan, answered, check)
     assert first is not None  # noqa: S101 - there is a first one
-    found, planted = np.concatenate(medians), replace(first.observers, thresholds=np.array(u))
+    found, planted = np.concatenate(medians), replace(first.observers, thresholds=np.array(u), moves=0.0)
     errors = (found - u) * math.log(10) if stimulus.spacing == "log" else (found - u) / u
     at = np.linspace(*stimulus.domain, POINTS)
     quantiles = np.quantile(found, SHARES)
@@ -245,7 +245,8 @@ def _longest(found: list[Planted]) -> tuple[float, float] | None:
 
 def _function(answered: ObserverAnswers, u: float, at: Floats) -> list[float]:
     """Return the function of an observer with threshold ``u`` at some levels [u], were they presented in full."""
-    found: list[float] = replace(answered.observers, thresholds=np.array(u), presented=None).probability(at).tolist()
+    observer = replace(answered.observers, thresholds=np.array(u), moves=0.0, presented=None)
+    found: list[float] = observer.probability(at).tolist()
     return found
 
 

@@ -2,6 +2,7 @@
 
 import time
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -22,13 +23,14 @@ from study_app.designer.measures.simulation import (
     Simulation,
     carry_out,
     focus_of,
+    observe,
     simulation_of,
     start_measure_worker,
 )
 from study_app.gui.participant.page_widgets import parts_of
 from study_app.gui.participant.pages.page_widget import PageContext
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
-from study_app.protocol.checks.expected_precision import imprecise
+from study_app.protocol.checks.expected_precision import imprecise, threshold_plan
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped_file
 from study_app.protocol.wording.languages import words
@@ -259,3 +261,13 @@ def test_a_page_never_shown_has_the_parts_of_one_that_is(qtbot: Any, size: tuple
 def test_an_order_is_given_up_before_its_first_number() -> None:
     with pytest.raises(Stopped):
         carry_out(order(20), print, lambda: True)
+
+
+def test_observers_of_evenly_spaced_levels_are_shown() -> None:
+    protocol = load("viscosityjnd")
+    plan = threshold_plan(protocol, protocol.main_blocks[0])
+    assert plan is not None
+    even = replace(plan, stimulus=plan.stimulus.model_copy(update={"spacing": "linear"}))
+    found = observe(even, 0.3, 0.02)
+    assert 0.5 < found.planted[0] < found.at_threshold < found.planted[-1]
+    assert found.observers > 0
