@@ -34,8 +34,8 @@ def test_examples_of_trials_are_studies_and_replace_parts_of_the_first() -> None
 def test_example_of_questions_is_a_study() -> None:
     (example,) = (one for one in examples(QUESTIONS) if one.startswith("format = 2"))
     study = parse(example.encode(), "example")
-    assert list(study.forms) == ["about_you", "comment"]
-    assert [item.kind_id for item in study.questionnaires["after"].items] == ["rating", "slider"]
+    assert list(study.forms) == ["about_you"]
+    assert [item.kind_id for item in study.questionnaires["after"].items] == ["rating"]
 
 
 def test_example_of_groups_gives_the_steps_that_it_names() -> None:
