@@ -28,8 +28,8 @@ class ForceRules(NamedTuple):
     slew limit meanwhile: with a third, a handle of 50 g released in a gap gained 6.5 mJ. ``hand_mps2`` is the greatest
     acceleration by a hand, ``gap_ticks`` the time between two samples, in nominal periods, above which it is a gap
     (`sample_validation`), ``quiet_s`` how long a hand must be quiet for its energy debt to be forgiven (`passivity`).
-    ``history_period_s`` is the period of the oscillation whose inertia the history force may return as energy: with
-    that of 1 Hz, a handle of 200 g let go in tar oscillated at 35 Hz on energy that such an oscillation does not store.
+    ``history_rs`` is the square root of the period of the oscillation whose inertia the history force may return as
+    energy: with that of 1 Hz, a handle of 200 g let go in tar oscillated at 35 Hz on energy that 35 Hz do not store.
     """
 
     version: int
@@ -47,7 +47,7 @@ class ForceRules(NamedTuple):
     hand_mps2: float = math.inf
     gap_ticks: float = math.inf
     quiet_s: float = math.inf
-    history_period_s: float = 1.0
+    history_rs: float = 1.0
 
 
 VERSIONS: Final = {
@@ -70,7 +70,7 @@ VERSIONS: Final = {
             hand_mps2=50.0,
             gap_ticks=4.5,
             quiet_s=0.3,
-            history_period_s=0.02,
+            history_rs=math.sqrt(0.02),
         ),
     )
 }

@@ -72,7 +72,7 @@ TAR, THROWN_TAR = "speed_mps=0.1885 release_s=1.01667", "hand=thrown speed_mps=0
         SHORT.format(3, 2, "physical_tar", 3, 0.05)
         + "rate_hz=500 estimator=kalman motion=reaches "
         + THROWN_TAR,  # KALMAN_SHARE
-        SHORT.format(2, 1, "physical_tar", 1, 0.2) + "motion=stroke speed_mps=1 estimator=kalman",  # history_period_s
+        SHORT.format(2, 1, "physical_tar", 1, 0.2) + "motion=stroke speed_mps=1 estimator=kalman",  # history_rs
     ],
 )
 def test_a_delay_one_tick_longer_than_believed_leaves_the_loop_stable(line):

@@ -19,7 +19,7 @@ RELEASED = {
     "hand_mps2": math.inf,
     "gap_ticks": math.inf,
     "quiet_s": math.inf,
-    "history_period_s": 1.0,
+    "history_rs": 1.0,
 }
 
 

@@ -67,7 +67,7 @@ def basset_force(
     for axis in range(3):
         force_n[axis] *= -history.factor_kg_rs * local.share
         state.force_n[axis] += force_n[axis]
-    inertia_kg = 0.5 * history.factor_kg_rs * local.share * math.sqrt(parameters.rules.history_period_s)
+    inertia_kg = 0.5 * history.factor_kg_rs * local.share * parameters.rules.history_rs
     state.returnable_j += (
         0.5 * liquid.inertia_share[delay_ticks] * inertia_kg * _storing_square(parameters, local, tracks)
     )

@@ -81,7 +81,7 @@ def unsteady_drag_force(
     local.late_mps = LATE_SHARE * u_mps
     local.prompt_nspm = law.stokes_nspm * local.frontal
     state.growth = max(state.growth, GROWS_AS_SPEED)
-    of_history_kg = 0.5 * law.factor_kg_rs * math.sqrt(parameters.rules.history_period_s)
+    of_history_kg = 0.5 * law.factor_kg_rs * parameters.rules.history_rs
     inertia_kg = (law.mass_kg + of_history_kg) * local.share
     square_m2ps2 = storing_square(parameters, local, tracks.smoothed_mps2, of_mass_per_s)
     state.returnable_j += 0.5 * liquid.inertia_share[delay_ticks] * inertia_kg * square_m2ps2

@@ -1,0 +1,62 @@
+"""Releases of a handle without friction with "kalman": how many keep oscillating, by the period of the stored energy.
+
+Run it by itself: ``python tests/benchmarks/haptics/releases.py CASES [PERIOD_S …]``; by default the period in use.
+"""
+
+import dataclasses
+import itertools
+import math
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from random import Random
+
+from study_app.evidence.stability import bench
+from study_app.evidence.stability.stability_cases import FIRST, LETS_GO, REACHES, SECOND, SINE, STROKE, Case
+from study_app.evidence.stability.verdict import judge
+from study_app.haptics.model.force_rules import CURRENT
+from study_app.haptics.runtime.pack import pack
+
+LIQUIDS = ("honey", "light_oil", "dense", "physical_honey", "physical_glycerin", "physical_water")
+CHOICES = {
+    "liquid": (*LIQUIDS, *["physical_tar"] * 4),
+    "scale": (1.0, 1.0, 3.0),
+    "delay": ((2, 1), (2, 1), (3, 2), (1, 0), (1, 1), (2, 2)),  # in fact, and as assumed
+    "motion": (STROKE, REACHES, SINE),
+    "speed_mps": (0.3, 0.6, 1.0),
+    "mass_kg": (0.1, 0.15, 0.2, 0.25, 0.3, 0.4),
+    "release_s": (0.6, 0.65, 0.7, 0.75, 0.8, 0.9),
+    "plant": (FIRST, SECOND),
+}
+
+
+def cases(count: int) -> list[Case]:
+    """Return cases that are drawn from all combinations, the same in every run."""
+    drawn = Random(5).sample(list(itertools.product(*CHOICES.values())), count)  # noqa: S311 - no secret
+    named = (dict(zip(CHOICES, one, strict=True)) for one in drawn)
+    free = Case(hand=LETS_GO, estimator="kalman", viscous_nspm=0.0)
+    return [
+        dataclasses.replace(free, **it, delay=delay, believed=believed)
+        for it in named
+        for delay, believed in [it.pop("delay")]
+    ]
+
+
+def reasons(period_s: float, case: Case) -> tuple[str, ...]:
+    """Return why a case is unstable with the energy of such a period."""
+    bench.pack = partial(pack, rules=CURRENT._replace(history_rs=math.sqrt(period_s)))
+    return judge(case, safe=True).reasons
+
+
+def main() -> None:
+    """Print for each period how many cases are unstable, and how many of them oscillate."""
+    count, *periods_s = sys.argv[1:]
+    for period_s in map(float, periods_s or [CURRENT.history_rs**2]):
+        with ProcessPoolExecutor() as executor:
+            found = [*executor.map(partial(reasons, period_s), cases(int(count)), chunksize=8)]
+        oscillate = sum("oscillation" in one for one in found)
+        print(f"{period_s:g} s: of {count} cases {sum(map(bool, found))} unstable, {oscillate} oscillate", flush=True)
+
+
+if __name__ == "__main__":
+    main()
