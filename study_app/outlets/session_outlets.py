@@ -69,9 +69,9 @@ def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
     """
     name, _, place = address.partition(":")
     kind = SINKS.get(name)
-    if kind is None:
+    if kind is None or not address.isprintable():
         examples = ", ".join(one.example for one in SINKS.values())
-        raise OutletError(f"'{address}' is not an address of markers: use one like {examples}")
+        raise OutletError(f"{address!r} is not an address of markers: use one like {examples}")
     return kind.open(place, now_ns)
 
 

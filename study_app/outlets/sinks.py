@@ -128,7 +128,7 @@ class SerialPort:
         self._failures: tuple[type[Exception], ...] = (serial.SerialException, OSError)
         try:
             self._port: Any = serial.Serial(name, int(baud or BAUD), write_timeout=TIMEOUT_S)
-        except (*self._failures, ValueError) as error:
+        except (*self._failures, ValueError, OverflowError) as error:
             raise OutletError(f"{self.address} cannot be opened: {_cause(error)}") from error
 
     def write(self, byte: int) -> None:

@@ -111,8 +111,10 @@ class ClusterExecutor(Executor):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         try:
             self._client = Client(address, timeout=CONNECT_S, set_as_default=False)
-        except (OSError, ValueError, MemoryError) as error:
+        except OSError as error:
             raise _no_scheduler(address, str(error)) from error
+        except Exception as error:  # whatever Dask makes of the bytes of another program
+            raise _no_scheduler(address, "another program answers there") from error
         self._executor = self._client.get_executor(pure=False)
         self.has_workers = bool(self._client.nthreads())
         self._pending: set[Future[Any]] = set()

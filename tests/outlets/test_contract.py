@@ -139,6 +139,8 @@ def test_the_other_end_gets_each_event_in_order(kind: str, parport: str) -> None
         ("serial:", "write serial:NAME or serial:NAME@BAUD"),
         ("serial:@9600", "write serial:NAME or serial:NAME@BAUD"),
         ("serial:/dev/ttyUSB0@fast", "write serial:NAME or serial:NAME@BAUD"),
+        ("serial:/dev/ptmx@99999999999999999999", "^serial:/dev/ptmx@9+ cannot be opened: "),
+        ("parallel:/dev/\0x", r"^'parallel:/dev/\\x00x' is not an address of markers: "),
         ("parallel:/nowhere/parport0", "parallel:/nowhere/parport0 cannot be opened: No such file"),
         ("usb:1", "'usb:1' is not an address of markers: use one like lsl, parallel:/dev/par"),
     ],

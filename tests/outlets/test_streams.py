@@ -15,6 +15,7 @@ from study_app.outlets.markers import SinkKind, SinkThread
 from study_app.outlets.session_outlets import Outlets, open_sink
 from study_app.outlets.streams import CHANNELS, SampleStream, channels_of
 from tests.outlets.sinks import Recorder, marker
+from tests.strangers import PATIENCE_S, visited
 
 pylsl = pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
 slow = pytest.mark.slow
@@ -113,6 +114,21 @@ def test_a_recorder_gets_markers_with_the_times_of_their_events() -> None:
         assert stamp_s == pytest.approx(1e-9 * one.time_ns + offset_s, abs=1e-3)
     assert found["rate"] == 0.0
     assert "<trial_started>10</trial_started>" in found["xml"]
+
+
+@slow
+def test_strangers_at_the_port_of_a_stream_disturb_neither_its_recorder_nor_its_end() -> None:
+    thread = SinkThread(open_sink("lsl", time.monotonic_ns))
+    (found,) = pylsl.resolve_byprop("name", "liquid-study markers", 1, 10)
+    with visited(int(found.as_xml().partition("<v4data_port>")[2].partition("<")[0])):
+        recorder = Recorder("liquid-study markers", 3)
+        for trial in (1, 2, 3):
+            thread.mark(marker(trial))
+        assert [texts for texts, _ in recorder.found()["samples"]] == [[marker(trial).text] for trial in (1, 2, 3)]
+        began_s = time.monotonic()
+        thread.close(5)
+        assert time.monotonic() - began_s < PATIENCE_S
+    assert thread.lost == ""
 
 
 @slow

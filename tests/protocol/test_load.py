@@ -1,5 +1,6 @@
 """Which files a study names as its liquids, however the key is written."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,7 @@ def test_a_name_is_looked_up_in_the_working_folder_first(tmp_path: Path, monkeyp
         ("folder/rek2024.toml", "no such file"),
         ("rek2024.toml", "no such file"),
         (".", "is a folder"),
+        (os.devnull, "is a pipe or a device"),
     ],
 )
 def test_a_protocol_that_is_not_there(name: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

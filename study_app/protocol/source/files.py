@@ -176,6 +176,8 @@ def find(name_or_path: str | Path) -> Path:
         raise _not_found(name_or_path, "no protocol of this name", did_you_mean(path.name, at_hand()))
     if path.is_dir():
         raise _not_found(name_or_path, "is a folder, not a protocol file", "name one of the .toml files in it")
+    if path.exists():
+        raise _not_found(name_or_path, "is a pipe or a device, not a protocol file", "name a .toml file")
     raise _not_found(name_or_path, "no such file", f"or a name: {', '.join(shipped())}")
 
 

@@ -8,8 +8,8 @@ too) has a line that names its file and participant. Below the lines of a file m
 import atexit
 import base64
 import json
+import queue
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from importlib import import_module
@@ -72,33 +72,37 @@ def stamped(lines: str, server: str) -> str:
     StoreError
         It gives none within `WAITS_S`.
     """
-    import urllib.request  # noqa: PLC0415 - loads the network's modules: only where a stamp is asked for
-    from http.client import HTTPException  # noqa: PLC0415 - the same
-
     client = _library("rfc3161_client")
     asked = client.TimestampRequestBuilder().data(lines.encode()).build()
     if not server.startswith(("http://", "https://")):
         raise StoreError(f"{server} is not a server of time stamps: give a URL such as https://freetsa.org/tsr")
+    answers = queue.SimpleQueue[bytes | Exception]()
+    threading.Thread(target=_ask, args=(server, asked.as_bytes(), answers), daemon=True).start()
+    try:
+        answer = answers.get(timeout=WAITS_S)  # the time-out of a connection is for each packet alone
+        if not isinstance(answer, Exception):
+            client.decode_timestamp_response(answer)
+    except queue.Empty:
+        answer = TimeoutError(f"not within {WAITS_S:g} s")
+    except ValueError as error:
+        answer = error
+    if isinstance(answer, Exception):
+        raise StoreError(f"{server} gave no time stamp ({str(answer)[:100]!r}): try again later") from answer
+    return f"stamp {base64.b64encode(answer).decode()}\n"
+
+
+def _ask(server: str, question: bytes, answers: queue.SimpleQueue[bytes | Exception]) -> None:
+    """Put what a server answers, in part where it is longer than a stamp, or the error of asking."""
+    import urllib.request  # noqa: PLC0415 - loads the network's modules: only where a stamp is asked for
+
     try:
         request = urllib.request.Request(  # noqa: S310 - http or https, as checked
-            server, asked.as_bytes(), {"Content-Type": "application/timestamp-query"}
+            server, question, {"Content-Type": "application/timestamp-query"}
         )
         with urllib.request.urlopen(request, timeout=WAITS_S) as answer:  # noqa: S310
-            content = _received(answer)
-        client.decode_timestamp_response(content)
-    except (OSError, HTTPException, ValueError) as error:
-        raise StoreError(f"{server} gave no time stamp ({error}): try again later") from error
-    return f"stamp {base64.b64encode(content).decode()}\n"
-
-
-def _received(answer: Any) -> bytes:
-    """Return what a server answers, in time for all of it."""
-    until_s, content = time.monotonic() + WAITS_S, b""
-    while more := answer.read1(LONGEST):
-        content += more
-        if len(content) > LONGEST or time.monotonic() > until_s:
-            raise TimeoutError("too much, or too slow")
-    return content
+            answers.put(answer.read(LONGEST))
+    except Exception as error:  # noqa: BLE001 - raised where the answer is waited for
+        answers.put(error)
 
 
 def read_proof(path: Path) -> Proof:

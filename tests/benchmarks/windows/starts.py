@@ -1,11 +1,11 @@
 """Whether the program ends as it should, however often it is started: run me, I print a table.
 
 Starts the program with its windows and ends it: home, closed; every page visited, then closed; a session of the demo
-in its two windows, ended by a signal. Counts what ended in another way than asked for, or printed an exception; of a
-program that hangs it prints the stacks. It runs on what display there is, without one on Qt's offscreen platform. Run
-by itself:
+in its two windows, ended by a signal at most a second later. Counts what ended in another way than asked for, or
+printed an exception; of a program that hangs it prints the stacks. It runs on what display there is, without one on
+Qt's offscreen platform. Run by itself:
 
-    python tests/benchmarks/windows/starts.py [--starts 300]
+    python tests/benchmarks/windows/starts.py [--starts 300] [--kind run]
 """
 
 import argparse
@@ -31,7 +31,7 @@ from study_app.app import main_controller
 from study_app.app.session.bridge import SessionBridge
 from study_app.cli import main
 
-kind, results = sys.argv[1:]
+kind, results, later_ms = sys.argv[1:]
 
 def visit(controller):
     names = list(controller.window.rail.buttons) if kind == "places" else []
@@ -47,7 +47,7 @@ def visit(controller):
 
 def end(bridge, begin=SessionBridge.start):
     begin(bridge)
-    QTimer.singleShot(200, lambda: os.kill(os.getpid(), signal.SIGTERM))
+    QTimer.singleShot(int(later_ms), lambda: os.kill(os.getpid(), signal.SIGTERM))
 
 SessionBridge.start = end
 if kind == "run":
@@ -57,6 +57,7 @@ from pathlib import Path
 sys.exit(main_controller.home(Path(results), then=visit))
 """
 KINDS: Final = {"home": 0, "places": 0, "run": 128 + signal.SIGTERM}  # the exit code that each ends with
+LATEST_MS: Final = 1000  # a session is ended at any time of its first second
 PATIENCE_S: Final = 120
 LOOK_S: Final = 2
 MOST_SHOWN: Final = 6000
@@ -66,14 +67,15 @@ def main() -> None:
     """Print how often each kind ended, and how."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--starts", type=int, default=300)
-    starts = parser.parse_args().starts
+    parser.add_argument("--kind", choices=KINDS, action="append", help="only this kind; without it, all in turn")
+    asked = parser.parse_args()
     surroundings = dict(os.environ)
     if not surroundings.get("DISPLAY") and not surroundings.get("WAYLAND_DISPLAY"):
         surroundings["QT_QPA_PLATFORM"] = "offscreen"
     ends: Counter[tuple[str, str]] = Counter()
     began = time.monotonic()
     with suppress(KeyboardInterrupt):  # Ctrl+C prints what there is
-        count(starts, surroundings, ends)
+        count(asked.starts, asked.kind or list(KINDS), surroundings, ends)
     print(f"{ends.total()} starts in {(time.monotonic() - began) / 60:.0f} min\n\n| started | ended | times |")
     print("| --- | --- | --: |")
     for (kind, how), times in sorted(ends.items()):
@@ -81,12 +83,13 @@ def main() -> None:
     sys.exit(any(how != "as it should" for _, how in ends))
 
 
-def count(starts: int, surroundings: dict[str, str], ends: Counter[tuple[str, str]]) -> None:
+def count(starts: int, kinds: list[str], surroundings: dict[str, str], ends: Counter[tuple[str, str]]) -> None:
     """Start and end the program, and count how it ended."""
     for at in range(starts):
-        kind = list(KINDS)[at % len(KINDS)]
+        kind, later_ms = kinds[at % len(kinds)], at * 37 % LATEST_MS
         with tempfile.TemporaryDirectory() as folder:
-            command = [sys.executable, "-X", "faulthandler", "-c", PROBE, kind, str(Path(folder) / "results" / "demo")]
+            words = [kind, str(Path(folder) / "results" / "demo"), str(later_ms)]
+            command = [sys.executable, "-X", "faulthandler", "-c", PROBE, *words]
             with subprocess.Popen(
                 command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=surroundings
             ) as program:

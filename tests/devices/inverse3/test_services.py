@@ -19,7 +19,7 @@ from study_app.devices.inverse3.device import Inverse3Device
 from study_app.devices.inverse3.opening import DEVICE_GLOBAL, SESSION_SCOPED, Messages
 from study_app.devices.inverse3.service import force_scale, probe
 from tests.compiled import needs_servo
-from tests.strangers import CLOSE, HTTP_OK, Parts, dripped, flooded, http_answer, sent, serving
+from tests.strangers import CLOSE, HTTP_OK, STRANGERS, Parts, dripped, flooded, http_answer, sent, serving
 
 pytestmark = [needs_servo, pytest.mark.slow]
 MOST_S: Final = 3.0
@@ -71,7 +71,6 @@ def http(body: bytes, mode: str = "unknown-scale") -> Kind:
 
 
 HUGE: Final = b"\x81\x7f" + (1 << 62).to_bytes(8, "big")
-CHUNKED: Final = HTTP_OK + b"Transfer-Encoding: chunked\r\n\r\n"
 ANSWERS: Final[Mapping[str, Kind]] = {
     "ends at once": Kind("closed", sent(CLOSE)),
     "another program": Kind("not-websocket", sent(HTTP_OK + b"Content-Length: 2\r\n\r\n{}")),
@@ -119,14 +118,7 @@ HANGS: Final[Mapping[str, Kind]] = {
     "no answer": Kind("no-reply", asked=sent()),
     "answers slowly": Kind("no-reply", asked=lambda _: slowly(0.2)),
     "pings for an answer": Kind("no-reply", asked=lambda _: flooded(b"", frame(b"", 0x89))),
-    "HTTP silent": Kind("unknown-scale", http=sent()),
-    "HTTP dripped": Kind("unknown-scale", http=lambda: dripped(HTTP_OK)),
-    "HTTP lines flooded": Kind("unknown-scale", http=lambda: flooded(HTTP_OK, b"name: value\r\n")),
-    "HTTP continues": Kind("unknown-scale", http=lambda: flooded(b"", b"HTTP/1.1 100 Continue\r\n\r\n")),
-    "body dripped": Kind("unknown-scale", http=lambda: dripped(HTTP_OK + b"Content-Length: 9999\r\n\r\n[1")),
-    "body flooded": Kind("unknown-scale", http=lambda: flooded(HTTP_OK + b"\r\n", b"1")),
-    "huge body": Kind("unknown-scale", http=lambda: flooded(HTTP_OK + b"Content-Length: %d\r\n\r\n" % (1 << 62), b"1")),
-    "chunks dripped": Kind("unknown-scale", http=lambda: dripped(CHUNKED + b"1\r\n1\r\n" * 1000)),
+    **{name: Kind("unknown-scale", http=partial(one, b"", None)) for name, one in STRANGERS.items() if "HTTP" in name},
 }  # fmt: skip
 
 

@@ -16,9 +16,11 @@ from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.store import workstation
 from study_app.store.folders import StudyFolder
+from study_app.store.verification import proofs
 from study_app.store.verification.proofs import leave, proof_text, read_proof
 from study_app.store.verification.verify_study import verify
 from tests.store.verification.played_studies import proved
+from tests.strangers import ends_with_each
 from tests.studies import once
 
 pytestmark = pytest.mark.slow
@@ -200,3 +202,17 @@ def test_a_server_that_gives_no_stamp_is_named_and_the_program_goes_on(study: Pa
     wait_for_proofs()
     (line,) = said
     assert re.search(r"proof.txt: http://127.0.0.1:9 gave no time stamp \(.*refused.*\): try again later", line)
+
+
+def test_no_other_program_in_place_of_a_server_of_stamps_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
+    monkeypatch.setattr(proofs, "WAITS_S", 1.0)
+
+    def client(port: int) -> str:
+        with pytest.raises(StoreError) as refused:
+            proofs.stamped("a line\n", f"http://127.0.0.1:{port}/")
+        return str(refused.value)
+
+    said = ends_with_each(client)
+    line = r"http://127.0.0.1:\d+/ gave no time stamp \([^\n]{1,200}\): try again later$"
+    assert [one for one in said.items() if not re.match(line, one[1])] == []
