@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# Runs the tests with another Python and the newest releases of all dependencies, in a Debian root. Linux, as root.
+# Runs the whole check, or some tests, with another Python and the newest releases of all dependencies, in a Debian
+# root. Linux, as root.
 #
 #     sudo packaging/other_python.sh SUITE MIRROR ROOT [words for pytest]
+#     sudo packaging/other_python.sh trixie http://MIRROR/debian /var/tmp/trixie
 #     sudo packaging/other_python.sh trixie http://MIRROR/debian /var/tmp/trixie -n 2 -m "not slow and not nightly"
 #
 # SUITE trixie has Python 3.13, forky 3.14. MIRROR is an archive of Debian packages; ROOT is made by mmdebstrap at the
@@ -36,9 +38,10 @@ exec unshare --mount --pid --fork bash -c '
         QT_QPA_PLATFORM=offscreen LIQUID_STUDY_CONFIG=/tmp/settings LIQUID_STUDY_WORKSPACE=/work \
         chroot "$root" bash -euc "
             cd /work
-            [ -e /venv ] || python3 -m venv /venv
-            /venv/bin/pip install --quiet --upgrade --upgrade-strategy eager -e \".[test,proofs]\"
-            /venv/bin/python --version
-            /venv/bin/pip list | grep -iE \"^(pyside6_essentials|numpy|numba|pandas|pyarrow|pyqtgraph|scipy) \"
-            exec /venv/bin/python -m pytest \"\$@\"" bash "$@"
+            [ -e .venv ] || python3 -m venv .venv
+            .venv/bin/pip install --quiet --upgrade --upgrade-strategy eager -e \".[test,proofs]\"
+            .venv/bin/python --version
+            .venv/bin/pip list | grep -iE \"^(pyside6_essentials|numpy|numba|pandas|pyarrow|pyqtgraph|scipy) \"
+            [ \$# -gt 0 ] || exec bash .ci/run
+            exec .venv/bin/python -m pytest \"\$@\"" bash "$@"
     exit $? # this shell is process 1: it collects processes whose parent was killed' bash "$@"
