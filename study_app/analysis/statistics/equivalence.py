@@ -309,7 +309,7 @@ def _all_signs(n: int) -> Array:
 @lru_cache(maxsize=4)
 def _drawn_signs(n: int, seed: int) -> Array:
     """Return random signs (draws, n)."""
-    return np.random.default_rng(seed).choice([-1.0, 1.0], (DRAWS, n))
+    return np.random.default_rng(seed).choice(np.array([-1.0, 1.0]), (DRAWS, n))
 
 
 def _signs(shifted: Array, seed: int) -> float:

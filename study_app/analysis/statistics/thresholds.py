@@ -86,7 +86,7 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
     used = there.any(axis=(1, 2))
     order = np.unique(presented[there.any(axis=(0, 2))])
     same = np.asarray(presented[:, None] == order, float)
-    yes, asked = (one[used].sum(axis=2) @ same for one in (there & (array >= NOTICED_FROM), there))
+    yes, asked = (one[used].sum(axis=2, dtype=float) @ same for one in (there & (array >= NOTICED_FROM), there))
     of_yes, of_asked = yes.sum(axis=0), asked.sum(axis=0)
     found: dict[str, Any] = {}
     note = _impossible(order, of_yes, of_asked)

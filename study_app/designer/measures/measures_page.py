@@ -203,19 +203,19 @@ class MeasuresPage(Themed, QWidget):
         self.track: PlotCard | None = None
         self.forces: ForcesCard | None = None
         self.blocks, self.grid = CardGrid(self.open_asked.emit), CardGrid(self.open_asked.emit)
-        inside = QWidget()
+        self._inside = QWidget()
         self.curves = QWidget()
         self.plots = hbox(spacing=8, margins=0, parent=self.curves)
         self.curves.setMaximumHeight(HIGHEST_PX)
         parts = (self.blocks, self.numbers, (self.curves, 3), (self.grid, 1), STRETCH)
-        self.column = vbox(*parts, spacing=8, margins=0, parent=inside)
+        self.column = vbox(*parts, spacing=8, margins=0, parent=self._inside)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
         self.area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.area.setAccessibleName("Measures")
         self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.area.setWidget(inside)
-        inside.setObjectName("earlier")
+        self.area.setWidget(self._inside)
+        self._inside.setObjectName("earlier")
         self.earlier = label(EARLIER, "label", "warn", wraps=True)
         self.earlier.hide()
         vbox(self.earlier, self.area, margins=0, parent=self)
@@ -237,7 +237,7 @@ class MeasuresPage(Themed, QWidget):
         if shown is None:
             return
         self.earlier.setVisible(shown.earlier)
-        self.area.widget().setEnabled(not shown.earlier)
+        self._inside.setEnabled(not shown.earlier)
         above = tuple(one for one in (shown.hypotheses, shown.blocks) if one is not None)
         self.blocks.setVisible(bool(above))
         self.blocks.show_cards(above)

@@ -267,7 +267,7 @@ class KeysCard(Themed, QFrame):
         self.setProperty("role", "card")
         self.close_button = IconButton("cross", "Close the list of keys", "Close (Esc)", size=36, role="plain")
         self.close_button.clicked.connect(self.close)
-        across = hbox(spacing=28, margins=(0, 0, 8, 0))
+        self._columns = hbox(spacing=28, margins=(0, 0, 8, 0))
         for groups in COLUMNS:
             column = vbox(spacing=5)
             for group in groups:
@@ -276,8 +276,8 @@ class KeysCard(Themed, QFrame):
                     add_layout(column, self._row(one))
                 column.addSpacing(10)
             column.addStretch()
-            add_layout(across, column, 1)
-        self.area = scrolled(across)
+            add_layout(self._columns, column, 1)
+        self.area = scrolled(self._columns)
         self.area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.area.setAccessibleName("Keys")
         top = hbox(label("Keys", "card"), STRETCH, self.close_button)
@@ -292,7 +292,7 @@ class KeysCard(Themed, QFrame):
 
     def open(self) -> None:
         around = self._place.rect()
-        inner = self.area.widget().sizeHint().height() + self.sizeHint().height() - self.area.sizeHint().height()
+        inner = self._columns.totalSizeHint().height() + self.sizeHint().height() - self.area.sizeHint().height()
         self.resize(min(WIDEST, around.width()), min(KEYS_HIGHEST, inner + 4, around.height()))
         self.move(self._place.mapToGlobal(around.center()) - self.rect().center())
         self.show()

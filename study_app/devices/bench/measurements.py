@@ -224,7 +224,7 @@ def _new(samples: Any) -> tuple[Floats, Floats]:
 def _gaussians(step_s: float) -> tuple[Floats, Floats, Floats]:
     """Return a Gaussian and its first and second derivative, for convolution, exact for 1, t and t²."""
     reach = math.ceil(_REACH * SIGMA_S / step_s)
-    t_s = step_s * np.arange(-reach, reach + 1)
+    t_s: Floats = step_s * np.arange(-reach, reach + 1, dtype=float)
     bell = np.exp(-0.5 * (t_s / SIGMA_S) ** 2)
     bell /= bell.sum()
     first = -t_s * bell

@@ -183,7 +183,8 @@ class ReadingCard(Card):
         self.content = vbox(spacing=4, margins=0, parent=self._shown)
         self.stack = QStackedLayout()
         self.stack.addWidget(self._shown)
-        self.stack.addWidget(MaskedPanel(HIDDEN, why))
+        self._masked = MaskedPanel(HIDDEN, why)
+        self.stack.addWidget(self._masked)
         add_layout(self.column, self.stack, 1)
 
     def show_blind(self, blind: bool) -> bool:
@@ -322,7 +323,7 @@ class CostCard(ReadingCard):
         self.sum.setAlignment(Qt.AlignmentFlag.AlignRight)
         whole = hbox(self.sum_name, (self.sum, 1))
         add_parts(self.content, self._costs, Rule(), whole, self._absent, STRETCH)
-        self.stack.widget(1).setMinimumHeight(COST_HEIGHT)  # of the hidden page: the lines may need more
+        self._masked.setMinimumHeight(COST_HEIGHT)  # the lines may need more
 
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):
@@ -375,7 +376,7 @@ class ErrorCard(ReadingCard):
         self.lines: list[ErrorLine] = []
         self._lines = vbox(spacing=2)
         add_parts(self.content, self._lines, STRETCH)
-        self.stack.widget(0).setMinimumHeight(ERROR_HEIGHT)
+        self._shown.setMinimumHeight(ERROR_HEIGHT)
 
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):

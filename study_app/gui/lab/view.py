@@ -82,7 +82,8 @@ class LabPlace(Place):
         self._middle.setRowStretch(0, 61)
         self._middle.setRowStretch(1, PLOTS_STRETCH)
         self.area = scrolled(self._middle)
-        self._side_area = scrolled(QGridLayout())
+        self._column = QGridLayout()
+        self._side_area = scrolled(self._column)
         self._body = grid(GAP, GAP, margins=(SPACE[4] - 3, GAP, SPACE[4] - 3, GAP))
         self._body.addWidget(self.form, 0, 0)
         self._body.addWidget(self.area, 0, 1)
@@ -96,14 +97,12 @@ class LabPlace(Place):
             return
         self._wide = wide
         cards = (self.estimate, self.cost, self.error, self.limiters)
-        column = self._side_area.widget().layout()
-        assert isinstance(column, QGridLayout)  # noqa: S101  # made so above
-        column.setSpacing(GAP)
-        column.setContentsMargins(0, 0, 0, 0)
+        self._column.setSpacing(GAP)
+        self._column.setContentsMargins(0, 0, 0, 0)
         for number, card in enumerate(cards):
             if wide:
-                column.addWidget(card, number, 0)
-                column.setRowStretch(number, int(card is self.limiters))
+                self._column.addWidget(card, number, 0)
+                self._column.setRowStretch(number, int(card is self.limiters))
             else:
                 row, at = ((0, 0), (1, 0), (1, 1), (2, 0))[number]
                 self._side.addWidget(card, row, at, 1, 2 if card in {self.estimate, self.limiters} else 1)

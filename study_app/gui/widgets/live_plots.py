@@ -267,7 +267,7 @@ class LatenessPlot(Plot):
         """Draw ``counts`` (bins,) between ``edges_us`` (bins + 1,) and the 99th percentile [µs]."""
         edges = np.log10(edges_us)
         filled = counts > 0
-        up = max(4, int(np.ceil(np.log10(max(1, counts.max(initial=0))))))
+        up = max(4, int(np.ceil(np.log10(max(1, int(counts.max(initial=0)))))))
         self._show_decades(max(int(np.ceil(edges[-1] - 1e-9)), int(np.ceil(self._limit + 0.1))), up)
         heights = np.log10(np.maximum(counts[filled], 1)) + 0.3
         width = (edges[1] - edges[0]) * 0.72
@@ -277,7 +277,7 @@ class LatenessPlot(Plot):
         if p99_us is not None:
             at = float(np.log10(max(p99_us, 1.0)))
             near = counts[np.abs((edges[:-1] + edges[1:]) / 2 - at) < 0.12 * self._decades[0]]
-            top = min(up + P99_ABOVE, float(np.log10(max(1, near.max(initial=1)))) + 0.3)
+            top = min(up + P99_ABOVE, float(np.log10(max(1, int(near.max(initial=1))))) + 0.3)
             self.p99_line.setData([at, at], [-0.3, top])
             self.p99_name.setPos(at, top)
             self.p99_name.setText(f"p99 {number(round(p99_us))}")
