@@ -4,13 +4,19 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from study_app.protocol.load import load
+from study_app.protocol.model import Protocol
 from study_app.protocol.simulated import TrialFeatures
+from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import ConditionFeatures
+from study_app.store.journals.journal import SessionClock
+from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.sessions.open_session import SessionStore
 
 
 def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
@@ -23,6 +29,23 @@ def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], obje
         with suppress(OSError):  # another worker was first
             making.rename(folder)
     return folder
+
+
+def begun(
+    folder: Path,
+    participant: str = "P001",
+    study: Protocol | Path | str = "demo",
+    source: bytes = b"",
+    *,
+    clock: SessionClock | None = None,
+    **given: Any,
+) -> SessionStore:
+    """Begin a session in a study's folder; any value of its ``SessionStart`` can be given."""
+    values: dict[str, Any] = {"seed": 1, "operator": "", "language": "en", "device": {"name": "mouse"}, "screens": {}}
+    start = SessionStart(participant, **(values | {"simulated": False} | given))
+    if isinstance(study, Protocol):
+        return begin(folder, study, source, start, clock=clock)
+    return begin(folder, load(study), source_bytes(study), start, clock=clock)
 
 
 @contextmanager

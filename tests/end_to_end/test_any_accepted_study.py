@@ -22,13 +22,12 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.progress import progress_of
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.end_to_end.drawn_studies import drawn
-from tests.studies import made_up
+from tests.studies import begun, made_up
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
@@ -71,19 +70,12 @@ def cut_off_and_resumed(study: Protocol, source: bytes, results: Path, felt: Con
     rng = random.Random(seed)  # noqa: S311 - of a test
     session = 2 if study.sequences else 1
     language = rng.choice(study.study.languages)
-    start = SessionStart(
-        "P001" if session == 2 else "P003",
-        seed=seed,
-        operator="",
-        language=language,
-        device=DEVICE,
-        screens=REHEARSED_SCREENS,
-        simulated=True,
-        session=session,
-    )
+    who = {"seed": seed, "language": language, "device": DEVICE, "screens": REHEARSED_SCREENS, "simulated": True}
+    person = "P001" if session == 2 else "P003"
     whole = len(journal.read(StudyFolder(results).session("P001", 1).journal))
     passed = SimulatedTime()
-    with begin(results, study, source, start, clock=SessionClock(passed.ns)) as store, pytest.raises(CutOffError):
+    first = begun(results, person, study, source, clock=SessionClock(passed.ns), session=session, **who)
+    with first as store, pytest.raises(CutOffError):
         run(study, store, CutOff(store, rng.randrange(whole)), felt, passed)
     lines = journal.read(store.folder.journal)
     passed = SimulatedTime(progress_of(lines).t_s)

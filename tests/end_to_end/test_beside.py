@@ -19,11 +19,10 @@ from study_app.session.resume import REHEARSED_SCREENS
 from study_app.session.simulated.answers_only import DEVICE, Answering, SimulatedTime
 from study_app.session.transitions.table import open_session
 from study_app.store.journals.journal import SessionClock
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 from study_app.user_folder import data_folder
-from tests.studies import made_up, rehearsed
+from tests.studies import begun, made_up, rehearsed
 
 pytestmark = pytest.mark.slow
 
@@ -57,10 +56,8 @@ class Stepwise:
 def test_a_report_beside_a_running_session_is_of_the_sessions_that_ended_and_disturbs_none(tmp_path: Path) -> None:
     results = rehearsed(tmp_path / "results", people=2)
     study, passed, features = load("demo"), SimulatedTime(), made_up("demo")
-    start = SessionStart(
-        "P003", seed=3, operator="", language="en", device=DEVICE, screens=REHEARSED_SCREENS, simulated=True
-    )
-    with begin(results, study, source_bytes("demo"), start, clock=SessionClock(passed.ns)) as store:
+    who = {"seed": 3, "device": DEVICE, "screens": REHEARSED_SCREENS, "simulated": True}
+    with begun(results, "P003", clock=SessionClock(passed.ns), **who) as store:
         kept, schedule = Stepwise(store), build_schedule(study, "P003", 3)
         state = open_session(study, schedule, store.key.codes, "en", secret=store.key.nonce)
         answering = Answering(study, state, kept, passed, lambda block, condition: features[block, condition])

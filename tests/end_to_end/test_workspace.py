@@ -11,12 +11,11 @@ from study_app.app.session.entry import run
 from study_app.cli.options import keep_offered_workspace
 from study_app.errors import StoreError
 from study_app.gui.home.study_facts import sources, study_facts
-from study_app.protocol.load import load as load_protocol
 from study_app.protocol.source.files import source_bytes
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.workstation import keep_workspace, load, recent_protocols, remember_protocol
 from study_app.user_folder import settings_file
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
+from tests.studies import begun
 
 
 @pytest.fixture
@@ -86,14 +85,7 @@ def test_windows_show_the_same_sessions_and_suggest_the_same_id_from_two_start_f
 
 
 def begin_session(folder: Path, participant: str) -> None:
-    begin(
-        folder,
-        load_protocol("demo"),
-        source_bytes("demo"),
-        SessionStart(
-            participant, seed=1, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=False
-        ),
-    ).close()
+    begun(folder, participant, operator="AK").close()
 
 
 @pytest.mark.slow

@@ -19,8 +19,8 @@ from study_app.errors import StoreError
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.verification.verify_study import verify
+from tests import studies
 from tests.faults.support.racers import race
 from tests.journal_lines import raw
 from tests.platforms import needs_fork
@@ -109,10 +109,8 @@ def test_of_two_programs_exactly_one_gets_each_id_and_both_have_the_same_key(tmp
     @contextmanager
     def begun(program: int, number: int) -> Iterator[str]:
         participant = f"P00{program + 2 if number % 2 else 1}"
-        who = {"seed": 1, "operator": "AB", "language": "en", "device": {"name": "memory"}, "screens": {}}
-        start = SessionStart(participant, simulated=False, **who)  # type: ignore[arg-type]
         try:
-            store = begin(tmp_path / str(number // 2), small.protocol(), b"small", start)
+            store = studies.begun(tmp_path / str(number // 2), participant, small.protocol(), b"small")
         except StoreError as error:
             yield f"refused: {error}"
         else:

@@ -26,10 +26,10 @@ from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import open_session
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.folders import StudyFolder
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
+from tests.studies import begun
 
 EARLIER = Path(__file__).parents[1] / "store" / "releases" / "0.1"
 THICK = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]\n'
@@ -209,9 +209,4 @@ def test_an_interrupted_session_goes_on_with_the_sealed_liquid(
     assert replay(session).proved
     if becomes is not None:
         with pytest.raises(StoreError, match="other conditions"):
-            begin(
-                tmp_path / "results",
-                load(study),
-                source_bytes(study),
-                SessionStart("P002", seed=3, operator="", language="en", device={}, screens={}, simulated=True),
-            )
+            begun(tmp_path / "results", "P002", study, simulated=True)

@@ -7,24 +7,16 @@ import pytest
 from study_app import app
 from study_app.app.session import entry
 from study_app.errors import StoreError
-from study_app.protocol.load import load
 from study_app.protocol.source.files import source_bytes
 from study_app.session.start import NewSession, resumed
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
+from tests import studies
 
 
 @pytest.fixture
 def begun(tmp_path: Path) -> SessionStore:
     """Begin a session of the demo; return it open."""
-    return begin(
-        tmp_path / "results",
-        load("demo"),
-        source_bytes("demo"),
-        SessionStart(
-            "P001", seed=5, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=False
-        ),
-    )
+    return studies.begun(tmp_path / "results", seed=5, operator="AK")
 
 
 @pytest.fixture

@@ -15,8 +15,8 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal import SessionClock
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
+from tests import studies
 from tests.journal_lines import event_of
 from tests.protocol.edited_studies import text_of
 
@@ -77,14 +77,11 @@ def begun(
     values: dict[str, Any] = {
         "seed": 11,
         "operator": "AB",
-        "language": "en",
         "device": {"name": "scripted", "rate_hz": 1000},
         "screens": {"participant": {"width": 1920, "height": 1080, "refresh_hz": 60.0}},
-        "simulated": False,
     }
     study = protocol or Protocol.model_validate(study_tables())
-    start = SessionStart(participant, **(values | given))
-    return begin(results, study, source, start, clock=clock or ticking_clock())
+    return studies.begun(results, participant, study, source, clock=clock or ticking_clock(), **(values | given))
 
 
 @pytest.fixture

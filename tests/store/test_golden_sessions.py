@@ -10,18 +10,15 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.load import load
-from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude, include
 from study_app.store.progress import Progress
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.verification.verify_study import verify
 from tests import golden
 from tests.golden_values import changed, table_lines, value_lines
 from tests.journal_lines import event_of
-from tests.studies import made_up, once
+from tests.studies import begun, made_up, once
 
 GOLDEN = Path(__file__).parent / "golden"
 STUDIES = ("demo", "physical2", "rek2024", "thickness", "viscosityjnd", "forcedelay", "delaydetect")
@@ -95,11 +92,8 @@ EVENTS: tuple[tuple[str, dict[str, Any]], ...] = (
 
 def test_a_journal(tmp_path: Path, pytestconfig: pytest.Config) -> None:
     study = tmp_path / "demo"
-    start = SessionStart(
-        "P003", seed=5, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=True
-    )
     progress, told, before = Progress(), list[str](), list[str]()
-    with begin(study, load("demo"), source_bytes("demo"), start) as session:
+    with begun(study, "P003", seed=5, operator="AK", simulated=True) as session:
         for number, (event, fields) in enumerate(EVENTS):
             session.append(event_of(event, **fields), t_s=float(number))
             session.write_tables()

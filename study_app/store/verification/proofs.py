@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from study_app.errors import StoreError
 from study_app.store import workstation
-from study_app.store.atomic import read_if_there, write_file
+from study_app.store.atomic import read_if_there, read_regular, write_file
 from study_app.store.blinded.blinding import reveals
 from study_app.store.checksums import Proofs, checked_line, listed, parsed, proof_of
 from study_app.store.exclusions import exclusions, reversals
@@ -203,7 +203,7 @@ def _check_stamp(path: Path, lines: str, token: str) -> str:
         verifier = client.VerifierBuilder()
         if root is None:
             raise StoreError(f"{path} is stamped: name the server's root certificate, liquid-study proof --root FILE")
-        verifier = verifier.add_root_certificate(x509.load_pem_x509_certificate(Path(root).read_bytes()))
+        verifier = verifier.add_root_certificate(x509.load_pem_x509_certificate(read_regular(Path(root))))
         verifier.build().verify_message(answer, lines.encode())
     except (client.VerificationError, ValueError, OSError) as error:
         raise StoreError(f"{path} is not what was stamped, or by another server ({error}): it was changed") from error

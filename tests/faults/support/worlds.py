@@ -9,11 +9,10 @@ from study_app.session.runner import Runner
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, ResumeRequested, Submitted
 from study_app.session.transitions.state import Phase
 from study_app.store.journals.journal import SessionClock
-from study_app.store.sessions.begin import SessionStart, begin
-from study_app.store.sessions.open_session import SessionStore
 from tests.journal_lines import raw
 from tests.session import small
 from tests.session.fakes import World
+from tests.studies import begun
 
 LEFT, RIGHT = (-0.02, 0.0, 0.0), (0.02, 0.0, 0.0)
 
@@ -23,21 +22,8 @@ class StoredWorld(World):
 
     def __init__(self, folder: Path, participant: str = "P001") -> None:
         super().__init__()
-        self.store: SessionStore = begin(
-            folder,
-            small.protocol(),
-            b"small",
-            SessionStart(
-                participant,
-                seed=1,
-                operator="AK",
-                language="en",
-                device={"name": "memory"},
-                screens={},
-                simulated=False,
-            ),
-            clock=SessionClock(self.servo.now_ns),
-        )
+        who = {"operator": "AK", "device": {"name": "memory"}, "clock": SessionClock(self.servo.now_ns)}
+        self.store = begun(folder, participant, small.protocol(), b"small", **who)
         plan = small.opened().plan
         ports = Ports(self.servo, self.store, self._present, self.clock, paints=False)
         schedule = build_schedule(plan.protocol, participant, 1)

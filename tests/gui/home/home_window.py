@@ -6,20 +6,11 @@ from study_app.designer import version_rows
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.home.view import HomePlace
 from study_app.gui.widgets.main_view import Place
-from study_app.protocol.load import load
-from study_app.protocol.source.files import source_bytes
-from study_app.store.sessions.begin import SessionStart, begin
+from tests.studies import begun
 
 
 def hold(folder, participant, *, simulated=False, study="demo"):
-    with begin(
-        folder,
-        load(study),
-        source_bytes(study),
-        SessionStart(
-            participant, seed=1, operator="", language="en", device={"name": "mouse"}, screens={}, simulated=simulated
-        ),
-    ) as store:
+    with begun(folder, participant, study, simulated=simulated) as store:
         store.finish("completed")
 
 

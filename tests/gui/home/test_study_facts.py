@@ -35,9 +35,9 @@ from study_app.session.resume import REHEARSED_SCREENS
 from study_app.store.drafts import Draft, draft_files, keep
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal_events
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.study_settings import begin_settings
+from tests import studies
 from tests.golden import compare
 from tests.golden_values import value_lines
 from tests.journal_lines import event_of
@@ -46,14 +46,10 @@ from tests.protocol.groups.grouped import GROUPS, STUDY
 pytestmark = pytest.mark.slow
 
 
-def begun(results, participant, source="demo", *, device="mouse", screens=None, simulated=False, pilot=False):
+def begun(results, participant, source="demo", *, device="mouse", **given):
     """Begin a session of the demo, or of a copy of it."""
-    protocol = load(source)
-    how = SessionStart(
-        participant, seed=1, operator="AK", language="en", device={"name": device}, screens=screens or {},
-        simulated=simulated, pilot=pilot,
-    )  # fmt: skip
-    return protocol, begin(results / "demo", protocol, source_bytes(source), how)
+    where = results / "demo", participant, source
+    return load(source), studies.begun(*where, operator="AK", device={"name": device}, **given)
 
 
 def start(results, participant, status=None, **how):

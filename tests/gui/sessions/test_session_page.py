@@ -12,17 +12,16 @@ from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.sessions.session_page import SessionPage, read_record
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
-from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
-from study_app.store.sessions.begin import SessionStart, begin
 from tests.golden import compare
 from tests.golden_values import changed
 from tests.gui.transcript import told
 from tests.journal_lines import event_of
+from tests.studies import begun
 
 pytestmark = pytest.mark.slow
 
@@ -42,10 +41,7 @@ def study(whole, tmp_path):
 
 def held(study):
     """Begin a session of the demo."""
-    start = SessionStart(
-        "P007", seed=1, operator="AK", language="en", device={"name": "mouse"}, screens={}, simulated=False
-    )
-    return begin(study, load("demo"), source_bytes("demo"), start)
+    return begun(study, "P007", operator="AK")
 
 
 def trial(store, number, **measured):

@@ -29,8 +29,8 @@ from study_app.session.transitions.events import (
 )
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import SessionClock
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
+from tests import studies
 from tests.session import small
 from tests.store.forging import parquet_of
 
@@ -48,22 +48,9 @@ STRESSED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 def begun(folder: Path, device: ScriptedDevice, servo: Servo, study: Protocol | None = None) -> SessionStore:
-    return begin(
-        folder,
-        study or small.protocol(),
-        b"small",
-        SessionStart(
-            "P001",
-            seed=1,
-            operator="",
-            language="en",
-            device=Rig(device, servo).described,
-            screens={},
-            simulated=True,
-            recordings=True,
-        ),
-        clock=SessionClock(servo.now_ns),
-    )
+    who = {"device": Rig(device, servo).described, "simulated": True, "recordings": True}
+    clock = SessionClock(servo.now_ns)
+    return studies.begun(folder, "P001", study or small.protocol(), b"small", clock=clock, **who)
 
 
 def held(

@@ -19,12 +19,12 @@ from study_app.session.transitions.state import Phase
 from study_app.session.trial import SETTLED_S
 from study_app.store.blinded.blinding import opened
 from study_app.store.journals.journal import SessionClock
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.tables.session_tables import SessionRows
 from tests.compiled import needs_servo
 from tests.session import small
 from tests.session.fakes import FakeJournal
 from tests.session.runner.bench import Bench, small_bench
+from tests.studies import begun
 
 pytestmark = needs_servo
 
@@ -110,16 +110,8 @@ class Judged:
         device, clock = ScriptedDevice(), VirtualClock()
         with device, Servo(device, clock=clock, elements=100) as servo:
             session_clock = SessionClock(servo.now_ns)
-            store = begin(
-                folder,
-                study,
-                b"small",
-                SessionStart(
-                    "P001", seed=1, operator="", language="en", device=device.describe(), screens={}, simulated=True
-                ),
-                clock=session_clock,
-            )
-            with store:
+            who = {"device": device.describe(), "simulated": True}
+            with begun(folder, "P001", study, b"small", clock=session_clock, **who) as store:
                 ports = Ports(servo, store, lambda _page: None, session_clock.seconds)
                 runner = Runner(study, build_schedule(study, "P001", 1), store.key.codes, ports, "en")
                 runner.post(Begin(0.0))

@@ -22,11 +22,11 @@ from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.begin import SessionStart, begin
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
+from tests import studies
 from tests.faults.support.killer import die, forked
 from tests.faults.support.racers import race
 from tests.journal_lines import raw
@@ -38,17 +38,8 @@ GROUP_NAMES = ("first_thin", "first_thick")
 
 
 def begun(folder: Path, participant: str, session: int = 1) -> SessionStore:
-    start = SessionStart(
-        participant,
-        session=session,
-        seed=11,
-        operator="AB",
-        language="en",
-        device={"name": "scripted"},
-        screens={},
-        simulated=False,
-    )
-    return begin(folder, grouped(), SOURCE, start)
+    who = {"seed": 11, "operator": "AB", "device": {"name": "scripted"}, "session": session}
+    return studies.begun(folder, participant, grouped(), SOURCE, **who)
 
 
 def events(store: SessionStore) -> list[str]:
@@ -197,9 +188,8 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
 
 def test_a_session_that_the_group_does_not_have_is_refused_before_anything_is_claimed(tmp_path: Path) -> None:
     study = grouped(("format = 2\n", 'format = 2\nsequences = [["hello", "thin"], ["thick", "end"]]\n'), groups="")
-    start = SessionStart("P001", session=3, seed=1, operator="", language="en", device={}, screens={}, simulated=False)
     with pytest.raises(StudyError, match="permitted: 1 to 2"):
-        begin(tmp_path / "s", study, SOURCE, start)
+        studies.begun(tmp_path / "s", "P001", study, SOURCE, session=3)
     assert not (tmp_path / "s").exists()
 
 
