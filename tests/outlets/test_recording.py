@@ -95,12 +95,19 @@ def test_a_reset_clock_is_told(streamed: Any, tmp_path: Path) -> None:
     assert "drift +2 ppm" in done.output.split("drift +2 ppm", 1)[1]
 
 
-@pytest.mark.parametrize("content", [None, b"", b"XDF:\x01", b"no recording", "other"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        *(None, b"", b"XDF:\x01", b"no recording", ("liquid-study markers", "EEG"), ("liquid-study markers", "")),
+        *(("<channel_count>1<", "<channel_count>0<"), ("<nominal_srate>1000.0", "<nominal_srate>0"), ("label>", "x>")),
+    ],
+)
 def test_a_file_that_cannot_be_used_ends_in_one_line(streamed: Any, tmp_path: Path, content: Any) -> None:
-    study, ((xml, _), _) = streamed
+    study, streams = streamed
     file = tmp_path / "own.xdf"
-    if content == "other":
-        write_xdf(file, [(xml.replace("liquid-study markers", "EEG"), [(["1"], 1.0)], ())])
+    if isinstance(content, tuple):
+        xml, rows = next(one for one in reversed(streams) if content[0] in one[0])
+        write_xdf(file, [(xml.replace(*content), rows, ())])
     elif content is not None:
         file.write_bytes(content)
     done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])

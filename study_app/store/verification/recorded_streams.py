@@ -38,10 +38,10 @@ def check_recording(file: Path, folder: Path, found: Findings) -> list[str]:
     StoreError
         It cannot be read, or has no stream of this program.
     """
-    streams = _read(file)
-    ours = [it for it in streams if it["info"]["name"][0] in {MARKERS, SAMPLES}]
+    streams = [(str(next(iter(it["info"].get("name") or ()), "")), it) for it in _read(file)]
+    ours = [(name, it) for name, it in streams if name in {MARKERS, SAMPLES}]
     if not ours:
-        names = ", ".join(repr(it["info"]["name"][0]) for it in streams) or "none"
+        names = ", ".join(repr(name) for name, _ in streams) or "none"
         raise StoreError(f"{file} has no stream '{MARKERS}' or '{SAMPLES}'; its streams: {names}")
     merged = read_merged(folder)
     places = [folder] if merged is None else [it for it in map(merged.folder, merged.names) if it.is_dir()]
@@ -53,10 +53,15 @@ def check_recording(file: Path, folder: Path, found: Findings) -> list[str]:
             made = (marker_of(line.event, line.t_s, 0, line.fields()) for line in lines)
             expected[one] = [it.text for it in made if it is not None]
     said = []
-    for stream in ours:
-        is_markers = stream["info"]["name"][0] == MARKERS
-        said += [*(_markers(file, stream, expected, found) if is_markers else _samples(file, stream, found))]
-        said.append(f"clock of '{stream['info']['name'][0]}': {clock_drift(stream)}")
+    for name, stream in ours:
+        try:
+            of = _markers(file, stream, expected, found) if name == MARKERS else _samples(file, stream, found)
+            said += [*of, f"clock of '{name}': {clock_drift(stream)}"]
+        except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+            why = f"{type(error).__name__}: {error}"
+            raise StoreError(
+                f"{file} holds a stream '{name}' that is damaged ({why}): restore it from a copy"
+            ) from error
     return said
 
 
