@@ -1,7 +1,8 @@
 """Tables as SPSS files (.sav), which jamovi, JASP and R read too: labels, levels and codes of missing answers included.
 
-Answers are numbers with labels and an ordinal measure. An answer off the scale is 98 and one that was not given is 99,
-both declared as missing; of any other number what is missing is SPSS's own. SPSS has no missing text: it is empty.
+Answers are numbers with labels and an ordinal measure. An excluded answer is 97 in the wide table, one off the scale 98
+and one that was not given 99, all declared as missing; of any other number what is missing is SPSS's own. SPSS has no
+missing text: it is empty.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.tables import Cells, Delivered, QuestionCells
 from study_app.store.tables.csv_files import Column
 
+EXCLUDED: Final = 97
 CANNOT_JUDGE: Final = 98
 NOT_ANSWERED: Final = 99
 NAME_BYTES: Final = 64
@@ -46,17 +48,16 @@ def long_sav(study: Study, table: Delivered) -> bytes:
 
 def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | QuestionCells]) -> bytes:
     """Return the wide table as a .sav file."""
-    answers = study.responses[study.responses["counted"]]
-    off = answers[answers["cannot_judge"]].groupby(["block", "code", "item"])["participant"].agg(set).to_dict()
+    answers = study.responses
+    by_cell = dict(iter(answers.groupby(["block", "code", "item"])))
     frame = table.frame.copy()
     coded = {}
     for name, one in cells.items():
         if isinstance(one, QuestionCells):
             frame[name], coded[name] = _question(study, one, frame[name], frame["participant"])
             continue
-        values = frame[name].astype("Float64")
-        judged = frame["participant"].isin(off.get((one.block.id, one.setting.code, one.item.id), set()))
-        frame[name] = values.mask(values.isna() & judged, CANNOT_JUDGE).fillna(NOT_ANSWERED)
+        rows = by_cell.get((one.block.id, one.setting.code, one.item.id), answers.head(0))
+        frame[name] = _with_codes(frame[name], frame["participant"], rows)
         coded[name] = _levels(dict(zip(LEVELS, one.block.labels, strict=True)), one.block.cannot_judge or "")
     numbered = {name for name, found in coded.items() if found}
     columns = tuple(replace(one, kind="number") if one.name in numbered else one for one in table.columns)
@@ -70,22 +71,32 @@ def _question(
     asked = cells.asked
     if isinstance(asked, PlacedScore) or not asked.levels:
         return values, {}
+    rows = study.rows_of(asked)
+    if cells.setting is not None:
+        rows = rows[rows["code"] == cells.setting.code]
     if asked.question.value_type == "text":
         if asked.question.names_several:
             return values, {}
         numbers = {option: number for number, option in enumerate(asked.levels, start=1)}
-        coded = values.map(numbers).astype("Float64").fillna(NOT_ANSWERED)
+        coded = _with_codes(values.map(numbers), people, rows)
         return coded, _levels({numbers[option]: words for option, words in asked.levels.items()}, "")
-    answers = study.answers_to(asked)
-    if cells.setting is not None:
-        answers = answers[answers["code"] == cells.setting.code]
-    judged = people.isin(set(answers.loc[answers["cannot_judge"], "participant"]))
-    coded = values.astype("Float64").mask(values.isna() & judged, CANNOT_JUDGE).fillna(NOT_ANSWERED)
-    return coded, _levels({int(point): words for point, words in asked.levels.items()}, asked.cannot_judge or "")
+    levels = {int(point): words for point, words in asked.levels.items()}
+    return _with_codes(values, people, rows), _levels(levels, asked.cannot_judge or "")
+
+
+def _with_codes(values: pd.Series[Any], people: pd.Series[Any], rows: pd.DataFrame) -> pd.Series[Any]:
+    """Return a cell for each participant, with the code of why there is no answer; ``rows`` are all that were given."""
+    counted = rows[rows["counted"]]
+    judged = set(counted.loc[counted["cannot_judge"].fillna(False), "participant"])
+    excluded = set(rows.loc[rows["excluded"], "participant"]) - set(counted["participant"])
+    coded = values.astype("Float64")
+    coded = coded.mask(coded.isna() & people.isin(judged), CANNOT_JUDGE)
+    return coded.mask(coded.isna() & people.isin(excluded), EXCLUDED).fillna(NOT_ANSWERED)
 
 
 def _levels(levels: Mapping[int, str], cannot_judge: str) -> dict[int, str]:
-    return {**levels, CANNOT_JUDGE: cannot_judge or "Cannot judge", NOT_ANSWERED: "No answer"}
+    off = {EXCLUDED: "Excluded", CANNOT_JUDGE: cannot_judge or "Cannot judge", NOT_ANSWERED: "No answer"}
+    return {**levels, **off}
 
 
 def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]]) -> bytes:
@@ -108,7 +119,7 @@ def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]]) -> 
                 name: {value: _cut(label, LABEL_BYTES // 2) for value, label in found.items()}
                 for name, found in (levels | flags).items()
             },
-            missing_ranges={name: [CANNOT_JUDGE, NOT_ANSWERED] for name in levels},
+            missing_ranges={name: [EXCLUDED, CANNOT_JUDGE, NOT_ANSWERED] for name in levels},
             variable_measure={name: _measure(column, name in levels) for name, column in columns.items()},
             variable_format={
                 name: form for name, column in columns.items() if (form := _format(column, table.frame[column.name]))

@@ -14,6 +14,7 @@ from study_app.analysis.export.psychds_dataset import FOLDER
 from study_app.analysis.export.spss import names_of
 from study_app.analysis.export.table_files import Extra
 from study_app.errors import AnalysisError, MissingExtra, naming_the_extra
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.unblinding import unblind
@@ -97,6 +98,22 @@ def test_a_text_that_sav_cannot_hold_is_cut_at_a_letter(small: Results, to: Path
     found, _ = sav(table(to, "small", "responses", "sav"))
     (reason,) = set(found["exclusion_reason"])
     assert reason == "é" * 16_382 + "…"
+
+
+def test_the_wide_table_for_spss_tells_why_an_answer_is_missing(small: Results, to: Path) -> None:
+    half_answered(small)
+    for trial in build_schedule(small.protocol, "C", seed=1).trials:
+        if small.key.condition(trial.block, trial.code) == "heavyzembla":
+            small.exclude("C", trial=trial.number)
+    small.open()
+    export(small.folder, to, extras=["sav", "wide"])
+    found, about = sav(table(to, "small", "wide", "sav"), missing=True)
+    cells = found.set_index("participant")[["smooth__heavyzembla", "warm__heavyzembla", "smooth__lightquorn"]]
+    assert cells.to_numpy().tolist() == [[7, 99, 7], [98, 4, 98], [97, 97, 6]]
+    words = about.variable_value_labels["smooth__heavyzembla"]
+    assert (words[97], words[99]) == ("Excluded", "No answer")
+    hidden, _ = sav(table(to, "small", "wide", "sav"))
+    assert hidden["smooth__heavyzembla"].isna().tolist() == [False, True, True]
 
 
 def test_names_are_ones_that_spss_takes_and_stay_apart() -> None:
