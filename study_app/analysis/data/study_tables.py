@@ -55,7 +55,7 @@ from study_app.protocol.model import Contrast
 from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.unblinding import all_opened
+from study_app.store.blinded.unblinding import all_opened, decided_late
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.sessions.folder_lock import never_begun
@@ -152,7 +152,8 @@ class Study:
     ``responses`` and ``trials`` have the columns of ``store.tables.columns``, with ``session_status``, ``excluded``,
     ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three. ``blocks``
     are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
-    the key is sealed; ``exclusions`` is what was decided to leave out; ``doubts`` are files that are not as they were
+    the key is sealed; ``exclusions`` is what was decided to leave out, ``late`` those of them that a person decided
+    after the key was opened; ``doubts`` are files that are not as they were
     recorded, and are used as they are. ``decided`` is what the protocol decided about the analysis, ``protocol`` the
     first session's, as its receipt holds it. ``levels`` are the blocks with a design, ``intervals`` the
     intervals of their trials; ``others`` are the questions that no block of statements holds;
@@ -173,6 +174,7 @@ class Study:
     trials: pd.DataFrame
     participants: pd.DataFrame
     exclusions: tuple[Exclusion, ...]
+    late: tuple[Exclusion, ...] = ()
     doubts: tuple[Discrepancy, ...] = ()
     decided: Decided = NOTHING_DECIDED
     others: OtherQuestions = NO_QUESTIONS
@@ -217,6 +219,11 @@ class Study:
         return tuple(sorted(set(map(str, counted)))) or (self.version,)
 
     @property
+    def contents(self) -> int:
+        """How many different study files these sessions were run with."""
+        return int(self.participants.loc[self.participants["counted"], "protocol_hash"].nunique())
+
+    @property
     def programs(self) -> tuple[str, ...]:
         """The versions of the program that ran the sessions that count."""
         counted = self.participants.loc[self.participants["counted"], "version"]
@@ -259,8 +266,13 @@ class Study:
 
     def answers_to(self, asked: PlacedQuestion) -> pd.DataFrame:
         """Return the rows of ``answered`` that count, of a question that no block of statements holds."""
+        rows = self.rows_of(asked)
+        return rows[rows["counted"]]
+
+    def rows_of(self, asked: PlacedQuestion) -> pd.DataFrame:
+        """Return all rows of ``answered`` of a question that no block of statements holds."""
         place = self.answered["form" if asked.where.is_form else "block"] == asked.where.id
-        rows = self.answered[self.answered["counted"] & place.fillna(False) & (self.answered["item"] == asked.id)]
+        rows = self.answered[place.fillna(False) & (self.answered["item"] == asked.id)]
         by_block = asked.where.is_form and asked.where.settings
         return rows.assign(code=rows["after_block"].fillna(START)) if by_block else rows
 
@@ -339,6 +351,10 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
         tables = [_of_site(site, one.settings, getattr(one, name)) for site, one in sites.items()]
         return pd.concat(tables, ignore_index=True)
 
+    def rows(name: str) -> tuple[Exclusion, ...]:
+        named = ((f"{site}{DASH}", row) for site, one in sites.items() for row in getattr(one, name))
+        return tuple(replace(row, participant=f"{prefix}{row.participant}") for prefix, row in named)
+
     return replace(
         studies[0],
         folder=folder,
@@ -357,11 +373,8 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
         participants=table("participants"),
         answered=table("answered"),
         intervals=table("intervals"),
-        exclusions=tuple(
-            replace(row, participant=f"{site}{DASH}{row.participant}")
-            for site, one in sites.items()
-            for row in one.exclusions
-        ),
+        exclusions=rows("exclusions"),
+        late=rows("late"),
         doubts=tuple(doubt for one in studies for doubt in one.doubts),
         decided=replace(studies[0].decided, changed=any(one.decided.changed for one in studies)),
         own_dynamics=pooled_dynamics(
@@ -411,6 +424,7 @@ def _load(folder: Path, *, sealed: bool = False) -> Study:
         trials=_with_counted(with_excluded(trials, listed), last),
         participants=participants.assign(counted=(participants["status"] == COMPLETED) & ~participants["excluded"]),
         exclusions=listed,
+        late=decided_late(place.path, listed),
         doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
         others=records[0].others,
         decided=read_decided([session.protocol.get("analysis") for session in records]),

@@ -48,6 +48,7 @@ from study_app.analysis.results import (
 from study_app.analysis.statistics.outcome import FEW
 from study_app.discovery import by_name
 from study_app.protocol.orders.balance import Evenness
+from study_app.store.blinded.unblinding import RULE
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import named
 
@@ -119,6 +120,16 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "Not all sessions were run under the same decisions about the analysis: everything found is exploratory; "
             "the first session's decisions are used."
         )
+    if study.contents > len(study.versions):
+        yield (
+            f"The study file was changed between sessions without a new version: {study.contents} different files were "
+            "run. Compare the protocols in the receipts; report.json lists each session's protocol_hash."
+        )
+    if study.late:
+        yield (
+            f"Decided after the key was opened, when the effect on the results could be seen: {_late(study)}. Compare "
+            "with the report without them."
+        )
     if study.n == 1:
         yield "One participant: all results concern this person alone, and do not generalise to others."
     if study.n < FEW and results.blocks:
@@ -183,18 +194,41 @@ def _sample(study: Study) -> str:
     under = ""
     if study.blocks and study.n:
         whole = all(set(people_a_setting(study, block).values()) == {study.n} for block in study.blocks)
-        some = ", some of them under fewer than all settings, single trials being left out"
-        under = ", each under all settings" if whole else some
+        under = ", each under all settings" if whole else _fewer_settings(study)
+    late = ""
+    if study.revealed and any(one.rule_or_person != RULE for one in study.exclusions):
+        late = " Exclusions were decided while the key was sealed."
+        if study.late:
+            late = f" Decided after the key was opened: {_late(study)}."
     return (
         f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, "
-        f"{version_words(study)}){under}{gone}."
+        f"{version_words(study)}){under}{gone}.{late}"
     )
+
+
+def _fewer_settings(study: Study) -> str:
+    """Return that participants were not under all settings: how many, if exclusions of single trials are the cause."""
+    fewer: set[str] = set()
+    for block in study.blocks:
+        trials = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+        left = set(zip(trials["participant"], trials["code"], strict=True))
+        gone = study.excluded_trials(block)
+        fewer |= {who for who, code in zip(gone["participant"], gone["code"], strict=True) if (who, code) not in left}
+    if not fewer:
+        return ", not all of them under all settings"
+    return f"; of {counted(len(fewer), 'participant')}, exclusions of single trials leave fewer than all settings"
+
+
+def _late(study: Study) -> str:
+    """Return how many exclusions were decided after the key was opened."""
+    return f"{counted(len(study.late), 'exclusion')} of {len(study.exclusions)}"
 
 
 def version_words(study: Study) -> str:
     """Return the versions of the protocol whose sessions are pooled."""
     versions = study.versions
-    return f"version {versions[0]}" if len(versions) == 1 else f"versions {listed(versions)}, pooled"
+    pooled = f"version {versions[0]}" if len(versions) == 1 else f"versions {listed(versions)}, pooled"
+    return f"{pooled}, in {study.contents} different files" if study.contents > len(versions) else pooled
 
 
 def _presented(study: Study, results: Results) -> str:
@@ -465,7 +499,11 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         answers = [f"{means} in {counted(count, 'session')}" for means, count in masked.most_common()]
         yield paragraph(f"Motors masked: {listed(answers)}.")
     yield heading(3, "Exclusions")
-    gone = [f"{named(one)}: {one.reason} ({one.rule_or_person}, {one.excluded_at})" for one in study.exclusions]
+    gone = [
+        f"{named(one)}: {one.reason} ({one.rule_or_person}, {one.excluded_at}"
+        f"{', after the key was opened' if one in study.late else ''})"
+        for one in study.exclusions
+    ]
     if study.left_out:
         gone.append(f"{counted(study.left_out, 'session')} not completed: left out of every number")
     yield bullets(_first(gone)) if gone else paragraph("Nothing is excluded: every completed session counts whole.")

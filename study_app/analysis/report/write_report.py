@@ -158,7 +158,7 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
             "key_opened": list(reveals_of(study.folder)),
         },
         "sessions": lambda: sessions(study),
-        "exclusions": lambda: [asdict(one) for one in study.exclusions],
+        "exclusions": lambda: [{**asdict(one), "after_unblinding": one in study.late} for one in study.exclusions],
         "doubts": lambda: [{"file": _path_in_study(study, doubt.path), "what": doubt.what} for doubt in study.doubts],
         "files": lambda: files(study),
         **{what: partial(plain, text) for what, text in texts.items()},

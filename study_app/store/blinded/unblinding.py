@@ -7,8 +7,9 @@ again completes it. In a merged study the key of each site is opened, every one 
 
 import contextlib
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Final
 
@@ -105,6 +106,19 @@ def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
         excluded = tuple(replace(row, participant=f"{prefix}{row.participant}") for row in of_site.excluded)
         found[prefix] = replace(of_site, excluded=excluded)
     return found
+
+
+def decided_late(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ...]:
+    """Return the exclusions of a study that a person decided after its key was opened; none of a merged study."""
+    opened_at = min(filter(None, (_moment(one["at"]) for one in reveals(folder))), default=None)
+    times = ((row, _moment(row.excluded_at)) for row in rows if row.rule_or_person != RULE)
+    return tuple(row for row, at in times if opened_at is not None and at is not None and at > opened_at)
+
+
+def _moment(text: str) -> datetime | None:
+    with contextlib.suppress(ValueError):  # `verify` names it
+        return datetime.fromisoformat(text).astimezone()
+    return None
 
 
 def reveals_of(folder: Path) -> tuple[dict[str, str], ...]:

@@ -32,6 +32,7 @@ from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place
 from study_app.store.sites.merge import unlisted
 from study_app.store.sites.merged import Merged, Site, read_merged
+from study_app.store.study_runs import run_of
 from study_app.store.tables import csv_files
 from study_app.store.tables.columns import EXCLUSIONS
 from study_app.store.tables.study_files import (
@@ -103,6 +104,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, found: Findings
     withdrawn = _withdrawn(study, found)
     sessions = [check_session(Place(study, one, name), key, found) for one in study.sessions()]
     _plug_ins(study, found)
+    _contents(study, found)
     _participants(study, name, sessions, found)
     if early_journals := sum(one.row is not None and not one.chained for one in sessions):
         many = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
@@ -131,6 +133,20 @@ def _plug_ins(study: StudyFolder, found: Findings) -> None:
         ]:
             what = f"sessions used {', '.join(missing)} of {package}, which is not installed"
             found.warning(study.data, f"{what}: what only the plug-in can tell was not checked")
+
+
+def _contents(study: StudyFolder, found: Findings) -> None:
+    """Name versions under which different files were run."""
+    runs = filter(None, (run_of(one.receipt) for one in study.sessions()))
+    hashes: dict[str, set[str]] = {}
+    for run in runs:
+        hashes.setdefault(run.version, set()).add(run.hash)
+    for version, contents in hashes.items():
+        if len(contents) > 1:
+            what = (
+                f"sessions of version {version} ran {len(contents)} different study files (protocol_hash in receipts)"
+            )
+            found.warning(study.data, f"{what}: change study.version with each change of the file")
 
 
 def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], found: Findings) -> None:

@@ -1,5 +1,6 @@
 """The report of few participants, missing answers and odd input: honest, or one clear error."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -11,10 +12,13 @@ from study_app.analysis.report.sections import methods
 from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.simulated import NO_FEATURES
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store import receipt
 from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import exclude
 from tests.analysis.conftest import Results, make_results, twelve
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
@@ -32,6 +36,28 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     both = "p adjusted over 1 statement by Holm (primary) and over {} statements by Benjamini-Hochberg (exploratory)"
     assert both.format("eight") in told
     assert both.format("four") in told
+
+
+def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_stated(
+    small: Results, tmp_path: Path
+) -> None:
+    for number, who in enumerate("ABC"):
+        place = small.add(who, lambda *_: 4).receipt
+        receipt.write(place, {**receipt.read(place), "protocol_hash": f"{number // 2}" * 64})
+    gone = [trial.number for trial in build_schedule(small.protocol, "A", seed=1).trials if trial.code == "L1"]
+    for trial in gone:
+        small.exclude("A", trial=trial)
+    small.open()
+    exclude(small.folder, "B", 1, by="AB", reason="the phone rang")
+    report(small.folder, tmp_path / "report")
+    told = " ".join((tmp_path / "report" / "methods.txt").read_text("utf-8").split())
+    assert (
+        "in 2 different files); of 1 participant, exclusions of single trials leave fewer than all settings; 1 further"
+        in told
+    )
+    assert f"Decided after the key was opened: 1 exclusion of {len(gone) + 1}." in told
+    rows = json.loads((tmp_path / "report" / "report.json").read_text("utf-8"))["exclusions"]
+    assert [row["participant"] for row in rows if row["after_unblinding"]] == ["B"]
 
 
 def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(

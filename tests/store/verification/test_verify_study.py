@@ -69,6 +69,13 @@ def test_a_receipt_without_a_protocol_makes_no_word_of_the_study_a_telltale(stud
         assert "reveals a condition" not in warned(verify(study))
 
 
+def test_two_files_under_one_version_are_named(study: Path) -> None:
+    assert "different study files" not in warned(verify(study))
+    path = study / P007 / "receipt.json"
+    receipt.write(path, {**receipt.read(path), "protocol_hash": "ab" * 32})
+    assert "version 1.0 ran 2 different study files" in warned(verify(study))
+
+
 def test_nothing_of_the_key_is_shown(study: Path) -> None:
     """Whatever is broken, no sentence tells a condition."""
     content = json.loads(base64.b64decode((study / "blinding" / "key.sealed").read_bytes()))
