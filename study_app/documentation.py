@@ -23,10 +23,13 @@ _GENERATED: Final = re.compile(r"<!-- generated: ([\w.]+):(\w+) -->")
 _LISTED: Final = re.compile(r"^- \[[^]]+\]\(([\w/-]+)\.md\)", re.MULTILINE)
 _TITLE: Final = re.compile(r"^# (.+)$", re.MULTILINE)
 
-SYNONYMS: Final = ("glossary", "Words of other programs")
-"""The page and heading of a list: words that no page has to contain, and links to the sections about them."""
+GLOSSARY: Final = "glossary"
+"""The page that shows the words of `SYNONYMS`; a search leaves them out."""
 
-_ROW: Final = re.compile(r"^- ([^:]+):\s+\[[^]]*\]\(([\w/-]+)\.md(?:#([\w-]+))?\)", re.MULTILINE)
+SYNONYMS: Final = "search-words.txt"
+"""The file of words that no page has to contain: in each line a page, perhaps its anchor, and the words about it."""
+
+_ROW: Final = re.compile(r"^([\w/-]+)(?:#([\w-]+))?: (.+)$", re.MULTILINE)
 _MARKS: Final = re.compile(r"[`*\\]|\[([^]]*)\]\([^)]*\)")
 _FENCED_OR_HEADING: Final = re.compile(r"^```.*?^```|^#+ ([^\n]+)$", re.MULTILINE | re.DOTALL)
 _WORD: Final = re.compile(r"\w[\w-]*")
@@ -91,13 +94,15 @@ def sections() -> dict[str, tuple[str, ...]]:
 class Section(NamedTuple):
     """A heading of a page with the text below it.
 
-    `names` are the title, the heading and its synonyms; `phrases` the synonyms, and the title at its own heading.
+    `names` are the title, the heading and its synonyms; `phrases` the synonyms, and the title at its own heading;
+    `text` is its `source` without marks, in small letters.
     """
 
     page: str
     heading: str
     names: str
     phrases: tuple[str, ...]
+    source: str
     text: str
 
 
@@ -145,18 +150,30 @@ def plain(text: str) -> str:
 
 @cache
 def synonyms() -> tuple[tuple[str, str, str], ...]:
-    """Return page, anchor and words of each entry of the glossary's last list."""
-    page_of_list, heading = SYNONYMS
-    _, _, rows = source(page_of_list).partition(f"## {heading}\n")
-    return tuple((page, anchor, " ".join(said.split())) for said, page, anchor in _ROW.findall(rows))
+    """Return page, anchor and words of each line of `SYNONYMS`."""
+    return tuple(_ROW.findall((folder() / SYNONYMS).read_text(encoding="utf-8")))
+
+
+def index_markdown() -> str:
+    """Return the words of `SYNONYMS` with links to their sections, as Markdown."""
+    rows = sorted(synonyms(), key=lambda row: row[2].casefold())
+    return "\n".join(f"- {said}: [{_heading(*place)}]({'.md#'.join(place).rstrip('#')})" for *place, said in rows)
+
+
+def _heading(name: str, anchor: str) -> str:
+    for read in (source, page):
+        for found in _FENCED_OR_HEADING.finditer(read(name)):
+            if found[1] and (not anchor or anchor_of(plain(found[1])) == anchor):
+                return plain(found[1])
+    raise KeyError(f"{name}#{anchor}")
 
 
 @cache
 def _sections() -> tuple[Section, ...]:
-    """Return every section of every page, in the order of the book, with the synonyms of the glossary."""
+    """Return every section of every page, in the order of the book, with its synonyms."""
     made: list[Section] = []
     for name in (*(page for pages in sections().values() for page in pages), *sections(), INDEX):
-        text, title_of_page = page(name), plain(title(name))
+        text, title_of_page = source(name) if name == GLOSSARY else page(name), plain(title(name))
         headings = [found for found in _FENCED_OR_HEADING.finditer(text) if found[1]]
         for found, ends in zip(headings, [*(one.start() for one in headings[1:]), len(text)], strict=True):
             heading = plain(found[1])
@@ -164,5 +181,6 @@ def _sections() -> tuple[Section, ...]:
             also = [said for page_, anchor_, said in synonyms() if (page_, anchor_) == (name, anchor)]
             shown = " ".join([title_of_page, heading, *also]).casefold()
             phrases = tuple(", ".join(also if anchor else [*also, title_of_page]).casefold().split(", "))
-            made.append(Section(name, heading, shown, phrases, plain(text[found.end() : ends]).casefold()))
+            below = text[found.end() : ends]
+            made.append(Section(name, heading, shown, phrases, below, plain(below).casefold()))
     return tuple(made)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import click
 from click.core import ParameterSource
@@ -301,12 +301,26 @@ def _studies(results: Path) -> Iterator[Path]:
         yield from study_folders(results)
 
 
+SECTIONS_SHOWN: Final = 5
+
+
 @click.command()
-@click.argument("page", metavar="[PAGE]", required=False)
-def docs(page: str | None) -> None:
-    """Print a page of the documentation with its lists, such as data-dictionary, or the names of all pages."""
+@click.argument("words", metavar="[PAGE | WORDS]", nargs=-1)
+def docs(words: tuple[str, ...]) -> None:
+    """Print a page of the documentation with its lists, such as data-dictionary; or the best section for some words.
+
+    Without an argument it prints the names of all pages.
+    """
     from study_app import documentation
 
-    if page is not None and page not in documentation.names():
-        raise click.UsageError(f"{page} is not a page of the documentation: liquid-study docs lists them")
-    click.echo(documentation.page(page) if page else "\n".join(documentation.names()))
+    typed = " ".join(words)
+    if not typed or typed in documentation.names():
+        click.echo(documentation.page(typed) if typed else "\n".join(documentation.names()))
+        return
+    found = documentation.search(typed)[:SECTIONS_SHOWN]
+    if not found:
+        raise click.UsageError(f"no page has a word of {typed!r}: liquid-study docs lists the pages")
+    best, *others = found
+    click.echo(f"{best.page}: {best.heading}\n\n{best.source.strip()}\n")
+    for one in others:
+        click.echo(f"see also  {one.page}: {one.heading}")
