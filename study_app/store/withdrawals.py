@@ -275,10 +275,11 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
     person = study.data / f"sub-{participant}"
     for session in sessions:
         refuse_if_open(session.path)
+    rows, ignores = exclusions(study.path), read_if_there(study.ignore)  # before anything is written
     if sessions and participant not in tombstones(study):
         add_tombstone(study, replace(tombstone, sessions=tuple(map(describe_session, sessions))))
     ignored = study.withdrawals.name.encode()  # by a Psych-DS validator, also in folders of earlier versions
-    if is_there(study.ignore) and ignored not in read_regular(study.ignore).splitlines():
+    if ignores is not None and ignored not in ignores.splitlines():
         append_line(study.ignore, ignored + b"\n")
     try:
         if is_there(person):
@@ -286,7 +287,6 @@ def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
             sync_folder(study.data)
     except OSError as error:
         raise cannot_write(person, error) from error
-    rows = exclusions(study.path)
     kept = tuple(row for row in rows if row.participant != participant)
     if kept != rows:
         write_file(study.exclusions, exclusion_bytes(kept))

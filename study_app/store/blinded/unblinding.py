@@ -16,7 +16,7 @@ from typing import Final
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.store import receipt
-from study_app.store.atomic import is_there, read_own, study_root, sweep, sweep_old, write_file
+from study_app.store.atomic import is_there, read_if_there, read_own, study_root, sweep, sweep_old, write_file
 from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol
 from study_app.store.checksums import replace_checksums
 from study_app.store.exclusions import Exclusion, exclude, exclusions, reversals
@@ -206,7 +206,7 @@ def _rewrite(place: Place, lines: list[Event], key: Key) -> list[str]:
     ours: dict[str, tuple[str, str]] = {}
     before, after = (dict(table_files(place, lines, one)) for one in (None, key))
     for path, columns in zip(after, table_columns(lines, opened=True).values(), strict=True):
-        held = path.read_bytes() if is_there(path) else b""
+        held = read_if_there(path) or b""
         written = [replace(column, later=False) if column.sealed else column for column in columns]
         sealed, content = (in_columns_of(held, whole[path], written)[0] for whole in (before, after))
         if held not in (sealed, content):

@@ -27,7 +27,16 @@ from typing import Any, BinaryIO
 
 import study_app
 from study_app.errors import StoreError
-from study_app.store.atomic import cannot_write, parse_json, read_own, study_root, sync_folder, write_file, write_whole
+from study_app.store.atomic import (
+    cannot_write,
+    parse_json,
+    read_own,
+    read_regular,
+    study_root,
+    sync_folder,
+    write_file,
+    write_whole,
+)
 from study_app.store.journals.journal_events import EVENTS, Event, problem, read_event, shortened
 
 FORMAT = 2
@@ -88,7 +97,7 @@ class Contents:
 def count_events(path: Path, *kinds: str) -> tuple[int, ...]:
     """Return the number of lines of each kind of event in a journal, without parsing it; 0 if it cannot be read."""
     try:
-        content = path.read_bytes()
+        content = read_regular(path)
     except OSError:
         return (0,) * len(kinds)
     return tuple(content.count(b'"event":"%s",' % kind.encode()) for kind in kinds)

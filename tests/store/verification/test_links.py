@@ -1,6 +1,9 @@
 """Files of a results folder that lead elsewhere, and names in them that are paths."""
 
 import json
+import os
+import re
+import signal
 from pathlib import Path
 
 import pytest
@@ -10,12 +13,14 @@ from study_app.cli import commands
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.store import receipt
 from study_app.store.blinded import blinding
+from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.output_files import write_files
 from study_app.store.sessions.open_session import Place, SessionStore
 from study_app.store.verification.verify_session import doubts
 from study_app.store.verification.verify_study import verify
+from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import forked
 from tests.platforms import needs_fork
 from tests.store.conftest import Start
@@ -93,3 +98,24 @@ def test_an_endless_device_is_never_read(tmp_path: Path, finished: SessionStore,
 
     assert forked(look) == 0
     assert path.name in said.read_text()
+
+
+@needs_fork
+@pytest.mark.parametrize("name", [".psychds-ignore", "data/sub-P007/ses-01/{}trials_data.csv"])
+def test_a_pipe_is_never_waited_for(tmp_path: Path, finished: SessionStore, name: str) -> None:
+    study = tmp_path / "study"
+    path = study / name.format("subject-P007_session-01_task-brackish_description-")
+    path.unlink()
+    os.mkfifo(path)
+
+    def act() -> None:
+        signal.alarm(20)
+        try:
+            told = unblind(study, "AB", "to analyse").left
+            withdraw(study, "P007", by="AB", reason="asked")
+        except StoreError as error:
+            told = (str(error),)
+        assert path.name in "\n".join(told)
+
+    assert forked(act) == 0
+    assert not (study / "withdrawals.jsonl").exists()
