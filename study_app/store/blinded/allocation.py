@@ -123,7 +123,7 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
 
 def claims(study: StudyFolder) -> list[Claim]:
     """Return the contents of all entries' files, in order."""
-    paths = [path for path in study.allocated.glob("*.json") if path.stem.isdigit()]
+    paths = [path for path in study.allocated.glob("*.json") if path.stem.isdecimal()]
     return [_claim(study, path) for path in sorted(paths, key=lambda path: int(path.stem))]
 
 

@@ -160,7 +160,7 @@ def check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[
     holders: dict[str, int] = {}
     for claim in claims(study):
         if not claim.participant:
-            if claim.path.stat().st_size:
+            if claim.path.lstat().st_size:
                 found.error(claim.path, "was changed: restore it from a copy")
             else:
                 found.warning(claim.path, "was claimed by a program that ended before it wrote it; it stays unused")
