@@ -82,12 +82,13 @@ def replace_checksums(session: SessionFolder, changes: Mapping[str, tuple[str, s
 def note_rebuilt(session: SessionFolder, what: str) -> None:
     """Note permanently which proofs of a session `rebuild` made again: they prove nothing about earlier changes."""
     at = datetime.now().astimezone().isoformat(timespec="seconds")
-    append_line(session.rebuilt, f"{at} liquid-study {study_app.__version__} rebuild: {what}\n".encode())
+    line = f"{at} liquid-study {study_app.__version__} rebuild: {what}\n"
+    append_line(session.rebuilt, line.encode("utf-8", "replace"))
 
 
 def checksum_bytes(sums: Mapping[str, str]) -> bytes:
     """Return the list: SHA-256 and path in the folder, by path."""
-    return "".join(f"{sums[name]}  {name}\n" for name in sorted(sums)).encode()
+    return "".join(f"{sums[name]}  {name}\n" for name in sorted(sums)).encode("utf-8", "surrogateescape")
 
 
 def hashed(session: SessionFolder, name: str) -> str:
@@ -97,10 +98,7 @@ def hashed(session: SessionFolder, name: str) -> str:
 
 def read_checksums(session: SessionFolder) -> dict[str, str]:
     """Return path in the folder → SHA-256."""
-    try:
-        text = read_own(session.checksums, study_root(session.checksums)).decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise StoreError(f"{session.checksums} is not a list of checksums: restore it from a copy") from error
+    text = read_own(session.checksums, study_root(session.checksums)).decode("utf-8", "surrogateescape")
     found: dict[str, str] = {}
     for line in text.splitlines():
         match = _LINE.fullmatch(line)
@@ -153,12 +151,12 @@ def fingerprint(sums: Mapping[str, str], lines: Iterable[Event]) -> str:
         for name in (line.recording, line.recording_frames)
     }
     proved = {name: sums[name] for name in sums if not name.endswith("_data.csv") and name not in {REBUILT, *sealed}}
-    return proof_of(checksum_bytes(proved).decode())
+    return proof_of(checksum_bytes(proved))
 
 
-def proof_of(text: str) -> str:
-    """Return the fingerprint of a text: 60 bits of its SHA-256 in base32."""
-    letters = _letters(text)
+def proof_of(content: bytes) -> str:
+    """Return the fingerprint of a text's bytes: 60 bits of their SHA-256 in base32."""
+    letters = _letters(content)
     return "-".join(letters[at : at + 4] for at in (0, 4, 8))
 
 
@@ -168,11 +166,11 @@ def checked_line(proof: str, place: str) -> str:
 
 
 def _check(proof: str, place: str) -> str:
-    return _letters(f"{proof}  {place}".lower())[:2]
+    return _letters(f"{proof}  {place}".lower().encode())[:2]
 
 
-def _letters(text: str) -> str:
-    return base64.b32encode(hashlib.sha256(text.encode()).digest()).decode().lower()
+def _letters(content: bytes) -> str:
+    return base64.b32encode(hashlib.sha256(content).digest()).decode().lower()
 
 
 def note_fingerprint(study: StudyFolder, session: SessionFolder, found: str, *, waits: bool = True) -> None:

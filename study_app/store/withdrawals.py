@@ -7,6 +7,7 @@ finishes it. Erased files are unlinked: disks and back-ups may still hold their 
 
 import hashlib
 import json
+import os
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator
@@ -200,7 +201,7 @@ def add_tombstone(study: StudyFolder, tombstone: Tombstone) -> None:
 
 def proof_of_withdrawal(tombstone: Tombstone) -> tuple[str, str]:
     """Return the fingerprint of a withdrawal, and what lists of fingerprints call it."""
-    return proof_of(json.dumps(asdict(tombstone))), f"withdrawals.jsonl/sub-{tombstone.participant}"
+    return proof_of(json.dumps(asdict(tombstone)).encode()), f"withdrawals.jsonl/sub-{tombstone.participant}"
 
 
 def _parsed(path: Path, number: int, line: bytes) -> Tombstone:
@@ -337,5 +338,5 @@ def _names(study: StudyFolder, participant: str, *folders: Path) -> Iterator[str
         kept = path == study.withdrawals or path.is_relative_to(study.allocated)
         if kept or path.parent.name == "recordings" or not path.is_file():
             continue
-        if word.search(path.name.encode()) or word.search(read_regular(path)):
+        if word.search(os.fsencode(path.name)) or word.search(read_regular(path)):
             yield f"{path} still names {participant}"

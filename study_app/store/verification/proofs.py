@@ -44,8 +44,9 @@ class Proof:
 def records(study: StudyFolder) -> Proofs:
     """Return fingerprint and place of each record of a study."""
     rows = (*exclusions(study.path), *reversals(study.path))
-    excluded = [(proof_of(json.dumps(asdict(row))), f"{study.exclusions.name}/sub-{row.participant}") for row in rows]
-    opened = [(proof_of(json.dumps(one)), study.reveals.name) for one in reveals(study.path)]
+    name = study.exclusions.name
+    excluded = [(proof_of(json.dumps(asdict(row)).encode()), f"{name}/sub-{row.participant}") for row in rows]
+    opened = [(proof_of(json.dumps(one).encode()), study.reveals.name) for one in reveals(study.path)]
     return (*map(proof_of_withdrawal, tombstones(study).values()), *opened, *dict.fromkeys(excluded))
 
 

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.output_files import write_files
 from study_app.store.sessions.open_session import Place, SessionStore
+from study_app.store.sessions.recovery import rebuild
 from study_app.store.verification.verify_session import doubts
 from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals import withdraw
@@ -118,3 +120,16 @@ def test_a_pipe_is_never_waited_for(tmp_path: Path, finished: SessionStore, name
 
     assert forked(act) == 0
     assert not (study / "withdrawals.jsonl").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names are texts elsewhere")
+def test_a_name_that_is_no_text_is_reported_and_searched(tmp_path: Path, finished: SessionStore) -> None:
+    study, name = tmp_path / "study", os.fsdecode(b"P007\xff.csv")
+    for folder in (study, finished.folder.path):
+        (folder / name).write_bytes(b"")
+    assert name in [Path(one.place).name for one in verify(study).errors]
+    finished.folder.checksums.unlink()
+    rebuild(finished.folder.path)
+    assert name not in [Path(one.place).name for one in verify(study).errors]
+    left = withdraw(study, "P007", by="AB", reason="asked").left
+    assert left == (f"{study / name} still names P007",)
