@@ -16,6 +16,9 @@ INDEX: Final = "index"
 ELSE: Final = "do"
 """The section of pages that no section lists."""
 
+LISTS: Final = ("commands", "data-dictionary", "kinds", "protocol-format")
+"""Pages that consist of generated lists."""
+
 FOLDERS: Final = {"decisions": "look-up"}
 """The section of pages in a folder that no section lists."""
 
@@ -94,14 +97,15 @@ def sections() -> dict[str, tuple[str, ...]]:
 class Section(NamedTuple):
     """A heading of a page with the text below it.
 
-    `names` are the title, the heading and its synonyms; `phrases` the synonyms, and the title at its own heading;
+    `names` are the title, the heading and its synonyms; `phrases` the begins of the words of each synonym, and of the
+    title at its own heading;
     `text` is its `source` without marks, in small letters.
     """
 
     page: str
     heading: str
     names: str
-    phrases: tuple[str, ...]
+    phrases: frozenset[frozenset[str]]
     source: str
     text: str
 
@@ -109,12 +113,11 @@ class Section(NamedTuple):
 def search(words: str) -> tuple[Section, ...]:
     """Return the best section of each page that has some of the words, or words that begin alike, the best page first.
 
-    A word counts more the fewer pages have it, and most in a heading. A section counts twice if one of its phrases was
-    typed: among others if it has several words, alone if it is one. Decisions count half. Pages far below the best are
-    left out.
+    A word counts more the fewer pages have it, and most in a heading. A section counts twice if the words of one of
+    its phrases were typed: among others if they are several, alone if it is one. Decisions, and pages that are lists,
+    count less. Pages far below the best are left out.
     """
-    typed = _WORD.findall(words.casefold())
-    stems = [_ENDING.sub("", word) for word in typed if word not in _NO_MATTER.split()] or typed
+    stems = _stems(words)
     score = dict.fromkeys(_sections(), 0.0)
     for stem in dict.fromkeys(stems):
         begins = re.compile(rf"(?<![^\W_]){re.escape(stem)}" + r"(?!\w)" * (len(stem) == 1))
@@ -123,15 +126,21 @@ def search(words: str) -> tuple[Section, ...]:
         rarity = math.log(1 + len(names()) / max(1, len(pages)))
         for one, weight in weights.items():
             score[one] += rarity * (weight or 0.25 * (one.page in pages))
-    whole = " ".join(typed)
+    typed = frozenset(stems)
     for one in score:
-        score[one] *= 2 if any(it == whole or (" " in it and it in whole) for it in one.phrases) else 1
-        score[one] *= 0.5 if one.page.split("/")[0] in FOLDERS else 1
+        score[one] *= 2 if any(it == typed or (len(it) > 1 and it <= typed) for it in one.phrases) else 1
+        score[one] *= 0.5 if one.page.split("/")[0] in FOLDERS else 0.65 if one.page in LISTS else 1
     best: dict[str, Section] = {}
     for one in sorted(score, key=lambda one: -score[one]):
         if score[one] > 0.3 * max(score.values()):
             best.setdefault(one.page, one)
     return tuple(best.values())
+
+
+def _stems(words: str) -> list[str]:
+    """Return the begins of the words that matter; of all words if none does."""
+    typed = _WORD.findall(words.casefold())
+    return [_ENDING.sub("", word) for word in typed if word not in _NO_MATTER.split()] or typed
 
 
 def _has(text: str, stem: str, begins: re.Pattern[str]) -> bool:
@@ -180,7 +189,8 @@ def _sections() -> tuple[Section, ...]:
             anchor = "" if heading == title_of_page else anchor_of(heading)
             also = [said for page_, anchor_, said in synonyms() if (page_, anchor_) == (name, anchor)]
             shown = " ".join([title_of_page, heading, *also]).casefold()
-            phrases = tuple(", ".join(also if anchor else [*also, title_of_page]).casefold().split(", "))
+            said = ", ".join(also if anchor else [*also, title_of_page]).split(", ")
+            phrases = frozenset(frozenset(_stems(phrase)) for phrase in said if phrase)
             below = text[found.end() : ends]
             made.append(Section(name, heading, shown, phrases, below, plain(below).casefold()))
     return tuple(made)
