@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from study_app.devices.rig import Rig
     from study_app.haptics.model.scene import Scene
-    from study_app.haptics.runtime.servo import Servo
     from study_app.protocol.model import Protocol
     from study_app.protocol.simulated import TrialFeatures
     from study_app.session.pages import Page
@@ -168,6 +167,12 @@ def fit(
     ------
     AnalysisError
         A column is missing or has other values, the design has no threshold, or the levels are not possible.
+
+    Notes
+    -----
+    The threshold is the level half-way between guessing and 1 − lapses. Trials of results are the rows of
+    ``read(...)["tracks"]`` that are ``analysed``, with ``level_delivered`` and ``right`` renamed to ``level`` and
+    ``success``; `read` has their ``thresholds``, too.
     """
     from dataclasses import asdict
 
@@ -348,10 +353,10 @@ class ForceLoop:
         self._reader = rig.servo.telemetry.reader()
 
     @property
-    def _servo(self) -> Servo:
+    def _opened(self) -> Rig:
         if self._rig is None:
             raise StudyError("the force loop has ended: open it again")
-        return self._rig.servo
+        return self._rig
 
     @property
     def dropped(self) -> int:
@@ -372,11 +377,29 @@ class ForceLoop:
 
         if liquid not in self._scenes:
             raise StudyError(f"{liquid!r} is not a liquid of the file: it has {', '.join(self._scenes)}")
-        scene, servo = override_all(self._scenes[liquid], parameters), self._servo
+        scene, servo = override_all(self._scenes[liquid], parameters), self._opened.servo
         if servo.may_adjust(scene):
             servo.adjust(scene)
         else:
             servo.load(scene)
+
+    def follow(self, t_s: ArrayLike, position_m: ArrayLike) -> None:
+        """Move the hand of a simulated device along the straight lines between places; until then it rests.
+
+        Of the times (n,) [s], which increase, only differences count; places (n, 3) [m, hand] outside the range of
+        motion, ±0.05 m along x and ±0.03 m along y and z, count as its border.
+
+        Raises
+        ------
+        StudyError
+            A person moves the device, or the motion cannot be used.
+        """
+        from study_app.devices.hand import hand_of
+
+        hand = hand_of(self._opened.device)
+        if hand is None:
+            raise StudyError("a person moves this device: follow is for simulated ones, such as 'scripted'")
+        hand.follow(t_s, position_m)
 
     def read(self) -> np.recarray[Any, Any]:
         """Return the samples since the last call, oldest first: ``position_m`` [m], ``device_force_n`` [N] and more.
@@ -386,17 +409,17 @@ class ForceLoop:
         ServoFault, DeviceLost
             The servo has stopped itself; the force is zero.
         """
-        self._servo.check()
+        self._opened.servo.check()
         samples: np.recarray[Any, Any] = self._reader.read()
         return samples
 
     def stop(self) -> None:
         """Send zero force from the next tick on, without a fade, until `fade_in`."""
-        self._servo.stop_force()
+        self._opened.servo.stop_force()
 
     def fade_in(self) -> None:
         """Fade the force in after `stop`."""
-        self._servo.fade_in()
+        self._opened.servo.fade_in()
 
     def _end(self) -> None:
         self._rig = None

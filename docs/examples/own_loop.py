@@ -10,11 +10,9 @@ class Window:
 
     def __init__(self, rate_hz):
         self._period_s = 1 / rate_hz
-        self._next_s = time.perf_counter()
 
     def flip(self):
-        self._next_s += self._period_s
-        time.sleep(max(0.0, self._next_s - time.perf_counter()))
+        time.sleep(self._period_s - time.perf_counter() % self._period_s)
 
 
 def main(frames=120, device="scripted"):
@@ -22,8 +20,10 @@ def main(frames=120, device="scripted"):
     window, shown = Window(60), []
     with api.open_force("rek2024", device=device, force_limit_n=2) as force:  # whatever ends it: zero force
         force.set_liquid("water")
+        if device == "scripted":
+            force.follow([0, 1, 2], [[0, 0, 0], [0.04, 0, 0], [0, 0, 0]])  # a simulated hand; a person moves a Falcon's
         for frame in range(frames):
-            samples = force.read()  # all since the last frame; "falcon" as the device gives the hand of a person
+            samples = force.read()  # all since the last frame
             if len(samples):
                 newest = samples[-1]
                 shown.append((newest.time_ns * 1e-9, newest.position_m.copy(), newest.device_force_n.copy()))

@@ -232,7 +232,7 @@ def test_every_way_out_of_a_force_loop_ends_at_zero_force(device: str) -> None:
             loop.set_liquid("water")
             assert loop._rig is not None
             hands.append(getattr(loop._rig.device, "hand", loop._rig.device))
-            hands[0].reach_to(0.04, 0.0, 0.0, duration_s=0.4)
+            loop.follow([0.0, 0.4], [[0.0, 0.0, 0.0], [0.04, 0.0, 0.0]])
             felt_n = samples(loop, 700)
             assert 0.0 < np.linalg.norm(felt_n, axis=1).max() <= 1.0
             loop.set_liquid("water", density_kg_m3=1200.0)
@@ -242,7 +242,7 @@ def test_every_way_out_of_a_force_loop_ends_at_zero_force(device: str) -> None:
             loop.read()  # what came before
             assert not np.any(samples(loop, 50)[-20:])
             loop.fade_in()
-            hands[0].reach_to(0.0, 0.0, 0.0, duration_s=10.0)
+            loop.follow([0.0, 10.0], [[0.04, 0.0, 0.0], [0.0, 0.0, 0.0]])
             loop.read()
             assert np.any(samples(loop, 200)[-1])
             raise ZeroDivisionError

