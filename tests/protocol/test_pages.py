@@ -35,7 +35,7 @@ def test_example_of_questions_is_a_study() -> None:
     (example,) = (one for one in examples(QUESTIONS) if one.startswith("format = 2"))
     study = parse(example.encode(), "example")
     assert list(study.forms) == ["about_you"]
-    assert [item.kind_id for item in study.questionnaires["after"].items] == ["rating"]
+    assert [item.kind_id for item in study.questionnaires["after"].items] == ["rating", "slider"]
 
 
 def test_example_of_groups_gives_the_steps_that_it_names() -> None:
