@@ -18,7 +18,7 @@ def _as_interpreter(words: list[str]) -> None:
         words = words[1:]
     if words[0] == "-c":
         sys.argv = ["-c", *words[2:]]
-        exec(words[1], {"__name__": "__main__"})  # noqa: S102  # nosec B102 - as an interpreter does
+        exec(words[1], {"__name__": "__main__"})  # nosec B102  # noqa: S102 - as an interpreter does
     else:
         sys.argv = words[1:]
         runpy.run_module(words[1], run_name="__main__", alter_sys=True)

@@ -119,8 +119,8 @@ def test_a_recorder_gets_markers_with_the_times_of_their_events() -> None:
 @slow
 def test_strangers_at_the_port_of_a_stream_disturb_neither_its_recorder_nor_its_end() -> None:
     thread = SinkThread(open_sink("lsl", time.monotonic_ns))
-    (found,) = pylsl.resolve_byprop("name", "liquid-study markers", 1, 10)
-    with visited(int(found.as_xml().partition("<v4data_port>")[2].partition("<")[0])):
+    described = thread.sink._outlet.get_info().as_xml()
+    with visited(int(described.partition("<v4data_port>")[2].partition("<")[0])):
         recorder = Recorder("liquid-study markers", 3)
         for trial in (1, 2, 3):
             thread.mark(marker(trial))
