@@ -36,7 +36,7 @@ def kinds_markdown() -> str:
         ("Limiters", ("bit", "limiter", "column", "what it says"), _limiters()),
         ("Trigger codes", ("code", "event of the journal"), ((str(code), f"`{name}`") for name, code in CODES.items())),
         ("Devices", ("`--device`", "device", "kind", "options"), _devices()),
-        ("What `devices doctor` checks, in order", ("device", "checked", "what you see", "cause", "cure"), _checks()),
+        ("Checks of a device, in order", ("`devices doctor`", "without it", "cause; cure"), _checks()),
         (
             "Templates",
             ("`--template`", "title", "question"),
@@ -118,7 +118,7 @@ def _devices() -> Iterator[tuple[str, ...]]:
 def _checks() -> Iterator[tuple[str, ...]]:
     for device in DEVICES:
         for one in device.doctor.findings() if device.doctor and device.kind != "simulated" else ():
-            yield f"`{device.name}` {one.number}", one.tested, one.symptom, one.cause, one.cure
+            yield f"`{device.name}` {one.number}: {one.tested}", one.symptom, f"{one.cause}; {one.cure}"
 
 
 def commands_markdown() -> str:

@@ -80,7 +80,8 @@ class Measurements:
     the force that limits and passivity controller are expected to withhold in the fastest stroke of a task, by
     liquid; None where it was not computed. ``velocity_errors`` are the relative error of the velocity and what it would
     be if all of the device's dynamics were known; None where all is. ``outlets`` are the streams and ports to other
-    programs; ``video`` is what was found of the study's videos, None without any.
+    programs; ``video`` is what was found of the study's videos, None without any. ``ran_otherwise`` is a participant
+    with whom the same version of the study ran from another file.
     """
 
     device: str
@@ -102,6 +103,7 @@ class Measurements:
     velocity_errors: tuple[float, float] | None = None
     outlets: tuple[OutletStatus, ...] = ()
     video: VideosFound | None = None
+    ran_otherwise: str = ""
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
 
@@ -296,6 +298,11 @@ def _costs(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         share, value = most_percent / limit_percent, f"at most {most_percent:.1f} %"
         advice = "Trials with such strokes would be invalid."
         yield _warned("Force withheld", value, about, advice, well=most_percent <= limit_percent, share=share)
+
+    if facts.ran_otherwise:
+        about = f"version {protocol.study.version} ran from another file with {facts.ran_otherwise}"
+        advice = "Give the changed file another study.version; the report names the change in any case."
+        yield Check("Study file", "warning", "changed", about, advice)
 
     if protocol.assigns_rows and (number := enrolment(facts.participant)) is not None:
         yield Check("Balance", "ok", f"participant number {number}", "determines the row of the square")

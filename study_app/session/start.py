@@ -15,7 +15,7 @@ from study_app.devices.registry import check_options, descriptor_of
 from study_app.devices.rig import Rig
 from study_app.errors import SessionError
 from study_app.outlets.session_outlets import Outlets, OutletStatus
-from study_app.protocol.load import parse, source_bytes
+from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, stream
 from study_app.protocol.orders.sequences import enrolment
@@ -33,6 +33,7 @@ from study_app.store.progress import progress_of
 from study_app.store.sessions.begin import SessionStart, begin, check_participant, refuse_never_begun, used_ids
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import check_can_go_on, refuse_finished, reopen
+from study_app.store.study_runs import run_of
 from study_app.store.tables.study_files import check_study
 from study_app.store.workstation import MachineSettings
 from study_app.video.sources import Videos
@@ -241,7 +242,20 @@ def measured(
         lasts_s=PLAYED_MEASURED_S if chosen.played else MEASURED_S,
         sleep=sleep,
     )
-    return replace(facts, video=looked)
+    return replace(facts, video=looked, ran_otherwise=ran_otherwise(chosen))
+
+
+def ran_otherwise(chosen: NewSession) -> str:
+    """Return a participant whose session ran the same version of the study from another file; "" without one."""
+    if chosen.resumes is not None:
+        return ""
+    source = chosen.read_source()
+    version, own = parse(source, chosen.source).study.version, protocol_hash(source)
+    for session in StudyFolder(chosen.results).sessions():
+        ran = run_of(session.receipt)
+        if ran is not None and ran.version == version and ran.hash != own:
+            return session.participant
+    return ""
 
 
 def open_outlets(machine: MachineSettings, servo: Servo, blinding: str) -> Outlets | None:

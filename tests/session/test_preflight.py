@@ -14,11 +14,14 @@ from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
-from study_app.protocol.load import load, parse
+from study_app.protocol.load import load, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.session import preflight_measurements
 from study_app.session.preflight import Measurements, Screen, checks, refused
 from study_app.session.preflight_measurements import measure
+from study_app.session.start import NewSession, ran_otherwise
+from study_app.store import receipt
+from study_app.store.folders import StudyFolder
 from tests.compiled import needs_servo
 from tests.golden import compare
 from tests.protocol.edited_studies import text_of
@@ -115,6 +118,19 @@ def test_a_session_needs_what_its_sealed_recordings_take(study: str, needed: int
     """A trial of 3 s is sealed into the room of 4 s, whatever its page and its questions take."""
     (room,) = [check for check in checks(small.WELL, load(study)) if check.name == "Free space"]
     assert room.about == f"a session needs about {needed} MB"
+
+
+@pytest.mark.parametrize(("recorded", "who"), [("ab" * 32, "P001"), (protocol_hash(source_bytes("rek2024")), "")])
+def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded: str, who: str) -> None:
+    study = load("rek2024")
+    place = StudyFolder(tmp_path).session("P001", 1)
+    place.path.mkdir(parents=True)
+    ran = {"key_hash": "", "protocol_hash": recorded, "protocol": {"study": {"version": study.study.version}}}
+    receipt.write(place.receipt, ran)
+    chosen = NewSession("rek2024", "P002", 1, 7, "AK", "en", "scripted", True, None, tmp_path)
+    assert ran_otherwise(chosen) == who
+    found = checks(replace(small.WELL, ran_otherwise=who), study)
+    assert [check.verdict for check in found if check.name == "Study file"] == ["warning"] * bool(who)
 
 
 def measured(results: Path) -> Measurements:
