@@ -38,8 +38,9 @@ _FENCED_OR_HEADING: Final = re.compile(r"^```.*?^```|^#+ ([^\n]+)$", re.MULTILIN
 _WORD: Final = re.compile(r"\w[\w-]*")
 _ENDING: Final = re.compile(r"(?<=\w{3})(?:ies|ings?|ed|es|s|e|y)$")
 _NO_MATTER: Final = (
-    "a about after an and are at be before by can do does for from have how i if in is it many me my need no not of on "
-    "one or our should that the their there they this to two was we what when where which who why will with you"
+    "a about after an and are at be before by can could do does for from get give gives got has have how i if in is "
+    "it know many may me my need no not of ok on one or our should that the their there they this to two want was we "
+    "what when where which who why will with would you"
 )
 
 
