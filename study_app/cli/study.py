@@ -69,6 +69,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         from study_app.designer.document.study import read
         from study_app.designer.measures.study_facts import to_translate
         from study_app.protocol.source.files import find
+        from study_app.session.simulated.paced_levels import undelivered_levels
         from study_app.store import workstation
         from study_app.video.sources import missing_here
 
@@ -77,7 +78,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         file = find(protocol)
         missing = missing_here(study, file.parent, camera, time.monotonic_ns)
         click.echo(describe.describe(study, delay_ticks, workstation.device_without_force()))
-        for sentence in to_translate(read(file.read_bytes(), file.parent)):
+        for sentence in (*undelivered_levels(study), *to_translate(read(file.read_bytes(), file.parent))):
             click.echo(f"\nNote: {sentence}.")
         if missing:
             click.echo(f"\nNote: {missing}. Sessions of this study do not start on this computer.")

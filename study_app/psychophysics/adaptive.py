@@ -22,9 +22,9 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from study_app.psychophysics.detection import preferred
 from study_app.psychophysics.families import Family, Floats, success
 from study_app.psychophysics.grid import Grid, Values, fit, quantile, tables
+from study_app.psychophysics.person_fit import Given, preferred
 
 # The level presented, in the coordinate u, and whether it was a success; in the order of presentation.
 Answer: TypeAlias = tuple[float, bool]
@@ -176,10 +176,6 @@ def _weighted_entropy(joint: NDArray[np.float64], axis: int) -> NDArray[np.float
     return np.asarray(total * np.log(total) - terms.sum(axis=axis), float)
 
 
-# Successes and failures of each track at each level, (tracks, levels) arrays.
-Counts: TypeAlias = tuple[Floats, Floats]
-
-
 class Answers(NamedTuple):
     """The levels presented and the answers.
 
@@ -191,36 +187,26 @@ class Answers(NamedTuple):
         False after the end of a track.
     towards, before : (tracks, trials) array
         The correct answer, and the one before: 1 the first of two intervals, −1 the second, 0 none of them.
+    done : (tracks, trials) array
+        The share of the trials that is done, from 0 to 1.
     """
 
     levels: Floats
     successes: NDArray[np.bool_]
     towards: Floats
     before: Floats
+    done: Floats
 
     def first(self, trials: int | None) -> Answers:
         """Return the answers to the first trials of each track; None: to all."""
-        levels, successes, towards, before = self
-        return Answers(levels[:, :trials], successes[:, :trials], towards[:, :trials], before[:, :trials])
+        levels, successes, *others = self
+        return Answers(levels[:, :trials], successes[:, :trials], *(one[:, :trials] for one in others))
 
-    def nearest(self, places: Sequence[float]) -> NDArray[np.int64]:
-        """Return the index of the nearest of ``places`` to each level, (tracks, trials).
-
-        Parameters
-        ----------
-        places : sequence of float
-            Levels, in u, ascending.
-        """
-        ascending = np.asarray(places, float)
-        return np.asarray(np.searchsorted((ascending[1:] + ascending[:-1]) / 2, self.levels), np.int64)
-
-    def counts(self, places: Sequence[float]) -> Counts:
-        """Return the successes and failures of each track at each of ``places``, counted at the `nearest` one."""
-        nearest = self.nearest(places)
-        row, trial = np.nonzero(~np.isnan(self.levels))
-        found = np.zeros((2, len(self.levels), len(places)))
-        np.add.at(found, (np.where(self.successes[row, trial], 0, 1), row, nearest[row, trial]), 1.0)
-        return found[0], found[1]
+    def given(self, places: Floats) -> list[Given]:
+        """Return the answers of each track, at the nearest of ``places``: levels in u, ascending."""
+        nearest, known = np.searchsorted((places[1:] + places[:-1]) / 2, self.levels), ~np.isnan(self.levels)
+        every = zip(nearest, self.successes, self.towards, self.before, self.done, known, strict=True)
+        return [Given(places, *(one[own] for one in track)) for *track, own in every]
 
 
 # The level of the next trial of each track, and whether the track goes on; followed by whether answers are successes.
@@ -277,16 +263,17 @@ class Observers:
         tracks, trials = draws.shape
         levels, successes, before = np.full(draws.shape, np.nan), np.zeros(draws.shape, bool), np.zeros(draws.shape)
         towards = np.zeros(draws.shape) if self.towards is None else self.towards
+        done = np.broadcast_to(np.arange(trials) / max(1, trials - 1), draws.shape)
         said, (now, running) = np.zeros(tracks), next(chosen)
         for trial in range(trials):
-            psi = self.probability(now, trial / max(1, trials - 1))
+            psi = self.probability(now, done[0, trial])
             psi = preferred(psi, self.lapse, towards[:, trial] * (self.criterion + self.repeats * said))
             right, before[:, trial] = draws[:, trial] < psi, said
             levels[running, trial], successes[:, trial] = now[running], right & running
             said = np.where(right, towards[:, trial], -towards[:, trial])
             if trial + 1 < trials:
                 now, running = chosen.send(right)
-        return Answers(levels, successes, towards, before)
+        return Answers(levels, successes, towards, before, done)
 
 
 def constant_tracks(levels: Sequence[float], repetitions: int, observers: Observers, draws: Floats) -> Answers:

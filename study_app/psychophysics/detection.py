@@ -1,4 +1,4 @@
-"""Detection theory: P(correct) of a design from d′ and the inverse, d′ and bias from counts of answers, preferences.
+"""Detection theory: P(correct) of a design from d′ and the inverse, d′ and bias from counts of answers.
 
 Rates use the log-linear correction (Hautus 1995), so that a rate of 0 or 1 has a finite d′. Models of the designs:
 Macmillan & Creelman 2005, Detection Theory, chapters 1, 7, 9 and 10; oddity: Frijters 1979, Br. J. Math. Stat.
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from statistics import NormalDist
 from typing import Final, Literal, TypeAlias
@@ -18,8 +18,7 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from study_app.psychophysics.families import CLIP, Floats
-from study_app.psychophysics.grid import Grid, Posterior, Values, fit, log_likelihood, posterior
+from study_app.psychophysics.families import Floats, erfc
 
 Model: TypeAlias = Literal["differencing", "independent"]
 
@@ -30,8 +29,6 @@ ENDS: Final = 9.0
 MOST: Final = 20.0
 """The largest d′ in searches."""
 TOLERANCE: Final = 1e-10
-
-_erfc = np.vectorize(math.erfc, otypes=[float])
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +198,7 @@ def _rule(low: float, high: float) -> tuple[Floats, Floats]:
 
 
 def _cdf(x: Floats) -> Floats:
-    return np.asarray(0.5 * _erfc(-x / math.sqrt(2.0)), float)
+    return np.asarray(0.5 * erfc(-x / math.sqrt(2.0)), float)
 
 
 def _abx(d_prime: float, divisor: float) -> float:
@@ -235,93 +232,3 @@ PROPORTIONS: Final[Mapping[str, Callable[[float], float]]] = {
     "yesno": lambda d_prime: NORMAL.cdf(d_prime / 2.0),
 }
 """P(correct) from d′, by design and model."""
-
-
-PREFERENCE_SD: Final = 1.0
-"""Standard deviation of preferences between people [SD of the decision]. [choice]"""
-BEYOND_CHANCE: Final = 2.0
-"""A preference is one from so many standard errors on."""
-PASSES: Final = 2
-"""Fits after which preferences are estimated: the first threshold is too high."""
-NEWTON_STEPS: Final = 10
-
-
-@cache
-def _normal_table() -> tuple[Floats, Floats]:
-    """Return z and the normal distribution function there: interpolated, it is correct to 1e-7."""
-    z = np.linspace(-8.0, 8.0, 16001)
-    return z, np.asarray(0.5 * _erfc(-z / math.sqrt(2.0)), float)
-
-
-def _moved(shares: ArrayLike, shift: ArrayLike) -> Floats:
-    """Return shares of decisions, whose variable a preference moves by ``shift`` [SD]."""
-    z, of_z = _normal_table()
-    deviates = np.asarray(np.interp(np.asarray(shares, float), of_z, z), float)
-    return np.asarray(np.interp(deviates + np.asarray(shift, float), z, of_z), float)
-
-
-def preferences(
-    towards: ArrayLike, successes: ArrayLike, before: ArrayLike, found: Posterior, levels: ArrayLike
-) -> Floats:
-    """Return how far preferences move each decision between two intervals towards the correct one (n,) [SD].
-
-    A probit regression of the answers, with what the levels contribute fixed, has the preference for the first interval
-    and that for the answer before as coefficients; those within `BEYOND_CHANCE` standard errors count as none.
-
-    Parameters
-    ----------
-    towards : (n,) array
-        1 where the first interval is the correct one, otherwise −1; 0 where that is not known.
-    successes : (n,) array
-        Whether answers are correct.
-    before : (n,) array
-        1 where the first interval was the answer before, otherwise −1; 0 where there was none before.
-    found : Posterior
-        Of these answers.
-    levels : (n,) array
-        In u.
-    """
-    (z, of_z), first, lapse = _normal_table(), np.asarray(towards, float), found.others[2]
-    unbiased = (found.success(levels) - lapse) / (1.0 - 2.0 * lapse)
-    sensed, said = first * np.interp(np.clip(unbiased, 0.5, 0.999), of_z, z), np.where(successes, first, -first)
-    causes, weights = np.column_stack([np.abs(first), np.asarray(before, float)]), np.zeros(2)
-    for _ in range(NEWTON_STEPS):
-        agreed = said * (sensed + causes @ weights)
-        hazard = np.exp(-0.5 * agreed**2) / (math.sqrt(2 * math.pi) * np.interp(agreed, z, of_z))
-        information = (causes.T * (hazard * (hazard + agreed))) @ causes + np.eye(2) / PREFERENCE_SD**2
-        weights += np.linalg.solve(information, causes.T @ (said * hazard) - weights / PREFERENCE_SD**2)
-    errors = np.sqrt(np.diag(np.linalg.inv(information)))
-    return np.asarray(first * (causes @ np.where(np.abs(weights) > BEYOND_CHANCE * errors, weights, 0.0)), float)
-
-
-def preferred(psi: ArrayLike, lapse: ArrayLike, shift: ArrayLike) -> Floats:
-    """Return ψ of two intervals where a preference moves the decision by ``shift`` towards the correct one [SD]."""
-    psi, lapse = np.asarray(psi, float), np.asarray(lapse, float)
-    if not np.any(shift):
-        return psi
-    unbiased = np.clip((psi - lapse) / (1.0 - 2.0 * lapse), CLIP, 1.0 - CLIP)
-    return np.asarray(np.clip(lapse + (1.0 - 2.0 * lapse) * _moved(unbiased, shift), CLIP, 1.0 - CLIP), float)
-
-
-def fit_preferring(
-    levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, shifts: ArrayLike, grid: Grid
-) -> Posterior:
-    """Return the posterior as `grid.fit` does, where preferences moved decisions by ``shifts`` (k,) [SD]."""
-    if not np.any(shifts):
-        return fit(levels, successes, failures, grid)
-    u, right, wrong, moved = (np.asarray(one, float) for one in (levels, successes, failures, shifts))
-    flat = replace(grid, width_prior=None, session_sd=(0.0, 0.0))
-    likelihood = np.zeros(grid.shape)
-    for shift in np.unique(moved).tolist():
-        at = moved == shift
-        likelihood += log_likelihood(right[at], wrong[at], *_moved_tables(flat, tuple(u[at].tolist()), shift))
-    return posterior(grid, likelihood)
-
-
-@lru_cache(maxsize=16)
-def _moved_tables(grid: Grid, levels: Values, shift: float) -> tuple[Floats, Floats]:
-    """Return log ψ and log(1 − ψ) at each level in each cell, of two intervals: the guess rate is one half."""
-    unbiased = replace(grid, lapses=(0.0,), lapse_prior=(1.0,)).success(levels)
-    lapses = np.array(grid.lapses)[:, None]
-    psi = np.clip(lapses + (1.0 - 2.0 * lapses) * _moved(unbiased, shift), CLIP, 1.0 - CLIP)
-    return np.log(psi), np.log1p(-psi)

@@ -47,6 +47,8 @@ class Grid:
     session_sd : tuple of float
         Standard deviation of a person's threshold from one session to the next: a constant part [u], and a part that
         is a share of the threshold.
+    log : bool
+        Whether u is the logarithm of a level.
     """
 
     family: Family
@@ -57,6 +59,7 @@ class Grid:
     lapse_prior: Values
     guesses: Values | None
     session_sd: tuple[float, float] = (0.0, 0.0)
+    log: bool = True
 
     @property
     def shape(self) -> tuple[int, int, int, int]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Final, Literal, NamedTuple
@@ -39,7 +39,7 @@ class Person(NamedTuple):
     width : float
         Of the psychometric function, as a share of that of an observer whose d′ is proportional to the level.
     lapse : float
-        Share of answers at random.
+        Share of answers at random: of k answers, one in k of these is correct.
     criterion, repeats : float
         Preference for the first interval, and for the last answer [SD of the decision].
     change : float
@@ -51,6 +51,10 @@ class Person(NamedTuple):
     criterion: float = 0.0
     repeats: float = 0.0
     change: float = 1.0
+
+    def wrong(self, answers: int) -> float:
+        """Return the lapse rate: the share of answers that are wrong at any level, where one of so many is correct."""
+        return self.lapse * (1.0 - 1.0 / answers)
 
     def at(self, done: float) -> float:
         """Return the threshold as a share of its mean, when a share of the block is ``done``."""
@@ -130,8 +134,8 @@ class Expected:
         Of one standard.
     standards : int
         Number of standards in the group's mean.
-    halves : mapping of str to float
-        Half the 95 % interval of one participant, in u, for each kind of people; infinite if nothing is measured.
+    halves : mapping of str to sequence of float
+        Half the 95 % intervals of participants, in u, for each kind of people; infinite if nothing is measured.
     spread : float
         Standard deviation of the estimate's error, in u; infinite if nothing is measured.
     threshold : float
@@ -143,7 +147,7 @@ class Expected:
     spacing: Literal["log", "linear"]
     trials: int
     standards: int
-    halves: Mapping[str, float]
+    halves: Mapping[str, Sequence[float]]
     spread: float
     threshold: float
     shared: float = 0.0
@@ -155,13 +159,13 @@ class Expected:
 
     @property
     def median(self) -> float:
-        """The median of `halves`, the higher of two."""
-        return sorted(self.halves.values())[len(self.halves) // 2]
+        """The median of `halves` over all kinds."""
+        return float(np.median(np.concatenate([*self.halves.values()])))
 
     @property
     def worst(self) -> tuple[str, float]:
-        """The kind of people with the widest interval, and half of it."""
-        return max(self.halves.items(), key=lambda one: one[1])
+        """The kind of people with the widest interval, and the median of half of it."""
+        return max(((kind, float(np.median(one))) for kind, one in self.halves.items()), key=lambda one: one[1])
 
     def of_group(self, participants: int, trials: float | None = None) -> float:
         """Return half the 95 % interval of a group's mean over all standards, as a share of the mean.

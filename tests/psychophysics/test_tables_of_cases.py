@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.psychophysics import adaptive, delivery, detection, families, grid, people
+from study_app.psychophysics import adaptive, delivery, detection, families, grid, people, person_fit
 from tests.golden import compare
 from tests.golden_values import one_line as told
 
@@ -62,7 +62,7 @@ def lines() -> Iterator[str]:
     for down, ratio, begin in ((1, 1.0, -0.3), (2, 0.5488, -1.0), (3, 0.7393, 0.0)):
         rule = adaptive.Staircase(down, 0.4, ratio, -2.0, 0.0, begin)
         found = [adaptive.staircase_tracks(rule, one, draws) for one in (observers, later)]
-        counted = found[0].first(5).counts(LEVELS)
+        counted = [one[1:3] for one in found[0].first(5).given(np.array(LEVELS))]
         yield f"{rule}: {rule.converges_to:.7g} {told([one[:2] for one in found])} {told(counted)}"
         for levels, right in zip(found[0].levels.tolist(), found[0].successes.tolist(), strict=True):
             given = list(zip(levels, right, strict=True))
@@ -75,11 +75,13 @@ def lines() -> Iterator[str]:
         yield f"search {more}: {told(adaptive.search_tracks(search, observers, draws, **more)[:2])}"
     prefers = replace(observers, criterion=2.5, repeats=0.4, towards=np.tile((1.0, -1.0), (2, 6)))
     yield f"prefers: {told(found := adaptive.search_tracks(search, prefers, draws))}"
-    answers = (found.towards[1], found.successes[1], found.before[1])
-    moved = detection.preferences(*answers, grid.fit(LEVELS, RIGHT, WRONG, SMALL), found.levels[1])
-    right, wrong = found.successes[1].astype(float), (~found.successes[1]).astype(float)
-    fitted = detection.fit_preferring(found.levels[1], right, wrong, 0.5 * found.towards[1], SMALL)
-    yield f"  {told(moved)} {told(detection.preferred(right, 0.05, (-0.5, 0.5) * 6))} {told(fitted.marginal)}"
+    _, given = found.given(np.array(LEVELS))
+    yield f"  {told(person_fit.preferences(given, grid.fit(LEVELS, RIGHT, WRONG, SMALL)))}"
+    yield f"  {told(person_fit.preferred(given.successes, 0.05, (-0.5, 0.5) * 6))}"
+    for one in (SMALL, replace(SMALL, log=False, session_sd=(0.0, 0.1))):
+        fitted = person_fit.fit_person(given, one, two_intervals=True)
+        yield f"  {told(fitted.shifts)} {fitted.change:.7g} {fitted.named} {told(fitted.flat.marginal)}"
+        yield f"  {told(fitted.expected(fitted.flat))} {told(fitted.after(5).marginal)}"
     yield from of_delivery()
 
 

@@ -37,22 +37,12 @@ from study_app.analysis.levels.statistic import (
 from study_app.analysis.levels.tracks import TRACK, answers_of, setting_of
 from study_app.analysis.results import LevelsResult, counted, listed, number
 from study_app.analysis.statistics.outcome import Array
-from study_app.analysis.statistics.thresholds import (
-    CHANGE_PRIOR,
-    CHANGED,
-    FEWEST,
-    SETS,
-    WORST,
-    change_score,
-    drift,
-    group_mean,
-    p_of_fit,
-)
+from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, drift, group_mean, p_of_fit
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
-from study_app.psychophysics.detection import BEYOND_CHANCE, PASSES, fit_preferring, preferences, preferred
 from study_app.psychophysics.families import level_at
-from study_app.psychophysics.grid import ALIKE, Grid, Posterior, group_widths
+from study_app.psychophysics.grid import ALIKE, Posterior, group_widths
+from study_app.psychophysics.person_fit import BEYOND_CHANCE, CHANGE_PRIOR, Given, PersonFit, fit_person
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
@@ -110,64 +100,22 @@ class ThresholdEstimate:
         return bool(self.change)
 
 
-@dataclass(frozen=True, slots=True)
-class Counts:
-    """Answers of one participant at one standard, by level in u and by how far preferences move the decision.
-
-    All have the shape (k,); ``places``, shape (n,), are those of the rows.
-    """
-
-    levels: Array
-    successes: Array
-    failures: Array
-    shifts: Array
-    places: NDArray[np.int64]
-
-    def fit(self, grid: Grid) -> Posterior:
-        """Return what they say about the person."""
-        return fit_preferring(self.levels, self.successes, self.failures, self.shifts, grid)
-
-    def expected(self, found: Posterior) -> Array:
-        """Return the share of successes that the function through all medians expects."""
-        return preferred(found.success(self.levels), found.others[2], self.shifts)
-
-    def steadied(self, successes: NDArray[np.bool_], change: float) -> "Counts":
-        """Return counts at the levels that would be answered as these if the threshold were that of the middle trial.
-
-        ``successes`` (n,) are those of the rows; the threshold of either half is the mean in it, if it rises evenly by
-        ``change`` from the first trial to the last [u].
-        """
-        n = len(successes)
-        later = np.where(np.arange(n) < n / 2, -change / 4, change / 4)
-        cells = np.column_stack([self.levels[self.places] - later, self.shifts[self.places]])
-        (levels, shifts), places = _cells(cells)
-        right, wrong = (np.bincount(places, one, len(levels)).astype(float) for one in (successes, ~successes))
-        return Counts(levels, right, wrong, shifts, places)
-
-
-def _cells(rows: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Return the columns of the different rows, and the place of each row among them."""
-    cells, places = np.unique(rows, axis=0, return_inverse=True)
-    return cells.T, np.asarray(places, np.int64)
-
-
-def counts_of(stimulus: Stimulus, rows: pd.DataFrame, moved: ArrayLike = 0.0) -> Counts:
-    """Return counts from rows of tracks, each at the mean of its delivered levels; preferences ``moved`` decisions."""
-    shifts = np.broadcast_to(np.asarray(moved, float), len(rows))
-    (asked, moves), places = _cells(np.column_stack([rows["level"], shifts]).astype(float))
+def given_by(stimulus: Stimulus, rows: pd.DataFrame) -> Given:
+    """Return the answers of a person from rows of tracks: levels at the mean of what was delivered of each."""
+    asked, places = np.unique(rows["level"].to_numpy(dtype=float), return_inverse=True)
     each = rows["level_delivered"].astype("Float64").to_numpy(dtype=float, na_value=math.nan)
     known, k = np.isfinite(each), len(asked)
     measured = np.bincount(places[known], minlength=k)
     delivered = np.bincount(places[known], each[known], minlength=k) / np.maximum(measured, 1)
     has_place = (measured > 0) & ((delivered > 0) | (stimulus.spacing == "linear"))
     placed = np.where(has_place & (asked != 0), delivered, asked)
-    successes = np.asarray(np.bincount(places, rows["success"].to_numpy(dtype=float), minlength=k), float)
-    return Counts(
+    return Given(
         levels=np.array([stimulus.coordinate(float(level)) for level in placed]),
-        successes=successes,
-        failures=np.asarray(np.bincount(places, minlength=k) - successes, float),
-        shifts=moves,
         places=places,
+        successes=rows["success"].to_numpy(dtype=bool),
+        towards=rows["towards"].to_numpy(dtype=float),
+        before=rows["before"].to_numpy(dtype=float),
+        done=np.linspace(0.0, 1.0, len(rows)),
     )
 
 
@@ -211,80 +159,48 @@ def thresholds_of(trials: pd.DataFrame, stimulus: Stimulus, design: Design) -> I
     )
 
 
-def fit_answers(
-    stimulus: Stimulus, rows: pd.DataFrame, grid: Grid, *, two_intervals: bool
-) -> tuple[Counts, Counts, float]:
-    """Return answers, those to be fitted, and by how much the threshold changes from first to last trial [decades].
-
-    A preference for one of two intervals is removed, and so is the change that is most probable: both make answers
-    worse. A change that may be chance is 0.
-    """
-    counts, successes = counts_of(stimulus, rows), rows["success"].to_numpy(dtype=bool)
-    found = counts.fit(grid)
-    for _ in range(PASSES if two_intervals else 0):
-        given = (rows["towards"].to_numpy(), successes, rows["before"].to_numpy())
-        counts = counts_of(stimulus, rows, preferences(*given, found, counts.levels[counts.places]))
-        if not counts.shifts.any():
-            break
-        found = counts.fit(grid)
-    at = counts.places
-    score, information = change_score(successes, counts.levels[at], found, counts.shifts[at])
-    decade = 1.0 if stimulus.spacing == "log" else abs(found.threshold) * math.log(10)
-    change = score * decade / (information * decade**2 + math.log10(CHANGE_PRIOR) ** -2)
-    beyond_chance = score**2 > CHANGED**2 * information
-    return counts, counts.steadied(successes, change * decade), change if beyond_chance else 0.0
-
-
 @dataclass(frozen=True, slots=True)
-class PersonFit:
-    """What the ``rows`` of a participant at a standard say, and how the threshold changes over them [decades].
-
-    ``steadied`` are the counts that are fitted, ``flat`` is the posterior under a flat prior on the width,
-    ``width_prior`` the prior of the other one.
-    """
+class FittedPerson:
+    """What the ``rows`` of a participant at a standard say; the width follows from the answers of all."""
 
     person: Any
     rows: pd.DataFrame
-    counts: Counts
-    steadied: Counts
-    flat: Posterior
+    fit: PersonFit
     width_prior: Array
-    posterior: Posterior
-    change: float
+
+    @property
+    def posterior(self) -> Posterior:
+        return self.fit.flat.with_widths(self.width_prior)
 
 
-def _fits(block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.DataFrame) -> tuple[list[PersonFit], float]:
+def _fits(
+    block: LevelBlock, stimulus: Stimulus, assumed: Assumed, rows: pd.DataFrame
+) -> tuple[list[FittedPerson], float]:
     """Return the fit of each participant from the analysed rows of one standard.
 
-    A threshold that changed is uncertain by the standard deviation of one that changes evenly, in addition to how far
-    it is from one session to the next. Followed by the variance of the group's mean that is due to the width that
-    people share [u²].
+    Followed by the variance of the group's mean that is due to the width that people share [u²].
     """
     two = block.design.kind == "2ifc" and block.has_correct_answer
-    grid = analysis_grid(stimulus, block.design, assumed)
-    of_people = [
-        (person, own, *fit_answers(stimulus, own, grid, two_intervals=two))
-        for person, own in rows.groupby("participant")
-    ]
-    flat = [one.fit(replace(grid, width_prior=None)) for _, _, _, one, _ in of_people]
-    found = []
-    priors, shared = group_widths(flat, assumed.width_prior) if flat else ((), 0.0)
-    for (person, own, counts, steadied, change), unknown, prior in zip(of_people, flat, priors, strict=True):
-        session_sd = math.hypot(SESSION_SD / math.sqrt(own["session"].nunique()), change / math.sqrt(12))
-        widened = replace(unknown.with_widths(prior), grid=analysis_grid(stimulus, block.design, assumed, session_sd))
-        found.append(PersonFit(person, own, counts, steadied, unknown, prior, widened, change))
-    return found, shared
+    people, fits = [], list[PersonFit]()
+    for person, own in rows.groupby("participant"):
+        grid = analysis_grid(stimulus, block.design, assumed, SESSION_SD / math.sqrt(own["session"].nunique()))
+        people.append((person, own))
+        fits.append(fit_person(given_by(stimulus, own), grid, two_intervals=two))
+    priors, shared = group_widths([one.flat for one in fits], assumed.width_prior) if fits else ((), 0.0)
+    return [FittedPerson(*who, *it) for who, *it in zip(people, fits, priors, strict=True)], shared
 
 
 def _own(
-    block: LevelBlock, stimulus: Stimulus, standard: Any, fitted: PersonFit, heard: pd.DataFrame
+    block: LevelBlock, stimulus: Stimulus, standard: Any, fitted: FittedPerson, heard: pd.DataFrame
 ) -> ThresholdEstimate:
     """Return a participant's threshold; ``heard`` are also the rows that are not analysed."""
-    counts, found, rows = fitted.counts, fitted.posterior, fitted.rows
-    grid = found.grid
+    fit, found, rows = fitted.fit, fitted.posterior, fitted.rows
+    given, grid = fit.given, found.grid
     level_of, threshold, (low, high) = stimulus.level_of, found.threshold, found.interval
     width, guess, lapse = found.others
-    psi, shown = counts.expected(found), counts.levels[np.isfinite(counts.levels)]
+    psi, shown = fit.expected(found), given.levels[np.isfinite(given.levels)]
+    _, first, cells = np.unique([given.places, fit.shifts], axis=1, return_index=True, return_inverse=True)
+    decades = fit.change / (1.0 if grid.log else abs(threshold) * math.log(10))
     percent, compared = compared_percent(block.published), math.nan
     if percent is not None:
         compared = level_at(grid.family, percent, threshold, *found.others)
@@ -298,12 +214,12 @@ def _own(
         width=width,
         lapse=lapse,
         guess=guess,
-        flat_width=level_of(fitted.flat.threshold),
+        flat_width=level_of(fit.flat.threshold),
         beyond="above" if threshold > shown.max(initial=-math.inf) else "below" if threshold < shown.min() else None,
         variance=found.variance,
-        fit_p=p_of_fit(counts.successes, counts.successes + counts.failures, psi),
-        drift=drift(rows["success"].to_numpy(dtype=bool), psi[counts.places]),
-        change=10.0**fitted.change - 1.0,
+        fit_p=p_of_fit(np.bincount(cells, given.successes), np.bincount(cells), psi[first]),
+        drift=drift(given.successes, psi),
+        change=10.0**decades - 1.0 if fit.named else 0.0,
         reversal_mean=_reversal_mean(block, stimulus, heard),
         target_percent=None if block.method is None else block.method.target_percent,
         compared=None if math.isnan(compared) else level_of(compared),
@@ -387,24 +303,21 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
         return
     rows = _answered(block, opened)
     at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
-    fits: list[tuple[Any, PersonFit]] = [
+    fits: list[tuple[Any, FittedPerson]] = [
         (standard, one) for standard, own in at_standards for one in _fits(block, stimulus, assumed, own)[0]
     ]
     for standard, fitted in sorted(fits, key=lambda one: one[1].person)[:most]:
-        own, counts, grid = fitted.rows, fitted.steadied, fitted.flat.grid
-        successes, ends = own["success"].to_numpy(dtype=bool), []
-        so_far = np.zeros((2, len(counts.levels)))
-        for place, right in zip(counts.places, successes, strict=True):
-            so_far[0 if right else 1, place] += 1
-            flat = replace(counts, successes=so_far[0], failures=so_far[1]).fit(grid)
-            ends.append([stimulus.level_of(end) for end in flat.with_widths(fitted.width_prior).interval])
+        own, ends = fitted.rows, []
+        for n in range(1, len(own) + 1):
+            so_far = fitted.fit.after(n).with_widths(fitted.width_prior)
+            ends.append([stimulus.level_of(end) for end in so_far.interval])
         low, high = np.array(ends).T
         yield TrackCourse(
             participant=str(fitted.person),
             standard=None if pd.isna(standard) else float(standard),
             tracks=np.array([int(name.rpartition("/")[2]) for name in own["track"]], np.int64),
             levels=own["level"].to_numpy(dtype=float),
-            successes=successes,
+            successes=fitted.fit.given.successes,
             reversals=own["reversal"].astype("boolean").to_numpy(dtype=bool, na_value=False),
             catches=own["catch"].fillna(False).to_numpy(dtype=bool),
             noises=~own["arrangement"].str.contains("C").to_numpy(dtype=bool),
@@ -500,7 +413,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             "random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp from three participants on."
             f"{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: correlation of "
             f"trial number and deviance residual, with “!” where the threshold changes over the trials by more than "
-            f"{CHANGED:g} standard errors. n counts answers{catch}."
+            f"{BEYOND_CHANCE:g} standard errors. n counts answers{catch}."
             + (f" {REMOVED.format('is', 'is')}" if found.design == "2ifc" else "")
         )
 
@@ -606,7 +519,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 f"{SETS} simulated sets of answers, and drift is the correlation of trial number and deviance residual "
                 "(Wichmann & Hill 2001). Intervals include that a person’s threshold differs between sessions by a "
                 f"factor of {10**SESSION_SD:.2f} (one standard deviation; from data of Jäkel & Wichmann 2006), and "
-                f"how far it changed over the trials where that exceeded {CHANGED:g} standard errors. The most "
+                f"how far it changed over the trials where that exceeded {BEYOND_CHANCE:g} standard errors. The most "
                 f"probable change (prior: a factor of {CHANGE_PRIOR:g}) was removed: the threshold is that in the "
                 "middle of the trials. Of the standard "
                 f"deviation of log widths {100 * ALIKE:.0f} % was taken to be between participants, so that each "

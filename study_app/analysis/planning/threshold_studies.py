@@ -297,8 +297,7 @@ def threshold_markdown(precisions: Precisions) -> str:
         f"# Expected precision of {text_in(study.title, language)} ({study.name} {study.version})",
         "",
         f"**SIMULATED.** {precisions.studies} studies for each row (seed {precisions.seed}, liquid-study "
-        f"{__version__}). People differ by a factor of {BETWEEN_PEOPLE:g}. Results are estimated as in the report, "
-        "but for changes over the trials.",
+        f"{__version__}). People differ by a factor of {BETWEEN_PEOPLE:g}. Results are estimated as in the report.",
     ]
     if precisions.studies < precisions.asked:
         lines += ["", f"**Ended early: {precisions.studies} of {precisions.asked} studies.**"]

@@ -21,8 +21,6 @@ from scipy.special import xlogy
 from scipy.stats import t as student
 
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked
-from study_app.psychophysics.detection import preferred
-from study_app.psychophysics.families import success
 from study_app.psychophysics.grid import Z_95, Grid, Posterior, Values, evenly, fit, geometric, tables
 
 NOTICED_FROM: Final = 5.0
@@ -251,12 +249,6 @@ def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
     return float(1 + np.count_nonzero(simulated >= found - 1e-9)) / (SETS + 1)
 
 
-CHANGED: Final = 2.0
-"""A threshold that changes over the trials by more than so many standard errors drifts."""
-CHANGE_PRIOR: Final = 1.5
-"""Factor by which a threshold changes from the first trial to the last (one standard deviation). [choice]"""
-
-
 def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:
     """Return the correlation of trial number and deviance residual; None where either does not vary.
 
@@ -267,39 +259,6 @@ def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:
     if len(y) < 3 or float(np.ptp(residuals)) == 0.0:
         return None
     return float(np.corrcoef(np.arange(len(y)), residuals)[0, 1])
-
-
-STEP: Final = 0.01
-"""By so many widths a threshold is moved to differentiate the function."""
-
-
-def change_score(
-    successes: ArrayLike, levels: ArrayLike, found: Posterior, shifts: ArrayLike = 0.0
-) -> tuple[float, float]:
-    """Return score and information, at none, of a change of the threshold from first to last trial [1/u, 1/u²].
-
-    Parameters
-    ----------
-    successes, levels : (n,) array
-        In the order of the trials; levels are in u.
-    found : Posterior
-        Of these answers, as if the threshold were constant.
-    shifts : (n,) array, optional
-        Of the decision by a preference, as in `fit_preferring`.
-    """
-    y, u, (width, *rates) = np.asarray(successes, float), np.asarray(levels, float), found.others
-    below, above = (
-        preferred(success(found.grid.family, u, found.threshold + way * STEP * width, width, *rates), rates[1], shifts)
-        for way in (-1, 1)
-    )
-    psi, slope = preferred(found.success(u), rates[1], shifts), (above - below) / (2 * STEP * width)
-    information = slope**2 / (psi * (1.0 - psi))
-    if not information.any():
-        return 0.0, 0.0
-    time = np.linspace(0.0, 1.0, len(y))
-    time = time - np.average(time, weights=information)
-    score = float((slope * (y - psi) / (psi * (1.0 - psi)) * time).sum())
-    return score, float((information * time**2).sum())
 
 
 FEWEST: Final = 3

@@ -181,7 +181,7 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
     first: ObserverAnswers | None = None
     for _ in range(0, OBSERVERS, AT_ONCE):
         check()
-        answered = plan.answers(np.full(AT_ONCE, u), random, (Person(lapse=lapses),))
+        answered = plan.answers(np.full(AT_ONCE, u), random, (_lapsing(plan, lapses),))
         medians.append(plan.estimates(answered).medians)
         presented += [one.levels[~np.isnan(one.levels)] for one in answered.tracks]
         if first is None:
@@ -207,6 +207,11 @@ def observe(plan: ThresholdPlan, threshold: float, lapses: float, check: Check =
     )
 
 
+def _lapsing(plan: ThresholdPlan, lapses: float) -> Person:
+    """Return who lapses at a rate: of answers at random some are correct."""
+    return Person(lapse=lapses / Person(lapse=1.0).wrong(len(plan.design.answers)))
+
+
 def measurable(
     plan: ThresholdPlan, lapses: float, least: float, check: Check = unchecked, most: float = math.inf
 ) -> Measurable:
@@ -224,7 +229,7 @@ def measurable(
         levels, held = [], []
         for _ in range(0, OBSERVERS, AT_ONCE):
             check()
-            answered = plan.answers(np.full(AT_ONCE, u), random, (Person(lapse=lapses),))
+            answered = plan.answers(np.full(AT_ONCE, u), random, (_lapsing(plan, lapses),))
             estimates = plan.estimates(answered)
             levels += [stimulus.level_of(one) for one in estimates.medians.tolist()]
             held.append((estimates.lows <= u) & (u <= estimates.highs))

@@ -33,10 +33,11 @@ from study_app.protocol.trials.tracks import (
     tracks_of,
 )
 from study_app.psychophysics.adaptive import Answers, Observers
-from study_app.psychophysics.detection import NORMAL, PASSES, fit_preferring, preferences, rating
+from study_app.psychophysics.detection import NORMAL, rating
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.grid import Z_95, Posterior, fit, group_widths
+from study_app.psychophysics.grid import Z_95, Posterior, group_widths
 from study_app.psychophysics.people import ALONE, ASSUMED, ESTIMATE_NOISE, KINDS, Estimates, Expected, Person
+from study_app.psychophysics.person_fit import fit_person
 
 D_PRIME: Final = 1.0
 """Of simulated participants. [choice]"""
@@ -173,7 +174,9 @@ def expected_mean(plan: MeanPlan) -> Expected:
     """Return how precise the d′, d_a or exponent of one participant, and their mean, are expected to be."""
     found = plan.estimates(np.full(MEAN_OBSERVERS, plan.value), np.random.default_rng(SEED))
     spread = float(found.std())
-    return Expected("linear", plan.trials, standards=1, halves={"": Z_95 * spread}, spread=spread, threshold=plan.value)
+    return Expected(
+        "linear", plan.trials, standards=1, halves={"": [Z_95 * spread]}, spread=spread, threshold=plan.value
+    )
 
 
 OBSERVERS: Final = 200
@@ -194,16 +197,15 @@ MOST_TRIALS: Final = 200
 
 @dataclass(frozen=True, eq=False)
 class ObserverAnswers:
-    """What observers answered in a block, one each: the ``tracks`` of one standard, and counts of other answers.
+    """What observers answered in a block, one each: the ``tracks`` of one standard, and other trials.
 
-    ``catch`` are answers to catch trials, which present the highest level, ``noise`` (2, observers) successes and
-    failures where the standard alone was presented, None where it never was.
+    ``catch`` trials present the highest level, ``noise`` trials the standard alone.
     """
 
     observers: Observers
     tracks: tuple[Answers, ...]
     catch: Answers
-    noise: Floats | None
+    noise: Answers
 
 
 @dataclass(frozen=True)
@@ -281,8 +283,9 @@ class ThresholdPlan:
         """Return what observers with thresholds (n,) [u] answer: ``people``, one for each or one for all."""
         stimulus, design = self.stimulus, self.design
         assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
-        columns = np.array([(it.width, it.lapse, it.change, it.criterion, it.repeats) for it in people]).T
-        width, lapse, change, *preferred = columns if len(people) > 1 else columns[:, 0]
+        answers = len(design.answers)
+        columns = np.array([(it.wrong(answers), it.width, it.change, it.criterion, it.repeats) for it in people]).T
+        lapse, width, change, *preferred = columns if len(people) > 1 else columns[:, 0]
         if guess is None:
             guess = lapse if guesses_of(stimulus, design) is None else FALSE_ALARMS
         presented = None if self.clipping is None else self.presented
@@ -291,7 +294,7 @@ class ThresholdPlan:
             assumed.family, thresholds, assumed.width_prior[0] * width, guess, lapse, presented, moves, *preferred
         )
         noise_trials, high = design.noise(self.method.presentations(stimulus)), stimulus.domain[1]
-        tracks, yes = [], np.zeros(len(thresholds))
+        tracks, yes = [], [np.zeros((len(thresholds), 0), bool)]
         for number in range(1, self.method.tracks + 1):
             noise = random.random((len(thresholds), noise_trials)) if noise_trials else None
             if np.any(preferred) and self.two_intervals:
@@ -299,43 +302,29 @@ class ThresholdPlan:
                 towards = random.permuted(np.tile((1.0, -1.0), (len(thresholds), (trials + 1) // 2)), axis=1)
                 observers = replace(observers, towards=towards[:, :trials])
             tracks.append(self.method.simulated(TrackSetting(stimulus, design, number), observers, random, noise))
-            yes += 0 if noise is None else (noise < guess).sum(axis=1)
+            yes += [] if noise is None else [noise < np.reshape(guess, (-1, 1))]
         caught = observers.probability(high) > random.random((self.catch * len(tracks), len(thresholds)))
-        none = np.zeros(caught.T.shape)
-        return ObserverAnswers(
-            observers, tuple(tracks), Answers(none + high, caught.T, none, none),
-            np.array([yes, noise_trials * len(tracks) - yes]) if noise_trials else None,
-        )  # fmt: skip
+
+        def evenly_spread(level: float, successes: NDArray[np.bool_]) -> Answers:
+            none = np.zeros(successes.shape)
+            return Answers(none + level, successes, none, none, none + 0.5)
+
+        catch, noises = evenly_spread(high, caught.T), evenly_spread(stimulus.coordinate(0.0), np.concatenate(yes, 1))
+        return ObserverAnswers(observers, tuple(tracks), catch, noises)
 
     def fits(self, answered: ObserverAnswers, most: int | None = None) -> list[Posterior]:
-        """Return what answers say about each observer, all widths being equally likely.
+        """Return what answers say about each observer, all widths being equally likely, as in the report.
 
-        Of each track the first ``most`` are taken, if that is given, without catch trials. Preferences are removed as
-        in the report, where anybody has any.
+        Of each track the first ``most`` are taken, if that is given, without catch trials.
         """
-        stimulus, tracks = self.stimulus, answered.tracks if most else (*answered.tracks, answered.catch)
-        high = stimulus.domain[1]
-        levels, successes, towards, before = (
-            np.concatenate(it, axis=1) for it in zip(*(one.first(most) for one in tracks), strict=True)
-        )
-        answers = Answers(levels, successes, towards, before)
+        low, high = self.stimulus.domain
+        parts = [*(one.first(most) for one in answered.tracks), answered.noise, *([] if most else [answered.catch])]
+        answers = Answers(*(np.concatenate(it, axis=1) for it in zip(*parts, strict=True)))
         presented = np.unique(answers.levels[~np.isnan(answers.levels)])
         if len(presented) > OBSERVERS:
-            presented = np.linspace(*stimulus.domain, OBSERVERS)
-        places = np.append(presented[presented < high], high)
-        counts = np.array(answers.counts(places.tolist()))
-        if answered.noise is not None:
-            counts = np.concatenate((answered.noise[:, :, None], counts), axis=2)
-            places = np.append(stimulus.coordinate(0.0), places)
-        grid = analysis_grid(stimulus, self.design, self.method.assumed(stimulus, self.design))
-        flat = replace(grid, width_prior=None)
-        fits = [fit(places, right, wrong, flat) for right, wrong in counts.transpose(1, 0, 2)]
-        if towards.any():
-            at, known = answers.nearest(places.tolist()), ~np.isnan(levels)
-            for one, own in enumerate(known):
-                given = successes[one, own], towards[one, own], before[one, own]
-                fits[one] = _without_preferences(fits[one], places, at[one, own], given, grid.prior[0, :, 0, 0])
-        return [replace(one, grid=grid) for one in fits]
+            presented = np.append(presented[presented < low], np.linspace(low, high, OBSERVERS))
+        grid = analysis_grid(self.stimulus, self.design, self.method.assumed(self.stimulus, self.design))
+        return [fit_person(it, grid, two_intervals=self.two_intervals).flat for it in answers.given(presented)]
 
     def estimates(self, answered: ObserverAnswers, most: int | None = None, together: int = PEOPLE) -> Estimates:
         """Return what the analysis estimates from answers; see `fits` and `grouped`."""
@@ -359,30 +348,6 @@ class ThresholdPlan:
     ) -> Estimates:
         """Return what the analysis estimates of observers with these thresholds [u], as in `answers`."""
         return self.estimates(self.answers(thresholds, random, people), together=together)
-
-
-def _without_preferences(
-    found: Posterior,
-    places: Floats,
-    at: NDArray[np.int64],
-    given: tuple[NDArray[np.bool_], Floats, Floats],
-    widths: Floats,
-) -> Posterior:
-    """Return the fit of one observer's answers at ``places[at]``, of which ``found`` is the one with preferences.
-
-    ``given`` are successes, and the answers that are correct and those before; ``widths`` is the prior of the width.
-    Preferences are rounded, so that observers have tables in common.
-    """
-    with_them, (successes, towards, before) = found, given
-    for _ in range(PASSES):
-        moved = preferences(towards, successes, before, found.with_widths(widths), places[at])
-        shifts, of_each = np.unique(np.round(moved, 1), return_inverse=True)
-        if not shifts.any():
-            return with_them
-        cells, shape = of_each * len(places) + at, len(shifts) * len(places)
-        right, wrong = (np.bincount(cells, one, shape) for one in (successes, ~successes))
-        found = fit_preferring(np.tile(places, len(shifts)), right, wrong, np.repeat(shifts, len(places)), found.grid)
-    return found
 
 
 def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
@@ -424,7 +389,7 @@ def expected(plan: ThresholdPlan) -> Expected:
         ends = ((found.highs - found.lows) / 2).reshape(len(kinds), -1)[:, full]
         errors = (found.medians - truth).reshape(len(kinds), -1)[:, full]
         measured = full.mean() > 0.5
-        halves.append(ends.mean(axis=1) if measured else np.full(len(kinds), math.inf))
+        halves.append(ends if measured else np.full((len(kinds), 1), math.inf))
         variances.append(float(errors.var()) if measured else math.inf)
         shared.append(together * float(found.shared.mean()))
     shrunk = (simulated.trials / plan.trials) ** 0.5
@@ -432,7 +397,7 @@ def expected(plan: ThresholdPlan) -> Expected:
         spacing=plan.stimulus.spacing,
         trials=plan.trials,
         standards=plan.standards,
-        halves=dict(zip(kinds, (shrunk * np.mean(halves, axis=0)).tolist(), strict=True)),
+        halves=dict(zip(kinds, (shrunk * np.concatenate(halves, axis=1)).tolist(), strict=True)),
         spread=shrunk * (sum(variances) / len(variances)) ** 0.5,
         threshold=plan.stimulus.level_of(float(np.median(own))),
         shared=shrunk**2 * sum(shared) / len(shared),

@@ -311,6 +311,7 @@ def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, session_
         lapse_prior=ANALYSIS_LAPSE_PRIOR,
         guesses=guesses_of(stimulus, design),
         session_sd=(session_sd, 0.0) if log else (0.0, session_sd * math.log(10)),
+        log=log,
     )
 
 

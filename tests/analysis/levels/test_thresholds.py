@@ -8,14 +8,18 @@ import pandas as pd
 import pytest
 from scipy.stats import norm
 
-from study_app.analysis.levels.thresholds import counts_of, thresholds
+from study_app.analysis.levels.thresholds import given_by, thresholds
 from study_app.analysis.statistics.thresholds import group_mean, p_of_fit
 from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.methods import QuestPlus, TrackSetting, TrialResult, UpDown
-from study_app.protocol.trials.stimuli import SESSION_SD, Stimulus
+from study_app.protocol.trials.stimuli import SESSION_SD, Stimulus, analysis_grid, assumed_for
 from study_app.psychophysics.families import rise, success
+from study_app.psychophysics.grid import fit
+from study_app.psychophysics.person_fit import fit_person
 from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, arranged, block, rows
+
+GRID = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")))
 
 
 def test_planted_thresholds_are_found_per_participant_and_for_the_group() -> None:
@@ -82,7 +86,7 @@ def test_levels_that_are_evenly_spaced_have_widths_and_thresholds_in_their_unit(
 
 def test_a_level_that_was_not_measured_counts_as_requested() -> None:
     one = rows({"P001": 0.2}).assign(level_delivered=pd.NA).astype({"level_delivered": "Float64"})
-    assert counts_of(STIMULUS, one).levels == pytest.approx([math.log10(level) for level in LEVELS])
+    assert given_by(STIMULUS, one.assign(towards=0.0, before=0.0)).levels == pytest.approx(np.log10(LEVELS))
 
 
 def test_noise_trials_determine_the_guess_rate_of_yes_no() -> None:
@@ -108,9 +112,8 @@ def test_family_and_prior_on_the_width_are_those_that_questplus_states() -> None
     _, logistic = thresholds(replace(block(), method=QuestPlus(family="logistic")), plain)
     u = [math.log10(level) for level in LEVELS]
     psi = success("logistic", u, math.log10(logistic.threshold), logistic.width or 0, 0.5, logistic.lapse or 0)
-    counts = counts_of(STIMULUS, plain)
-    answers = counts.successes + counts.failures
-    assert logistic.fit_p == pytest.approx(p_of_fit(counts.successes, answers, psi), abs=1e-9)
+    successes, answers = (plain.groupby("level")["success"].agg(what) for what in ("sum", "count"))
+    assert logistic.fit_p == pytest.approx(p_of_fit(successes, answers, psi), abs=1e-9)
     _, wide = thresholds(replace(block(), method=QuestPlus(width_prior=(3.5, 1.05))), plain)
     assert wide.width == pytest.approx(3.5, rel=0.1)
     _, narrow = thresholds(replace(block(), method=QuestPlus(widths=(0.1, 0.3), width_prior=(0.2, 1.05))), plain)
@@ -151,10 +154,13 @@ def test_a_threshold_that_changes_is_named_with_its_size_and_widens_the_interval
     assert one.change == pytest.approx(-0.75, abs=0.15)
     assert (other.drifts, other.change) == (False, 0.0)
     assert math.log(one.high / one.low) > 1.3 * math.log(other.high / other.low)
-    moved = counts_of(STIMULUS, learns).steadied(learns["success"].to_numpy(dtype=bool), -0.6)
-    in_middle = np.log10(learns["level"]) + np.repeat([-0.15, 0.15], len(learns) // 2)  # a fallen threshold: easier
-    assert moved.levels[moved.places] == pytest.approx(in_middle)
-    assert moved.successes.sum() == learns["success"].sum()
+    found = fit_person(given_by(STIMULUS, learns.assign(towards=0.0, before=0.0)), GRID, two_intervals=False)
+    assert found.change == pytest.approx(math.log10(1 + one.change), abs=0.02)
+    in_middle = np.log10(levels) + np.repeat([found.change / 4, -found.change / 4], len(levels) // 2)  # then easier
+    right = learns["success"].to_numpy(dtype=float)
+    moved = fit(in_middle, right, 1.0 - right, replace(GRID, width_prior=None))
+    assert found.flat.threshold == pytest.approx(moved.threshold, abs=1e-3)
+    assert found.flat.variance == pytest.approx(moved.variance + found.change**2 / 12, rel=0.01)
 
 
 @pytest.mark.parametrize(("criterion", "repeats"), [(0.0, 0.0), (0.6, 0.0), (0.0, 0.6)])

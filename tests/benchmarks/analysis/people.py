@@ -19,11 +19,12 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.levels.thresholds import fit_answers
+from study_app.analysis.levels.thresholds import given_by
 from study_app.analysis.planning.power_curves import interval
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, assumed_for
 from study_app.psychophysics.grid import Grid, Posterior
+from study_app.psychophysics.person_fit import fit_person
 
 DATA = Path(__file__).parents[2] / "data" / "serial_decision.csv.gz"
 PIECE = 200
@@ -60,7 +61,8 @@ def fitted(own: pd.DataFrame, correct: np.ndarray, stimulus: Stimulus, grid: Gri
     rows = pd.DataFrame({"level": own["stimulus"], "success": correct, "towards": towards})
     before = np.concatenate(([0.0], np.where(correct, towards, -towards)[:-1]))
     rows = rows.assign(level_delivered=rows["level"], before=before)
-    return fit_answers(stimulus, rows, grid, two_intervals=True)[1].fit(grid)
+    found = fit_person(given_by(stimulus, rows), grid, two_intervals=True).flat
+    return found.with_widths(grid.prior[0, :, 0, 0])
 
 
 def pairs(trials: pd.DataFrame, size: int, draw: np.random.Generator | None = None) -> Iterator[Pair]:

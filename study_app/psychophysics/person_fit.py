@@ -1,0 +1,229 @@
+"""The fit to the answers of one person, without preferences for an answer and without the change over the trials.
+
+A preference for one of two intervals, or for the last answer, and a threshold that changes make answers worse than they
+would be at the same threshold in its middle. Both are estimated from the answers, and the posterior is that without
+them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from study_app.psychophysics.families import CLIP, Floats, erfc, success
+from study_app.psychophysics.grid import Grid, Posterior, Values, log_likelihood, posterior, tables
+
+PREFERENCE_SD: Final = 1.0
+"""Standard deviation of preferences between people [SD of the decision]. [choice]"""
+CHANGE_PRIOR: Final = 1.5
+"""Factor by which a threshold changes from the first trial to the last (one standard deviation). [choice]"""
+BEYOND_CHANCE: Final = 2.0
+"""A preference, and a change that is named, is one from so many standard errors on."""
+PREFERENCE_STEP: Final = 0.1
+"""Preferences are rounded to so much [SD of the decision], so that people have tables in common."""
+PASSES: Final = 2
+"""Fits after which preferences are estimated: the first threshold is too high."""
+NEWTON_STEPS: Final = 10
+STEP: Final = 0.01
+"""By so many widths a threshold is moved to differentiate the function."""
+
+
+class Given(NamedTuple):
+    """The answers of one person.
+
+    Attributes
+    ----------
+    levels : (k,) array
+        The levels presented, ascending, in the coordinate u.
+    places : (n,) array
+        Of each trial the index of its level.
+    successes : (n,) array of bool
+        Whether answers are successes.
+    towards, before : (n,) array
+        The correct answer, and the one before: 1 the first of two intervals, −1 the second, 0 none of them.
+    done : (n,) array
+        The share of the trials that is done, from 0 to 1.
+    """
+
+    levels: Floats
+    places: NDArray[np.int64]
+    successes: NDArray[np.bool_]
+    towards: Floats
+    before: Floats
+    done: Floats
+
+    def first(self, n: int) -> Given:
+        """Return the first n answers."""
+        levels, places, successes, *others = self
+        return Given(levels, places[:n], successes[:n], *(one[:n] for one in others))
+
+
+@dataclass(frozen=True, slots=True)
+class PersonFit:
+    """What the answers of a person say.
+
+    Attributes
+    ----------
+    given : Given
+        The answers.
+    shifts : (n,) array
+        How far a preference moves each decision towards the correct answer [SD].
+    change : float
+        By how much the threshold rises from the first trial to the last, in u: the most probable change.
+    named : bool
+        Whether the change is beyond chance: the threshold is then uncertain by the standard deviation of one that
+        changes evenly, in addition to how far it is from one session to the next.
+    flat : Posterior
+        Without both, under a flat prior on the width; its grid has the prior of the width.
+    """
+
+    given: Given
+    shifts: Floats
+    change: float
+    named: bool
+    flat: Posterior
+
+    def expected(self, found: Posterior) -> Floats:
+        """Return the share of successes that the function through all medians expects in each trial, (n,)."""
+        psi, rates = found.success(self.given.levels), found.others
+        return preferred(psi[self.given.places], rates[2], self.shifts)
+
+    def after(self, n: int) -> Posterior:
+        """Return what the first n answers say, where preferences and change are those of all, as ``flat``."""
+        grid = self.flat.grid
+        return _posterior(_likelihoods(self.given.first(n), self.shifts[:n], grid), self.change, grid)
+
+
+def fit_person(given: Given, grid: Grid, *, two_intervals: bool) -> PersonFit:
+    """Return the fit to the answers of one person.
+
+    Parameters
+    ----------
+    given : Given
+        The answers.
+    grid : Grid
+        The cells and their prior.
+    two_intervals : bool
+        Whether one of two intervals is correct, so that a person may prefer one.
+    """
+    shifts = np.zeros(len(given.places))
+    parts = _likelihoods(given, shifts, grid)
+    found = posterior(grid, np.add.reduce([*parts.values()]))
+    for _ in range(PASSES if two_intervals else 0):
+        moved = preferences(given, found)
+        if np.array_equal(moved, shifts):
+            break
+        shifts, parts = moved, _likelihoods(given, moved, grid)
+        found = posterior(grid, np.add.reduce([*parts.values()]))
+    score, information = change_score(given, found, shifts)
+    decade = 1.0 if grid.log else abs(found.threshold) * math.log(10)
+    change = score / (information + (math.log10(CHANGE_PRIOR) * decade) ** -2) if decade else 0.0
+    named, (constant, share) = score**2 > BEYOND_CHANCE**2 * information, grid.session_sd
+    if named:
+        grid = replace(grid, session_sd=(math.hypot(constant, change / math.sqrt(12)), share))
+    return PersonFit(given, shifts, change, named, _posterior(parts, change, grid))
+
+
+def _likelihoods(given: Given, shifts: Floats, grid: Grid) -> dict[float, NDArray[np.float64]]:
+    """Return the logarithm of the likelihood of the answers before (−1), at (0) and after (1) the middle trial."""
+    flat, u, k = replace(grid, width_prior=None, session_sd=(0.0, 0.0)), tuple(given.levels.tolist()), len(given.levels)
+    found, halves = dict.fromkeys((-1.0, 0.0, 1.0), np.zeros(grid.shape)), np.sign(given.done - 0.5)
+    for half, shift in {*zip(halves.tolist(), shifts.tolist(), strict=True)}:
+        at = (halves == half) & (shifts == shift)
+        right, wrong = (np.bincount(given.places[at & one], minlength=k) for one in (given.successes, ~given.successes))
+        logarithms = _moved_tables(flat, u, shift) if shift else tables(flat, u)[1:]
+        found[half] = found[half] + log_likelihood(right, wrong, *logarithms)
+    return found
+
+
+def _posterior(parts: dict[float, NDArray[np.float64]], change: float, grid: Grid) -> Posterior:
+    """Return the posterior of the threshold in the middle, if that of either half is the mean in it."""
+    cells = change / 4 / (grid.thresholds[1] - grid.thresholds[0])
+    flat = replace(grid, width_prior=None)
+    whole = np.add.reduce([_further(likelihood, half * cells) for half, likelihood in parts.items()])
+    return replace(posterior(flat, whole), grid=grid)
+
+
+def _further(values: NDArray[np.float64], cells: float) -> NDArray[np.float64]:
+    """Return the values so many thresholds further, interpolated; beyond an end that of the end."""
+    last = len(values) - 1
+    at = np.clip(np.arange(len(values)) + cells, 0, last)
+    low = np.minimum(at.astype(np.int64), last - 1)
+    share = (at - low)[:, None, None, None]
+    return np.asarray(values[low] * (1.0 - share) + values[low + 1] * share, float)
+
+
+def change_score(given: Given, found: Posterior, shifts: Floats) -> tuple[float, float]:
+    """Return score and information, at none, of a change of the threshold from first to last trial [1/u, 1/u²].
+
+    ``found`` is of these answers, as if the threshold were constant, ``shifts`` (n,) are of the decisions [SD].
+    """
+    y, u, (width, *rates) = given.successes.astype(float), given.levels, found.others
+    below, above, psi = (
+        preferred(success(found.grid.family, u, at, width, *rates)[given.places], rates[1], shifts)
+        for at in (found.threshold - STEP * width, found.threshold + STEP * width, found.threshold)
+    )
+    psi, slope = np.clip(psi, CLIP, 1.0 - CLIP), (above - below) / (2 * STEP * width)
+    information = slope**2 / (psi * (1.0 - psi))
+    if not information.any():
+        return 0.0, 0.0
+    time = given.done - np.average(given.done, weights=information)
+    return float((slope * (y - psi) / (psi * (1.0 - psi)) * time).sum()), float((information * time**2).sum())
+
+
+@cache
+def _normal_table() -> tuple[Floats, Floats]:
+    """Return z and the normal distribution function there: interpolated, it is correct to 1e-7."""
+    z = np.linspace(-8.0, 8.0, 16001)
+    return z, np.asarray(0.5 * erfc(-z / math.sqrt(2.0)), float)
+
+
+def _moved(shares: ArrayLike, shift: ArrayLike) -> Floats:
+    """Return shares of decisions, whose variable a preference moves by ``shift`` [SD]."""
+    z, of_z = _normal_table()
+    deviates = np.asarray(np.interp(np.asarray(shares, float), of_z, z), float)
+    return np.asarray(np.interp(deviates + np.asarray(shift, float), z, of_z), float)
+
+
+def preferences(given: Given, found: Posterior) -> Floats:
+    """Return how far preferences move each decision between two intervals towards the correct one (n,) [SD].
+
+    A probit regression of the answers, with what the levels contribute fixed, has the preference for the first interval
+    and that for the answer before as coefficients; those within `BEYOND_CHANCE` standard errors count as none.
+    ``found`` is the posterior of these answers.
+    """
+    (z, of_z), first, lapse = _normal_table(), given.towards, found.others[2]
+    unbiased = ((found.success(given.levels) - lapse) / (1.0 - 2.0 * lapse))[given.places]
+    sensed, said = first * np.interp(np.clip(unbiased, 0.5, 0.999), of_z, z), np.where(given.successes, first, -first)
+    causes, weights = np.column_stack([np.abs(first), given.before]), np.zeros(2)
+    for _ in range(NEWTON_STEPS):
+        agreed = said * (sensed + causes @ weights)
+        hazard = np.exp(-0.5 * agreed**2) / (math.sqrt(2 * math.pi) * np.interp(agreed, z, of_z))
+        information = (causes.T * (hazard * (hazard + agreed))) @ causes + np.eye(2) / PREFERENCE_SD**2
+        weights += np.linalg.solve(information, causes.T @ (said * hazard) - weights / PREFERENCE_SD**2)
+    errors = np.sqrt(np.diag(np.linalg.inv(information)))
+    weights = np.where(np.abs(weights) > BEYOND_CHANCE * errors, weights, 0.0)
+    return np.asarray(first * np.round(causes @ weights / PREFERENCE_STEP) * PREFERENCE_STEP + 0.0, float)
+
+
+def preferred(psi: ArrayLike, lapse: ArrayLike, shift: ArrayLike) -> Floats:
+    """Return ψ of two intervals where a preference moves the decision by ``shift`` towards the correct one [SD]."""
+    psi, lapse = np.asarray(psi, float), np.asarray(lapse, float)
+    if not np.any(shift):
+        return psi
+    unbiased = np.clip((psi - lapse) / (1.0 - 2.0 * lapse), CLIP, 1.0 - CLIP)
+    return np.asarray(np.clip(lapse + (1.0 - 2.0 * lapse) * _moved(unbiased, shift), CLIP, 1.0 - CLIP), float)
+
+
+@lru_cache(maxsize=32)
+def _moved_tables(grid: Grid, levels: Values, shift: float) -> tuple[Floats, Floats]:
+    """Return log ψ and log(1 − ψ) at each level in each cell, of two intervals: the guess rate is one half."""
+    unbiased = replace(grid, lapses=(0.0,), lapse_prior=(1.0,)).success(levels)
+    lapses = np.array(grid.lapses)[:, None]
+    psi = np.clip(lapses + (1.0 - 2.0 * lapses) * _moved(unbiased, shift), CLIP, 1.0 - CLIP)
+    return np.log(psi), np.log1p(-psi)

@@ -1,0 +1,52 @@
+"""Levels of liquids with inertia in the motion of a target that is followed: whether the safety layer delivers them.
+
+Added mass and history return energy to the hand, which the safety layer permits in part: no force of a uniform motion
+tells how much.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.runtime.offline import samples_along
+from study_app.protocol.model import Follow, Protocol
+from study_app.protocol.trials.presented_levels import ends
+from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulated
+from study_app.protocol.trials.tracks import condition_of, stimulus_of
+from study_app.store.delivered import delivered, judged, undelivered
+
+INERTIAL = {effect.name for effect in EFFECTS if effect.damping_nspm is not None}
+
+
+def undelivered_levels(protocol: Protocol) -> Iterator[str]:
+    """Yield a sentence for each stimulus of which an end of the levels would be presented again and again."""
+    for block in protocol.blocks.values():
+        task, where = protocol.tasks[block.task], f"stimuli.{block.stimulus}.levels"
+        if block.stimulus is None or not isinstance(task, Follow):
+            continue
+        stimulus = stimulus_of(protocol, block)
+        if stimulus.vary in OF_CONDITION:
+            continue
+        t_s = np.arange(round(task.limit_s * protocol.device.rate_hz)) / protocol.device.rate_hz
+        motion, shares = Motion(t_s, np.array([task.target_m(one) for one in t_s.tolist()])), dict[str, float]()
+        for standard, level, scene in ends(protocol, block):
+            if not any(INERTIAL & set(liquid.effects) for liquid in resolve(scene).liquids):
+                continue
+            presented = Stimulated(
+                condition_of(protocol, stimulus), stimulus.vary, stimulus.comparison(standard, level)
+            )
+            samples = judged(samples_along(scene, motion))
+            samples["time_ns"] = np.rint(1e9 * t_s)
+            found = delivered(protocol, presented, task, samples)
+            if [*undelivered(protocol.limits, presented, task, found)]:
+                shares[f"{level:.3g}"] = found.force_share or 0.0
+        if shares:
+            yield (
+                f"{where}: a hand that follows the target is sent {min(shares.values()):.0%} of the force at level "
+                f"{' and '.join(shares)}: the liquid returns energy, which the safety layer removes: such trials are "
+                "repeated, and stay unanswered: choose a smaller scene.scale, or effects without added_mass, history "
+                "and unsteady_drag"
+            )
