@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
+from study_app.cli import commands
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume
 from study_app.store.blinded.blinding import opened, read_key
@@ -119,3 +121,28 @@ def test_a_session_ended_between_two_attempts_goes_on_to_the_same_answers(sessio
     assert outcomes(again) == outcomes(whole)
     assert answers(again) == answers(whole)
     assert reproduced(session).differences == []
+
+
+INERTIA = """
+format = 2
+study.name = "inertia"
+scene.scale = {scale}
+liquids.goo = {{ density_kg_m3 = 1200, viscosity_pa_s = 1.0, effects = ["unsteady_drag"] }}
+tasks.stir.kind = "follow"
+stimuli.viscosity = {{ vary = "viscosity_pa_s", levels = [0.02, 0.6] }}
+blocks.thicker = {{ stimulus = "viscosity", design = "2ifc", method = "m" }}
+methods.m = {{ kind = "questplus", trials = 2 }}
+"""
+
+
+@pytest.mark.parametrize(("scale", "notes"), [(3, 0), (4, 1)])
+def test_check_notes_levels_of_a_liquid_with_inertia_that_a_rehearsal_does_not_deliver(
+    scale: int, notes: int, tmp_path: Path
+) -> None:
+    file = tmp_path / "inertia.toml"
+    file.write_text(INERTIA.format(scale=scale), encoding="utf-8")
+    said = CliRunner().invoke(commands, ["check", str(file)]).output
+    assert said.count("sent 94% of the force at level 0.6 and 0.02") == notes
+    study = rehearse(file, participants=1, seed=1, results=tmp_path / "results")
+    valid = {row["valid"] for row in rows_of(StudyFolder(study).sessions()[0].path, "trials")}
+    assert valid == {"false" if notes else "true"}
