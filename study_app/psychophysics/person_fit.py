@@ -62,6 +62,33 @@ class Given(NamedTuple):
         levels, places, successes, *others = self
         return Given(levels, places[:n], successes[:n], *(one[:n] for one in others))
 
+    def fit(self, grid: Grid, *, two_intervals: bool) -> PersonFit:
+        """Return the fit to the answers.
+
+        Parameters
+        ----------
+        grid : Grid
+            The cells and their prior.
+        two_intervals : bool
+            Whether one of two intervals is correct, so that a person may prefer one.
+        """
+        shifts = np.zeros(len(self.places))
+        parts = _likelihoods(self, shifts, grid)
+        found = posterior(grid, np.add.reduce([*parts.values()]))
+        for _ in range(PASSES if two_intervals else 0):
+            moved = preferences(self, found)
+            if np.array_equal(moved, shifts):
+                break
+            shifts, parts = moved, _likelihoods(self, moved, grid)
+            found = posterior(grid, np.add.reduce([*parts.values()]))
+        score, information = change_score(self, found, shifts)
+        decade = 1.0 if grid.log else abs(found.threshold) * math.log(10)
+        change = score / (information + (math.log10(CHANGE_PRIOR) * decade) ** -2) if decade else 0.0
+        named, (constant, share) = score**2 > BEYOND_CHANCE**2 * information, grid.session_sd
+        if named:
+            grid = replace(grid, session_sd=(math.hypot(constant, change / math.sqrt(12)), share))
+        return PersonFit(self, shifts, change, named, _posterior(parts, change, grid))
+
 
 @dataclass(frozen=True, slots=True)
 class PersonFit:
@@ -97,36 +124,6 @@ class PersonFit:
         """Return what the first n answers say, where preferences and change are those of all, as ``flat``."""
         grid = self.flat.grid
         return _posterior(_likelihoods(self.given.first(n), self.shifts[:n], grid), self.change, grid)
-
-
-def fit_person(given: Given, grid: Grid, *, two_intervals: bool) -> PersonFit:
-    """Return the fit to the answers of one person.
-
-    Parameters
-    ----------
-    given : Given
-        The answers.
-    grid : Grid
-        The cells and their prior.
-    two_intervals : bool
-        Whether one of two intervals is correct, so that a person may prefer one.
-    """
-    shifts = np.zeros(len(given.places))
-    parts = _likelihoods(given, shifts, grid)
-    found = posterior(grid, np.add.reduce([*parts.values()]))
-    for _ in range(PASSES if two_intervals else 0):
-        moved = preferences(given, found)
-        if np.array_equal(moved, shifts):
-            break
-        shifts, parts = moved, _likelihoods(given, moved, grid)
-        found = posterior(grid, np.add.reduce([*parts.values()]))
-    score, information = change_score(given, found, shifts)
-    decade = 1.0 if grid.log else abs(found.threshold) * math.log(10)
-    change = score / (information + (math.log10(CHANGE_PRIOR) * decade) ** -2) if decade else 0.0
-    named, (constant, share) = score**2 > BEYOND_CHANCE**2 * information, grid.session_sd
-    if named:
-        grid = replace(grid, session_sd=(math.hypot(constant, change / math.sqrt(12)), share))
-    return PersonFit(given, shifts, change, named, _posterior(parts, change, grid))
 
 
 def _likelihoods(given: Given, shifts: Floats, grid: Grid) -> dict[float, NDArray[np.float64]]:

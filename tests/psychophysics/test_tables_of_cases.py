@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.psychophysics import adaptive, delivery, detection, families, grid, people, person_fit
+from study_app.psychophysics import adaptive, delivery, detection, families, grid, people
 from tests.golden import compare
 from tests.golden_values import one_line as told
 
@@ -76,10 +76,8 @@ def lines() -> Iterator[str]:
     prefers = replace(observers, criterion=2.5, repeats=0.4, towards=np.tile((1.0, -1.0), (2, 6)))
     yield f"prefers: {told(found := adaptive.search_tracks(search, prefers, draws))}"
     _, given = found.given(np.array(LEVELS))
-    yield f"  {told(person_fit.preferences(given, grid.fit(LEVELS, RIGHT, WRONG, SMALL)))}"
-    yield f"  {told(person_fit.preferred(given.successes, 0.05, (-0.5, 0.5) * 6))}"
     for one in (SMALL, replace(SMALL, log=False, session_sd=(0.0, 0.1))):
-        fitted = person_fit.fit_person(given, one, two_intervals=True)
+        fitted = given.fit(one, two_intervals=True)
         yield f"  {told(fitted.shifts)} {fitted.change:.7g} {fitted.named} {told(fitted.flat.marginal)}"
         yield f"  {told(fitted.expected(fitted.flat))} {told(fitted.after(5).marginal)}"
     yield from of_delivery()

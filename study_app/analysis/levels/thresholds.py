@@ -42,7 +42,7 @@ from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
 from study_app.psychophysics.grid import ALIKE, Posterior, group_widths
-from study_app.psychophysics.person_fit import BEYOND_CHANCE, CHANGE_PRIOR, Given, PersonFit, fit_person
+from study_app.psychophysics.person_fit import BEYOND_CHANCE, CHANGE_PRIOR, Given, PersonFit
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
 WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
@@ -185,7 +185,7 @@ def _fits(
     for person, own in rows.groupby("participant"):
         grid = analysis_grid(stimulus, block.design, assumed, SESSION_SD / math.sqrt(own["session"].nunique()))
         people.append((person, own))
-        fits.append(fit_person(given_by(stimulus, own), grid, two_intervals=two))
+        fits.append(given_by(stimulus, own).fit(grid, two_intervals=two))
     priors, shared = group_widths([one.flat for one in fits], assumed.width_prior) if fits else ((), 0.0)
     return [FittedPerson(*who, *it) for who, *it in zip(people, fits, priors, strict=True)], shared
 

@@ -37,7 +37,6 @@ from study_app.psychophysics.detection import NORMAL, rating
 from study_app.psychophysics.families import Floats
 from study_app.psychophysics.grid import Z_95, Posterior, group_widths
 from study_app.psychophysics.people import ALONE, ASSUMED, ESTIMATE_NOISE, KINDS, Estimates, Expected, Person
-from study_app.psychophysics.person_fit import fit_person
 
 D_PRIME: Final = 1.0
 """Of simulated participants. [choice]"""
@@ -324,7 +323,7 @@ class ThresholdPlan:
         if len(presented) > OBSERVERS:
             presented = np.append(presented[presented < low], np.linspace(low, high, OBSERVERS))
         grid = analysis_grid(self.stimulus, self.design, self.method.assumed(self.stimulus, self.design))
-        return [fit_person(it, grid, two_intervals=self.two_intervals).flat for it in answers.given(presented)]
+        return [it.fit(grid, two_intervals=self.two_intervals).flat for it in answers.given(presented)]
 
     def estimates(self, answered: ObserverAnswers, most: int | None = None, together: int = PEOPLE) -> Estimates:
         """Return what the analysis estimates from answers; see `fits` and `grouped`."""

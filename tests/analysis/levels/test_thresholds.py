@@ -16,7 +16,6 @@ from study_app.protocol.trials.methods import QuestPlus, TrackSetting, TrialResu
 from study_app.protocol.trials.stimuli import SESSION_SD, Stimulus, analysis_grid, assumed_for
 from study_app.psychophysics.families import rise, success
 from study_app.psychophysics.grid import fit
-from study_app.psychophysics.person_fit import fit_person
 from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, arranged, block, rows
 
 GRID = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")))
@@ -154,7 +153,7 @@ def test_a_threshold_that_changes_is_named_with_its_size_and_widens_the_interval
     assert one.change == pytest.approx(-0.75, abs=0.15)
     assert (other.drifts, other.change) == (False, 0.0)
     assert math.log(one.high / one.low) > 1.3 * math.log(other.high / other.low)
-    found = fit_person(given_by(STIMULUS, learns.assign(towards=0.0, before=0.0)), GRID, two_intervals=False)
+    found = given_by(STIMULUS, learns.assign(towards=0.0, before=0.0)).fit(GRID, two_intervals=False)
     assert found.change == pytest.approx(math.log10(1 + one.change), abs=0.02)
     in_middle = np.log10(levels) + np.repeat([found.change / 4, -found.change / 4], len(levels) // 2)  # then easier
     right = learns["success"].to_numpy(dtype=float)

@@ -24,7 +24,6 @@ from study_app.analysis.planning.power_curves import interval
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, assumed_for
 from study_app.psychophysics.grid import Grid, Posterior
-from study_app.psychophysics.person_fit import fit_person
 
 DATA = Path(__file__).parents[2] / "data" / "serial_decision.csv.gz"
 PIECE = 200
@@ -61,8 +60,7 @@ def fitted(own: pd.DataFrame, correct: np.ndarray, stimulus: Stimulus, grid: Gri
     rows = pd.DataFrame({"level": own["stimulus"], "success": correct, "towards": towards})
     before = np.concatenate(([0.0], np.where(correct, towards, -towards)[:-1]))
     rows = rows.assign(level_delivered=rows["level"], before=before)
-    found = fit_person(given_by(stimulus, rows), grid, two_intervals=True).flat
-    return found.with_widths(grid.prior[0, :, 0, 0])
+    return given_by(stimulus, rows).fit(grid, two_intervals=True).flat.with_widths(grid.prior[0, :, 0, 0])
 
 
 def pairs(trials: pd.DataFrame, size: int, draw: np.random.Generator | None = None) -> Iterator[Pair]:
