@@ -2,7 +2,6 @@
 
 import socket
 import threading
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,10 +17,10 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 from tests.compiled import needs_servo
 from tests.devices.inverse3.server import ServiceServer
+from tests.devices.subjects import PATIENCE_S, until
 from tests.strangers import http_answer, serving
 
 pytestmark = [needs_servo, pytest.mark.slow]
-ENOUGH_S = 20.0
 
 
 @pytest.fixture
@@ -33,17 +32,6 @@ def service() -> Service:
 def server(service: Service) -> Iterator[ServiceServer]:
     with ServiceServer(service) as serving:
         yield serving
-
-
-def until(condition: object, seconds: float = ENOUGH_S) -> bool:
-    """Wait until a condition holds; return whether it did."""
-    end = time.monotonic() + seconds
-    waiting = threading.Event()
-    while not condition():  # type: ignore[operator]
-        if time.monotonic() > end:
-            return False
-        waiting.wait(0.002)
-    return True
 
 
 def moved_by(service: Service) -> bool:
@@ -58,24 +46,24 @@ def test_a_servo_reads_positions_and_sends_forces_and_ends_with_zero(service: Se
         assert device.describe()["force_scale"] == 1.0
         with Servo(device) as servo:
             servo.load(load("rek2024").scene_for("honey"))
-            assert until(lambda: moved_by(service))
+            until(lambda: moved_by(service), "it does not happen")
             servo.check()
             counters = device.counters
             assert counters["fresh"] > 10
             assert counters["unasked"] == 0
-        assert until(lambda: service.force_n == (0.0, 0.0, 0.0), 1.0)
-    assert until(lambda: service.state.close_frames == 1)
+        until(lambda: service.force_n == (0.0, 0.0, 0.0), "the force stays", 1.0)
+    until(lambda: service.state.close_frames == 1, "it does not happen")
 
 
 def test_a_service_that_is_killed_in_a_stroke_ends_in_its_message(service: Service, server: ServiceServer) -> None:
     with Inverse3Device(f"127.0.0.1:{server.port}") as device, Servo(device) as servo:
         servo.load(load("rek2024").scene_for("honey"))
-        assert until(lambda: moved_by(service))
+        until(lambda: moved_by(service), "it does not happen")
         server.drop()
-        assert until(lambda: servo.fault is not None)
+        until(lambda: servo.fault is not None, "it does not happen")
         with pytest.raises(DeviceLost, match=r"closed the connection.*start Haply Hub.*the force is zero"):
             servo.check()
-        assert until(lambda: service.force_n == (0.0, 0.0, 0.0))
+        until(lambda: service.force_n == (0.0, 0.0, 0.0), "it does not happen")
 
 
 def test_closing_a_connection_with_unread_replies_does_not_reset_it() -> None:
@@ -142,11 +130,11 @@ def test_a_service_that_does_not_answer_about_its_force_scale_moves_nothing(
     answer: bytes, service: Service, server: ServiceServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     late = threading.Event()
-    monkeypatch.setattr(server, "_answer_http", lambda _head: answer or str(late.wait(ENOUGH_S)).encode())
+    monkeypatch.setattr(server, "_answer_http", lambda _head: answer or str(late.wait(PATIENCE_S)).encode())
     with pytest.raises(
         DeviceFailure, match=r"multiplier of all forces is not known \(no number within 0\.5 s\).*restart"
     ):
         Inverse3Device(f"127.0.0.1:{server.port}").open()
     late.set()
     assert service.state.pushes == 0
-    assert until(lambda: service.state.ended == 1)
+    until(lambda: service.state.ended == 1, "it does not happen")
