@@ -1,4 +1,4 @@
-"""The liquid lab: where its place, a device's servo, the edits, their cost and the estimation meet.
+"""The liquid lab: where its place, a device's servo, the edits and their cost meet.
 
 Nothing of it acts on the hand once the place is left: leaving it, closing the window, an exception in a slot or in
 painting, all end in zero force first, then the servo, then the device.
@@ -14,8 +14,6 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -29,32 +27,16 @@ from study_app.errors import StudyError
 from study_app.evidence.appraisal import AppraisalClient, Costs, Errors, Question, start_appraisal_worker
 from study_app.gui.home.startup_window import LONG_AFTER_S
 from study_app.gui.kit.devices import device_choices
-from study_app.gui.lab.lab_state import (
-    DRAG,
-    LSL,
-    OFF,
-    SOURCES,
-    WAKE,
-    CostRow,
-    DeviceShown,
-    ErrorRow,
-    EstimateRow,
-    EstimateShown,
-    LabView,
-    Now,
-)
+from study_app.gui.lab.lab_state import CostRow, DeviceShown, ErrorRow, LabView, Now
 from study_app.gui.lab.view import LabPlace
 from study_app.gui.widgets.background import Background, delayed
 from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting, Side, Workbench
-from study_app.lab.estimation.sources import available
-from study_app.lab.presets import Choice, liquids_at_hand, liquids_of, preset_text, save, spoken, use_in_study
+from study_app.lab.presets import Choice, liquids_at_hand, liquids_of, preset_text, save, spoken
 from study_app.lab.programmed_paths import TITLES
-from study_app.protocol.quantities import QUANTITIES
 
 if TYPE_CHECKING:
-    from study_app.lab.estimation.live_estimation import LiveEstimation
     from study_app.lab.live import Live
 
 SMALLEST_N = 0.001
@@ -244,15 +226,15 @@ class LabSaving(QObject):
         self.liquids = liquids
         self.said = ""
         self._before: threading.Thread | None = None
-        self._files: list[tuple[Scene, Path]] = []
         self._done.connect(self._tell, Qt.ConnectionType.QueuedConnection)
 
     def save(self, path: Path, setting: Setting) -> None:
-        self._begin(partial(self._save, path, setting), (str(path),))
-
-    def use(self, study: Path, setting: Setting) -> None:
-        """Name a setting's file in a study, after it was saved in the study's folder where it has no file yet."""
-        self._begin(partial(self._use, study, setting), ())
+        at_hand = (*(it.source for it in self.liquids), str(path))
+        # Not a pool, whose threads Python waits for at its end: a drive may never answer.
+        self._before = threading.Thread(
+            target=self._write, args=(self._before, path, setting, at_hand), name="preset", daemon=True
+        )
+        self._before.start()
 
     def open(self, path: Path) -> Choice:
         """Have the liquids of a file at hand; return the first.
@@ -264,8 +246,6 @@ class LabSaving(QObject):
         """
         found = liquids_of(str(path))
         self.liquids = (*(it for it in self.liquids if it not in found), *found)
-        if len(found) == 1:
-            self._files.insert(0, (found[0].scene, path))
         self.said = f"Opened {path.name}: {', '.join(spoken(it.liquid) for it in found)}"
         return found[0]
 
@@ -275,31 +255,15 @@ class LabSaving(QObject):
             self._before.join(patience_s)
             QCoreApplication.sendPostedEvents(self)
 
-    def _begin(self, write: Callable[[], str], more: tuple[str, ...]) -> None:
-        at_hand = (*(it.source for it in self.liquids), *more)
-        # Not a pool, whose threads Python waits for at its end: a drive may never answer.
-        self._before = threading.Thread(
-            target=self._write, args=(self._before, write, at_hand), name="preset", daemon=True
-        )
-        self._before.start()
-
-    def _write(self, before: threading.Thread | None, write: Callable[[], str], at_hand: tuple[str, ...]) -> None:
+    def _write(self, before: threading.Thread | None, path: Path, setting: Setting, at_hand: tuple[str, ...]) -> None:
         if before is not None:
             before.join()
         try:
-            found: object = write(), liquids_at_hand(saved=at_hand)
+            save(path, preset_text(setting))
+            found: object = f"Saved as {path.name} in {path.parent}", liquids_at_hand(saved=at_hand)
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             found = error
         self._done.emit(found)
-
-    def _save(self, path: Path, setting: Setting) -> str:
-        save(path, preset_text(setting))
-        self._files = [(setting.scene, path), *((scene, file) for scene, file in self._files if file != path)]
-        return f"Saved as {path.name} in {path.parent}"
-
-    def _use(self, study: Path, setting: Setting) -> str:
-        file = next((path for scene, path in self._files if scene == setting.scene and path.is_file()), None)
-        return use_in_study(study, setting, file)
 
     def _tell(self, found: Exception | tuple[str, tuple[Choice, ...]]) -> None:
         if isinstance(found, Exception):
@@ -307,147 +271,6 @@ class LabSaving(QObject):
             return
         self.said, written = found
         self.liquids = tuple(dict.fromkeys((*self.liquids, *written)))
-
-
-PREPARING: Final = "Loading the force model …"
-NAMES: Final = {DRAG: ("drag_coefficient",), WAKE: ("drag_coefficient", "length", "scaling")}
-
-
-class LabEstimation:
-    """An estimation for the lab's selected setting: `poll` with each frame, `shown` for its view, `close` to end."""
-
-    def __init__(self, lab: LabController) -> None:
-        self._lab = lab
-        self._executor: ThreadPoolExecutor | None = None
-        self._loading: Future[LiveEstimation] | None = None
-        self._wanted: tuple[str, str, Path | None] = (OFF, DRAG, None)
-        self.estimation: LiveEstimation | None = None
-        self._trouble = self._refused = ""
-        self._sources = (*SOURCES, *(LSL if available() else ()))
-
-    def poll(self) -> None:
-        """Take what was measured since, and apply what is applied continuously."""
-        if self._loading is not None and self._loading.done():
-            loading, self._loading = self._loading, None
-            self.estimation = loading.result()
-            self._begin()
-        if self.estimation is None or self._wanted[0] == OFF:
-            return
-        from study_app.lab.estimation.live_estimation import set_values  # noqa: PLC0415 - loads the compiler
-
-        values = self.estimation.poll(self._lab.live, self._lab.bench)
-        if self.estimation.trouble:
-            self._trouble = f"{self.estimation.trouble[:1].upper()}{self.estimation.trouble[1:]}"
-            self._wanted = (OFF, *self._wanted[1:])
-        elif values:
-            self._change(lambda bench: set_values(bench, values, held=True))
-
-    def close(self) -> None:
-        """Estimate nothing; a search that is under way ends by itself."""
-        self._wanted, self._trouble = (OFF, *self._wanted[1:]), ""
-        self._loading = None
-        if self.estimation is not None:
-            self.estimation.close()
-        self.estimation = None
-        executor, self._executor = self._executor, None
-        if executor is not None:
-            executor.shutdown(wait=False, cancel_futures=True)
-
-    def shown(self) -> EstimateShown:
-        source, parameters, _ = self._wanted
-        shown = EstimateShown(self._sources, source, parameters, message=self._trouble)
-        if source == OFF:
-            return shown
-        if self.estimation is None:
-            return replace(shown, message=PREPARING)
-        found = self.estimation.estimate
-        rows = tuple(
-            EstimateRow(_label(name), f"{value:.4g}", _interval(*found.intervals[name]))
-            for name, value in found.values.items()
-            if name in found.intervals
-        )
-        if found.identified:
-            share = 100 * found.rms_n / found.force_rms_n if found.force_rms_n > 0 else 0.0
-            message = f"Residual {found.rms_n:.3f} N, {share:.0f} % of the force; {found.seconds:.0f} s measured."
-        else:
-            message = f"{found.reason[:1].upper()}{found.reason[1:]}."
-        if not self.estimation.applies:
-            message += " Compared only: it is not applied."
-        elif not found.identified:
-            message += " Nothing is changed."
-        applies = self.estimation.applies and self._lab.live is not None
-        return replace(
-            shown,
-            rows=rows,
-            message=f"{message}{self._refused}",
-            sound=found.identified,
-            may_apply=applies and found.identified,
-            may_follow=applies,
-            follows=self.estimation.follows,
-        )
-
-    def do(self, what: str, *details: Any) -> None:
-        """Do what is asked for on its card."""
-        source, parameters, path = self._wanted
-        match what, *details:
-            case "source", path, source:
-                self._want(source, parameters, path)
-            case "parameters", parameters:
-                self._want(source, parameters, path)
-            case "apply", *_ if self.estimation is not None:
-                self._change(self.estimation.applied)
-            case "follow", on if self.estimation is not None:
-                self.estimation.follows = on
-
-    def _want(self, source: str, parameters: str, path: Path | None) -> None:
-        """Estimate from a source; load what that needs in the thread first."""
-        self._wanted, self._trouble, self._refused = (source, parameters, path), "", ""
-        if self.estimation is not None:
-            self._begin()
-        elif source != OFF and self._loading is None:
-            self._executor = ThreadPoolExecutor(1, thread_name_prefix="lab estimation")
-            self._loading = self._executor.submit(_load, self._executor)
-
-    def _begin(self) -> None:
-        assert self.estimation is not None  # noqa: S101 - begun where it is loaded
-        from study_app.lab.estimation.live_estimation import Chosen  # noqa: PLC0415 - loads the compiler
-
-        source, parameters, path = self._wanted
-        try:
-            self.estimation.choose(Chosen(source, NAMES[parameters], path))  # type: ignore[arg-type]
-        except StudyError as error:
-            self._trouble = f"{error}"
-            self._wanted = (OFF, parameters, None)
-
-    def _change(self, edit: Callable[[Workbench], Workbench]) -> None:
-        """Change the selected setting; where it refuses the values, say so and apply none continuously."""
-        assert self.estimation is not None  # noqa: S101 - of which the values are
-        try:
-            bench = edit(self._lab.bench)
-        except StudyError as error:
-            self.estimation.follows = False
-            self._refused = f" Not applied: {error}."
-            return
-        self._refused = ""
-        self._lab.feel(bench)
-
-
-def _load(executor: ThreadPoolExecutor) -> LiveEstimation:
-    """Load and compile the estimation, in its thread."""
-    from study_app.lab.estimation.fits import prepare  # noqa: PLC0415
-    from study_app.lab.estimation.live_estimation import LiveEstimation  # noqa: PLC0415 - loads the compiler
-
-    prepare()
-    return LiveEstimation(executor)
-
-
-def _label(name: str) -> str:
-    place = "body" if name == "drag_coefficient" else "wake"
-    return QUANTITIES[f"{place}.{name}"].label
-
-
-def _interval(lower: float, upper: float) -> str:
-    return f"{lower:.3g} … {upper:.3g}"
 
 
 INITIAL_A: Final = Choice("rek2024", "water", "Water")
@@ -492,7 +315,6 @@ class LabController(QObject):
         self._prices = Prices(make_appraiser)
         self._opening = LabOpening(open_live, options)
         self._saving = LabSaving(liquids_at_hand() if liquids is None else liquids)
-        self.estimation = LabEstimation(self)
         self.chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
@@ -562,13 +384,8 @@ class LabController(QObject):
                 live.press(buttons)
             case "save", path, setting:
                 self._save(path, setting)
-            case "use", path, setting:
-                self._forget_trouble()
-                self._saving.use(path, setting)
             case "preset", path:
                 self._open_preset(path)
-            case "source" | "parameters" | "apply" | "follow", *_:
-                self.estimation.do(what, *details)
 
     @property
     def liquids(self) -> tuple[Choice, ...]:
@@ -588,7 +405,6 @@ class LabController(QObject):
             log.warning("the servo did not stop properly: %s", error)
             self.place.message.emit("The device was not released properly", f"{error}.")
         finally:
-            self.estimation.close()
             self._prices.close()
             self.uncaught.remove()
 
@@ -608,7 +424,6 @@ class LabController(QObject):
             self._let_go()
         except StudyError as second:
             log.warning("the servo did not stop properly: %s", second)
-        self.estimation.close()
         traceback.clear_frames(error.__traceback__)
         known = isinstance(error, StudyError)
         said = f"{error}" if known else f"{type(error).__name__}: {error}; the force is off"
@@ -663,7 +478,6 @@ class LabController(QObject):
             refused=self._refused,
             said=self._saving.said,
             study=self.study,
-            estimate=self.estimation.shown(),
             **shown,
         )
 
@@ -684,7 +498,6 @@ class LabController(QObject):
     def _frame(self) -> None:
         if self.live is not None:
             self.live.poll()
-        self.estimation.poll()
         self._prices.take()
         self._show()
 

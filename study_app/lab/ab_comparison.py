@@ -14,44 +14,10 @@ from numpy.typing import NDArray
 
 from study_app.errors import StudyError
 from study_app.haptics.model.effect import Value
-from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.laws import stress_pa
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.model.slope_limits import steady
 from study_app.lab.parameters import changed, sections, the_liquid, value_of
 
 Floats: TypeAlias = NDArray[np.float64]
-
-RATES_PER_S: Final[Floats] = np.geomspace(0.1, 1000.0, 41)
-SPEEDS_MPS: Final[Floats] = np.linspace(0.0, 0.3, 31)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SteadyCurves:
-    """Steady flow of a setting.
-
-    ``stress_pa`` (n,) is the shear stress [Pa] at `RATES_PER_S`, None for a liquid without viscosity; ``force_n`` (m,)
-    the force sent [N] at the speeds `SPEEDS_MPS` of the hand.
-    """
-
-    stress_pa: Floats | None
-    force_n: Floats
-
-
-def has_flow_curve(scene: Scene) -> bool:
-    """Return whether the liquid of a scene with one liquid is non-Newtonian."""
-    return "non_newtonian" in resolve(scene).liquids[0].effects
-
-
-def steady_curves(scene: Scene) -> SteadyCurves:
-    """Return the curves of a scene with one liquid."""
-    scene = resolve(scene)
-    (liquid,) = scene.liquids
-    force_n = np.array([steady(scene, speed).force_n for speed in SPEEDS_MPS.tolist()])
-    if has_flow_curve(scene):
-        return SteadyCurves(np.array([stress_pa(liquid.non_newtonian, it) for it in RATES_PER_S.tolist()]), force_n)
-    return SteadyCurves(None if liquid.viscosity_pa_s is None else liquid.viscosity_pa_s * RATES_PER_S, force_n)
-
 
 Side: TypeAlias = Literal["A", "B"]
 
@@ -149,25 +115,6 @@ class Workbench:
         if edited == it:
             return replace(self, held=key if held and goes_on else None)
         return self._edited(self.presented, edited, held=key if held else None, goes_on=goes_on)
-
-    def put(self, scene: Scene, key: str | None = None) -> Workbench:
-        """Return a copy with another scene selected; successive changes of one ``key`` are one undo step.
-
-        Raises
-        ------
-        StudyError
-            Nothing may be edited now.
-        """
-        self._refuse_blind("edited")
-        held = None if key is None else (self.presented, key)
-        if scene == self.in_hand.scene:
-            return replace(self, held=held)
-        return self._edited(
-            self.presented,
-            replace(self.in_hand, scene=scene),
-            held=held,
-            goes_on=held is not None and self.held == held,
-        )
 
     def choose(self, side: Side, name: str, scene: Scene) -> Workbench:
         """Return a copy with another liquid on a side.

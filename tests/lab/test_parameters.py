@@ -90,6 +90,7 @@ def test_effects_by_hand_begin_as_the_gate_chose_them() -> None:
     assert value_of(lawful, "drag.law") == "brown-lawler"
     assert value_of(lawful, "effects") == "on"
     assert changed(honey, "effects.history", "off").liquids[0].effects == ("drag", "buoyancy", "added_mass")
+    assert changed(honey, "effects.non_newtonian", "on").liquids[0].viscosity_pa_s is None
 
 
 def test_the_lab_takes_one_liquid_and_no_given_velocity() -> None:

@@ -47,13 +47,6 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="Only measure how much of a delayed force is sent.",
 )
-@click.option(
-    "--estimation",
-    "estimated",
-    type=click.IntRange(1),
-    metavar="N",
-    help="Only simulate N loops in which estimates are applied.",
-)
 @click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
 @click.option("--cases", type=click.IntRange(1), metavar="N", help="Only simulate N cases of each group.")
 @click.option(
@@ -68,7 +61,6 @@ def stability(
     delivered: bool,
     velocity: bool,
     delayed: Path | None,
-    estimated: int | None,
     seed: str,
     cases: int | None,
     only: str | None,
@@ -84,7 +76,7 @@ def stability(
     from study_app.evidence.stability.case_groups import groups, some, sweep
     from study_app.evidence.stability.stability_cases import parse
 
-    parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity, "estimation": estimated}
+    parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity}
     exclude_each_other(to=to, case=line, table=table, delayed=delayed, only=only, **parts)
     prepare(to)
     if line is not None:
@@ -109,7 +101,7 @@ def stability(
     if any(parts.values()):
         part = next(name for name, chosen in parts.items() if chosen)
         with progress() as show, executor_for(workers) as executor:
-            measured = _measure(part, estimated or 0, executor, show)
+            measured = _measure(part, executor, show)
         present(measured, None)
         return
     chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
@@ -136,17 +128,12 @@ def stability(
     end_if(swept.unstable)
 
 
-def _measure(part: str, estimated: int, executor: Executor, show: ShowProgress) -> Evidence:
+def _measure(part: str, executor: Executor, show: ShowProgress) -> Evidence:
     """Return the evidence of one measurement of its own."""
-    from study_app.evidence.stability import applied_estimates, delivered_force, velocity, withheld_force
-    from study_app.evidence.table import run
+    from study_app.evidence.stability import delivered_force, velocity, withheld_force
 
     if part == "velocity":
         return velocity.evidence(velocity.measure(lambda what: show(f"measuring {what}")))
-    if part == "estimation":
-        show("applying estimates in closed loops")
-        cases = [(one,) for one in applied_estimates.applied_cases(estimated)]
-        return applied_estimates.evidence(run(applied_estimates.judge_applied, cases, executor))
     show(f"measuring the force {part}")
     if part == "withheld":
         return withheld_force.evidence(withheld_force.measure(executor=executor))

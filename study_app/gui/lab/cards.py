@@ -1,38 +1,24 @@
-"""The lab's cards: live plots, flow curve, cost and error, limiters, estimation."""
+"""The lab's cards: live plots, cost and error, limiters."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QLabel, QStackedLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QStackedLayout, QVBoxLayout, QWidget
 
-from study_app.gui.lab.lab_state import (
-    OFF,
-    PARAMETERS,
-    SPAN_S,
-    Choices,
-    CostRow,
-    ErrorRow,
-    EstimateRow,
-    Floats,
-    LabView,
-)
+from study_app.gui.lab.lab_state import SPAN_S, CostRow, ErrorRow, Floats, LabView
 from study_app.gui.lab.parameters import HIDDEN
 from study_app.gui.theme.theme import LIGHT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.accessible import describe_plot
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Icon, MaskedPanel, Rule, fill_rounded, smooth_painter
-from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
-from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_ink
+from study_app.gui.widgets.labels import Elided, figures, label, set_ink
 from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, number, pen
-from study_app.haptics.model.scene import Scene
-from study_app.lab.ab_comparison import RATES_PER_S, SPEEDS_MPS, SteadyCurves, has_flow_curve, steady_curves
 from study_app.lab.live import LimiterCount
 from study_app.number_text import grouped
 
@@ -462,224 +448,3 @@ def _fit(lines: list, count: int, kind: type, layout: QVBoxLayout) -> None:
     while len(lines) < count:
         lines.append(kind())
         layout.addWidget(lines[-1])
-
-
-BUTTON: Final = 32
-MESSAGE_LINES: Final = 3
-
-
-class EstimateCard(ReadingCard):
-    """Where the force comes from, what is estimated, the values, and how they are applied.
-
-    ``source_chosen`` is a source, ``parameters_chosen`` which parameters;
-    ``follow_asked`` is whether they are applied continuously.
-    """
-
-    source_chosen = Signal(str)
-    parameters_chosen = Signal(str)
-    follow_asked = Signal(bool)
-
-    def __init__(self) -> None:
-        super().__init__("Estimate", label("", "small", "text2"), "Estimates would reveal which is which.")
-        self.source, self.parameters = _choice("Measured force"), _choice("Estimated parameters")
-        _offer(self.parameters, PARAMETERS, PARAMETERS[0][0])
-        self._offered: Choices = ()
-        self.lines: list[tuple[Elided, QLabel, QLabel]] = []
-        self._grid = QGridLayout()
-        self._grid.setColumnStretch(0, 1)
-        self._grid.setHorizontalSpacing(8)
-        self._grid.setVerticalSpacing(0)
-        self.message = Clamped("", MESSAGE_LINES, "small", "text2")
-        self.apply = ActionButton("check", "Apply", height=BUTTON)
-        self.apply.setProperty("dense", "true")
-        self.follow = Toggle("Continuously")
-        self.follow.setFont(font("label"))
-        self.follow.setToolTip("Apply estimates as they come, slowly, within the slope and force limits")
-        self._inside = QWidget()
-        buttons = hbox(self.apply, self.follow, STRETCH, spacing=10)
-        inner = grid(down=6, margins=0, parent=self._inside)
-        inner.addWidget(self.parameters, 0, 0)
-        add_layout(inner, self._grid, 1, 0)
-        inner.addWidget(self.message, 2, 0)
-        add_layout(inner, buttons, 3, 0)
-        add_parts(self.content, self.source, self._inside, STRETCH)
-        self.source.activated.connect(lambda index: self.source_chosen.emit(self.source.itemData(index)))
-        self.parameters.activated.connect(lambda index: self.parameters_chosen.emit(self.parameters.itemData(index)))
-        self.follow.clicked.connect(self._ask_follow)
-
-    def show_view(self, view: LabView) -> None:
-        shown = view.estimate
-        if self.show_blind(view.workbench.blind):
-            return
-        if shown.sources != self._offered:
-            self._offered = shown.sources
-            _offer(self.source, shown.sources, shown.source)
-        if not self.source.view().isVisible():
-            self.source.setCurrentIndex(self.source.findData(shown.source))
-        self.parameters.setCurrentIndex(self.parameters.findData(shown.parameters))
-        self.aside.setText(f"{view.felt}, 95 % interval" if shown.rows else "")
-        self._inside.setVisible(shown.source != OFF or bool(shown.message))
-        self.message.show_text(shown.message)
-        set_ink(self.message, "text2" if shown.sound else "warn")
-        self._show_rows(shown.rows, sound=shown.sound)
-        self.apply.setEnabled(shown.may_apply)
-        self.follow.setEnabled(shown.may_follow)
-        with QSignalBlocker(self.follow):
-            self.follow.setChecked(shown.follows)
-
-    def _show_rows(self, rows: tuple[EstimateRow, ...], *, sound: bool) -> None:
-        while len(self.lines) < len(rows):
-            name, value, interval = Elided("label", "text2"), figures("", "label"), figures("", "small", "text2")
-            value.setFont(font("label", weight=600, tabular=True))
-            name.setFixedHeight(LINE)
-            for at, part in enumerate((name, value, interval)):
-                side = Qt.AlignmentFlag.AlignVCenter | (Qt.AlignmentFlag.AlignRight if at else Qt.AlignmentFlag(0))
-                self._grid.addWidget(part, len(self.lines), at, side)
-            self.lines.append((name, value, interval))
-        for line, parts in enumerate(self.lines):
-            for part in parts:
-                part.setVisible(line < len(rows))
-            if line < len(rows):
-                row, (name, value, interval) = rows[line], parts
-                name.show_text(row.name)
-                value.setText(row.value)
-                interval.setText(row.interval)
-                set_ink(value, "text" if sound else "text3")
-
-    def _ask_follow(self, on: bool) -> None:
-        self.follow.setChecked(not on)  # the view says when it is
-        self.follow_asked.emit(on)
-
-
-def _choice(name: str) -> Choice:
-    made = Choice()
-    made.setProperty("dense", "true")
-    made.setFont(font("label"))
-    made.setAccessibleName(name)
-    made.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-    made.setMinimumContentsLength(12)
-    return made
-
-
-def _offer(choice: Choice, choices: Choices, chosen: str) -> None:
-    choice.clear()
-    for value, words in choices:
-        choice.addItem(words, value)
-    choice.setCurrentIndex(choice.findData(chosen))
-
-
-NOT_MODELLED: Final = "Steady shear. Not modelled: thixotropy, impact, fracture."
-STRESS_SENTENCE: Final = f"Shear stress of settings A and B over the shear rate. {NOT_MODELLED}"
-STEADY_FORCE_SENTENCE: Final = (
-    "Force of settings A and B on a hand that moves evenly, over its speed in m/s, after the limits."
-)
-STYLES: Final = (B, A)
-EMPTY: Final[Floats] = np.empty(0)
-
-
-class FlowCurvePlot(Plot):
-    """Stress over shear rate, both logarithmic."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.curves = [pg.PlotCurveItem(antialias=True) for _ in STYLES]
-        for curve, style in zip(self.curves, STYLES, strict=True):
-            draw_quickly(curve, solid=style.stroke == "solid")
-            self.box.addItem(curve, ignoreBounds=True)
-        self.axes["left"].setWidth(56)
-        self.axes["bottom"].setHeight(26)
-        first, last = (round(math.log10(rate)) for rate in (RATES_PER_S[0], RATES_PER_S[-1]))
-        self.box.setXRange(first, last + 0.06 * (last - first), padding=0)
-        self.show_ticks("bottom", _decades(first, last))
-        self.apply_theme(LIGHT)
-
-    def sizeHint(self) -> QSize:
-        return QSize(240, 120)
-
-    def show_stresses(self, stresses_pa: tuple[Floats | None, ...]) -> None:
-        """Draw stresses (n,) [Pa], each at the shear rates; None draws nothing."""
-        shown = np.concatenate([it for it in stresses_pa if it is not None] or [np.ones(1)])
-        first, last = math.floor(math.log10(shown.min()) + 1e-9), math.ceil(math.log10(shown.max()) - 1e-9)
-        last = max(last, first + 1)
-        self.show_ticks("left", _decades(first, last))
-        self.box.setYRange(first - 0.02, last + 0.12 * (last - first), padding=0)
-        for curve, it in zip(self.curves, stresses_pa, strict=True):
-            curve.setData(*((EMPTY, EMPTY) if it is None else (np.log10(RATES_PER_S), np.log10(it))))
-
-    def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
-        for curve, style in zip(self.curves, STYLES, strict=True):
-            curve.setPen(self.stroke(style.colour(theme), style.width, DASH[style.stroke]))
-
-
-class SpeedPlot(CurvePlot):
-    """Curves over the speed of the hand."""
-
-    def __init__(self) -> None:
-        super().__init__(STYLES, 1.0)
-        most_mps = float(SPEEDS_MPS[-1])
-        self.box.setXRange(0.0, 1.06 * most_mps, padding=0)
-        self.show_ticks("bottom", [(round(it, 6), number(round(it, 6))) for it in np.arange(0.0, most_mps + 0.01, 0.1)])
-
-
-class FlowCurveCard(PlotCard):
-    """Shear stress over shear rate of both settings."""
-
-    def __init__(self) -> None:
-        self.stresses = FlowCurvePlot()
-        super().__init__("Flow curve", "Pa over 1/s", self.stresses, STRESS_SENTENCE)
-        note = Elided("small", "text2")
-        note.show_text(NOT_MODELLED)
-        self.column.addWidget(note)
-
-    def show_curves(self, a: SteadyCurves, b: SteadyCurves) -> None:
-        self.legend.show_entries(((A, _name("A", a)), (B, _name("B", b))))
-        self.stresses.show_stresses((b.stress_pa, a.stress_pa))
-
-
-class SteadyForceCard(PlotCard):
-    """Force over the speed of the hand in both settings."""
-
-    def __init__(self) -> None:
-        self.forces = SpeedPlot()
-        super().__init__("Force over speed", "N over m/s", self.forces, STEADY_FORCE_SENTENCE)
-
-    def show_curves(self, a: SteadyCurves, b: SteadyCurves, limit_n: float) -> None:
-        self.legend.show_entries(((A, "A"), (B, "B"), (LIMIT, f"limit {limit_n:g} N")))
-        self.forces.show_curves(SPEEDS_MPS, (b.force_n, a.force_n), limit_n)
-
-
-class FlowCurveRow(QWidget):
-    """Both cards side by side; hidden while neither setting has a flow curve."""
-
-    def __init__(self, gap: int) -> None:
-        super().__init__()
-        self.stress, self.force = FlowCurveCard(), SteadyForceCard()
-        self._shown: tuple[Scene, Scene, float] | None = None
-        hbox((self.stress, 1), (self.force, 1), spacing=gap, margins=0, parent=self)
-        self.hide()
-
-    def show_view(self, view: LabView) -> None:
-        """Draw the curves of both settings and the limit of the one in hand, if one of them has changed."""
-        bench = view.workbench
-        for card in (self.stress, self.force):
-            card.show_blind(bench.blind)
-        scenes, limit_n = (bench.a.scene, bench.b.scene), bench.in_hand.scene.force_limit_n
-        shown = (*scenes, limit_n)
-        if shown == self._shown:
-            return
-        self._shown = shown
-        self.setVisible(any(map(has_flow_curve, scenes)))
-        if not self.isHidden():
-            a, b = map(steady_curves, scenes)
-            self.stress.show_curves(a, b)
-            self.force.show_curves(a, b, limit_n)
-
-
-def _name(side: str, curves: SteadyCurves) -> str:
-    return f"{side}, no viscosity" if curves.stress_pa is None else side
-
-
-def _decades(first: int, last: int) -> list[tuple[float, str]]:
-    step = 1 + (last - first) // 5
-    return [(float(k), number(10.0**k)) for k in range(first, last + 1, step)]

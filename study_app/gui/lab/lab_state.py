@@ -7,7 +7,7 @@ how it is written.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,51 +21,6 @@ if TYPE_CHECKING:
     from study_app.lab.shadow import Trace
 
 Choices: TypeAlias = tuple[tuple[str, str], ...]
-
-OFF: Final = "off"
-FILE: Final = "file"
-DRAG: Final = "drag"
-WAKE: Final = "wake"
-SOURCES: Final[Choices] = (
-    (OFF, "No measured force"),
-    ("other", "Simulated sensor, other setting"),
-    ("device", "Force of the device"),
-    (FILE, "Growing CSV file …"),
-)
-LSL: Final[Choices] = (("lsl", "LSL stream"),)
-PARAMETERS: Final[Choices] = ((DRAG, "Drag coefficient"), (WAKE, "Drag coefficient and wake"))
-
-
-@dataclass(frozen=True, slots=True)
-class EstimateRow:
-    """A parameter with its estimated value and 95 % interval, written out."""
-
-    name: str
-    value: str
-    interval: str
-
-
-@dataclass(frozen=True, slots=True)
-class EstimateShown:
-    """An estimation: where the force comes from, which parameters, what was found, and what may be done with it.
-
-    ``message`` says why nothing is found or applied, or how much of the force is left. ``sound`` is whether the motion
-    identifies the values; only then ``may_apply`` can be true. ``follows`` is whether values are applied continuously.
-    """
-
-    sources: Choices = SOURCES
-    source: str = OFF
-    parameters: str = DRAG
-    rows: tuple[EstimateRow, ...] = ()
-    message: str = ""
-    sound: bool = False
-    may_apply: bool = False
-    may_follow: bool = False
-    follows: bool = False
-
-
-NO_ESTIMATE: Final = EstimateShown()
-
 
 Floats: TypeAlias = NDArray[np.float64]
 Point: TypeAlias = tuple[float, float, float]
@@ -126,8 +81,7 @@ class LabView:
     not be changed and one line why, a new pair for every refusal; ``said`` tells what was saved or opened last.
     ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet, a tail also where the setting
     has no wake. ``cost`` and ``errors`` are of the felt setting, empty until they are measured; ``measuring`` while
-    they are measured anew; ``estimate`` what a measured force says. ``study`` is the study that is edited and takes
-    changes back, "" without one.
+    they are measured anew. ``study`` is the study that is edited and takes changes back, "" without one.
     """
 
     workbench: Workbench
@@ -153,7 +107,6 @@ class LabView:
     workspace_m: Point = (0.1, 0.06, 0.06)
     body_radius_m: float = 0.0034
     study: str = ""
-    estimate: EstimateShown = NO_ESTIMATE
 
     @property
     def felt(self) -> Side:

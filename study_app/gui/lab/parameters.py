@@ -555,11 +555,10 @@ class FormPanel(Card):
         self.copy = ActionButton("copy", "Copy to B", height=32)
         self.copy.setProperty("dense", "true")
         self.open = ActionButton("file", "Open preset …", height=32)
-        self.use = ActionButton("layers", "Use in a study …", height=32)
         self.back = ActionButton("designer", "Put back into the study", height=32)
         self.back.hide()
         self.said = Clamped("", 2, "small", "text2")
-        for button in (self.open, self.use, self.back):
+        for button in (self.open, self.back):
             button.setProperty("dense", "true")
         self._lay_out()
 
@@ -568,10 +567,9 @@ class FormPanel(Card):
         self.area = scrolled(QWidget())
         whole = QWidget()
         column = vbox(head, Rule(), (self.area, 1), spacing=8, margins=0, parent=whole)
-        foot = hbox((self.open, 1), (self.use, 1), spacing=8)
         column.addWidget(Rule())
         column.addWidget(self.said)  # above the buttons, which stay in their place when it appears
-        add_parts(column, self.back, foot)
+        add_parts(column, self.back, self.open)
         self.hidden = MaskedPanel(HIDDEN, "Parameters would reveal which is which.")
         self._stack = QStackedLayout()
         self._stack.addWidget(whole)

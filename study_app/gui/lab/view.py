@@ -11,8 +11,8 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QGridLayout
 
-from study_app.gui.lab.cards import CostCard, ErrorCard, EstimateCard, FlowCurveRow, ForceCard, LimiterCard, SpeedCard
-from study_app.gui.lab.lab_state import FILE, LabView
+from study_app.gui.lab.cards import CostCard, ErrorCard, ForceCard, LimiterCard, SpeedCard
+from study_app.gui.lab.lab_state import LabView
 from study_app.gui.lab.lab_tank import LabTank, TankNote
 from study_app.gui.lab.parameters import KEY, FormPanel, LabHeader
 from study_app.gui.theme.theme import SPACE
@@ -34,8 +34,8 @@ class LabPlace(Place):
     """The lab as a place of the operator's window.
 
     ``asked(what, details)`` carries requests by their names: of parameters in SI (``held`` while a slider is dragged),
-    of the mouse while it moves the ball [m, hand frame], of files with the `Setting` that was felt, of the device, the
-    force and the estimation; "enter" and "leave" as the place is shown and hidden. ``put_back_asked`` is the felt side
+    of the mouse while it moves the ball [m, hand frame], of files with the `Setting` that was felt, of the device and
+    the force; "enter" and "leave" as the place is shown and hidden. ``put_back_asked`` is the felt side
     and its `Setting`, for the study that is edited.
     """
 
@@ -57,8 +57,6 @@ class LabPlace(Place):
         self.tank = LabTank()
         self.note = TankNote(self.tank)
         self.force, self.speed = ForceCard(), SpeedCard()
-        self.curves = FlowCurveRow(GAP)
-        self.estimate = EstimateCard()
         self.cost, self.error, self.limiters = CostCard(), ErrorCard(), LimiterCard()
         self._escape = EscapeKey(self, anywhere=True)
         self._lay_out()
@@ -77,8 +75,7 @@ class LabPlace(Place):
         add_layout(self._middle, framed, 0, 0, 1, 2)
         self._middle.addWidget(self.force, 1, 0)
         self._middle.addWidget(self.speed, 1, 1)
-        self._middle.addWidget(self.curves, 2, 0, 1, 2)
-        add_layout(self._middle, self._side, 3, 0, 1, 2)
+        add_layout(self._middle, self._side, 2, 0, 1, 2)
         self._middle.setRowStretch(0, 61)
         self._middle.setRowStretch(1, PLOTS_STRETCH)
         self.area = scrolled(self._middle)
@@ -96,7 +93,7 @@ class LabPlace(Place):
         if wide == self._wide:
             return
         self._wide = wide
-        cards = (self.estimate, self.cost, self.error, self.limiters)
+        cards = (self.cost, self.error, self.limiters)
         self._column.setSpacing(GAP)
         self._column.setContentsMargins(0, 0, 0, 0)
         for number, card in enumerate(cards):
@@ -104,13 +101,13 @@ class LabPlace(Place):
                 self._column.addWidget(card, number, 0)
                 self._column.setRowStretch(number, int(card is self.limiters))
             else:
-                row, at = ((0, 0), (1, 0), (1, 1), (2, 0))[number]
-                self._side.addWidget(card, row, at, 1, 2 if card in {self.estimate, self.limiters} else 1)
+                row, at = divmod(number, 2)
+                self._side.addWidget(card, row, at, 1, 2 if card is self.limiters else 1)
         self._side_area.setVisible(wide)
         self._side_area.setFixedWidth(SIDE_WIDTH)
 
     def _connect(self) -> None:
-        header, form, tank, estimate = self.header, self.form, self.tank, self.estimate
+        header, form, tank = self.header, self.form, self.tank
         for part, what in (
             (header.blind_asked, "blind"),
             (header.device_chosen, "device"),
@@ -119,8 +116,6 @@ class LabPlace(Place):
             (form.liquid_chosen, "liquid"),
             (tank.moved, "point"),
             (tank.pressed, "press"),
-            (estimate.parameters_chosen, "parameters"),
-            (estimate.follow_asked, "follow"),
         ):
             part.connect(partial(self.ask, what))
         for pressed, what in (
@@ -132,17 +127,14 @@ class LabPlace(Place):
             (self.note.fade_in.clicked, "fade in"),
             (self.note.cancel.clicked, "cancel"),
             (self.note.diagnose.clicked, "diagnose"),
-            (estimate.apply.clicked, "apply"),
         ):
             pressed.connect(lambda *_checked, what=what: self.ask(what))
         for button, ask in (
             (header.save, self.ask_where_to_save),
             (form.open, self.ask_which_to_open),
-            (form.use, self.ask_which_study),
             (form.back, self.put_back),
         ):
             button.clicked.connect(ask)
-        estimate.source_chosen.connect(self._choose_source)
         self._escape.held.connect(self._stop)
 
     def ask(self, what: str, *details: Any) -> None:
@@ -156,13 +148,9 @@ class LabPlace(Place):
     def show_view(self, view: LabView) -> None:
         self._view = view
         for part in (
-            self.header, self.form, self.tank, self.note, self.force, self.speed, self.curves, self.estimate, self.cost,
-            self.error, self.limiters,
+            self.header, self.form, self.tank, self.note, self.force, self.speed, self.cost, self.error, self.limiters,
         ):  # fmt: skip
             part.show_view(view)
-        stretch = 0 if self.curves.isVisibleTo(self) else PLOTS_STRETCH  # the tank makes room for a third row
-        if stretch != self._middle.rowStretch(1):  # setting it lays the page out again
-            self._middle.setRowStretch(1, stretch)
 
     def ask_where_to_save(self) -> None:
         """Ask for the preset's file; nothing waits meanwhile, and the force can be stopped while the dialog is open."""
@@ -175,19 +163,9 @@ class LabPlace(Place):
         if self._free_to_ask() is not None:
             self._ask_for_file("Open preset", "Presets and protocols", "preset")
 
-    def ask_which_study(self) -> None:
-        if (setting := self._free_to_ask()) is not None:
-            self._ask_for_file(f"Use {setting.title} in a study", "Protocols", "use", setting)
-
     def put_back(self) -> None:
         if (setting := self._free_to_ask()) is not None and self._view is not None:
             self.put_back_asked.emit(self._view.felt, setting)
-
-    def _choose_source(self, source: str) -> None:
-        if source != FILE:
-            self.ask("source", None, source)
-        elif self._free_to_ask() is not None:
-            self._ask_for_file("Measured motion and force", "Tables", "source", FILE, suffix=".csv")
 
     def _free_to_ask(self) -> Setting | None:
         """Return the felt setting; None while another question is open, or the comparison is blind."""
@@ -195,11 +173,9 @@ class LabPlace(Place):
             return None
         return self._view.workbench.in_hand
 
-    def _ask_for_file(
-        self, title: str, files: str, what: str, *details: Any, suffix: str = SUFFIX, saves: bool = False
-    ) -> QFileDialog:
+    def _ask_for_file(self, title: str, files: str, what: str, *details: Any, saves: bool = False) -> QFileDialog:
         """Ask for a file, at first in the workspace's protocols, then for what is to be done with it."""
-        dialog = self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{suffix})")
+        dialog = self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{SUFFIX})")
         if saves:
             dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         else:

@@ -1,12 +1,11 @@
 """Estimates parameters of a liquid from a stream of measured force, or gives the reason without an estimate.
 
 The drag coefficient alone follows each batch of rows by recursive least squares (`fits.RecursiveDrag`). With length and
-scaling of the wake the newest rows are searched once per second of the stream (``wake_fit``), in an executor if the
-caller has windows. A value counts only if the motion identifies it (``information``).
+scaling of the wake the newest rows are searched once per second of the stream (``wake_fit``). A value counts only if
+the motion identifies it (``information``).
 """
 
 import math
-from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -80,8 +79,6 @@ class OnlineEstimator:
         ``("drag_coefficient",)``, or with ``"length"``, ``"scaling"`` or both.
     memory_s : float
         Age at which a row has the weight 1/e [s].
-    executor : Executor, optional
-        Searches for the wake; by default `take` does so itself.
 
     Raises
     ------
@@ -89,14 +86,7 @@ class OnlineEstimator:
         A parameter that the liquid does not have, or that its force does not depend on.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        names: tuple[str, ...] = (DRAG,),
-        *,
-        memory_s: float = MEMORY_S,
-        executor: Executor | None = None,
-    ) -> None:
+    def __init__(self, scene: Scene, names: tuple[str, ...] = (DRAG,), *, memory_s: float = MEMORY_S) -> None:
         if unknown := [name for name in names if name not in NAMES]:
             raise StudyError(f"{unknown[0]!r} cannot be estimated online: choose among {', '.join(NAMES)}")
         if DRAG not in names:
@@ -104,7 +94,7 @@ class OnlineEstimator:
         if why := refusal(scene, names):
             raise StudyError(why)
         self.names = names
-        self._scene, self._memory_s, self._executor = resolve(scene), memory_s, executor
+        self._scene, self._memory_s = resolve(scene), memory_s
         self.restart()
 
     def restart(self) -> None:
@@ -118,16 +108,8 @@ class OnlineEstimator:
         self._drag = RecursiveDrag(self._memory_s)
         self._dropped = False
         self._searched_s = -math.inf
-        self._pending: Future[WakeFit | None] | None = None
         self._known: dict[str, float] | None = None
-        self._estimate = NOTHING
-
-    @property
-    def estimate(self) -> Estimate:
-        if self._pending is not None and self._pending.done():
-            search, self._pending = self._pending, None
-            self._finish(search.result())
-        return self._estimate
+        self.estimate = NOTHING
 
     def take(self, rows: Rows) -> None:
         """Process the next rows; a gap in time restarts the estimation.
@@ -144,7 +126,7 @@ class OnlineEstimator:
             self.restart()
             rows = rows.part(int(gaps[-1]))
             missing = f"no force was measured for {gaps_s[gaps[-1]]:.2g} s, at most {GAP_S:g} s are permitted"
-            self._estimate = replace(NOTHING, reason=f"{missing}: the estimation restarted")
+            self.estimate = replace(NOTHING, reason=f"{missing}: the estimation restarted")
         self._last_s = float(rows.t_s[-1])
         if self._rate_hz is None:
             self._waiting = joined(self._waiting, rows)
@@ -167,20 +149,20 @@ class OnlineEstimator:
         self._drag.take(rows.t_s, g_n, rows.force_n - h_n, rows.usable)
         value = self._drag.value
         if self._seconds < LEAST_S or not math.isfinite(value):
-            self._estimate = _waits(self._seconds)
+            self.estimate = _waits(self._seconds)
             return
         variance_n2, following = self._drag.residual
         found = information(np.array([[value**2 * self._drag.normal_n2]]), variance_n2, following)
         fit = WakeFit({DRAG: value}, found, following, math.sqrt(3 * variance_n2), self._drag.force_rms_n)
-        self._estimate = self._judged(fit)
+        self.estimate = self._judged(fit)
 
     def _search(self, rows: Rows) -> None:
         assert self._rate_hz is not None  # noqa: S101 - known before
         self._kept.append(rows)
         if self._seconds < LEAST_S:
-            self._estimate = _waits(self._seconds)
+            self.estimate = _waits(self._seconds)
             return
-        if self._last_s - self._searched_s < SEARCH_S or (self._pending is not None and not self._pending.done()):
+        if self._last_s - self._searched_s < SEARCH_S:
             return
         self._searched_s = self._last_s
         kept = joined(*self._kept)
@@ -192,17 +174,12 @@ class OnlineEstimator:
         )
         from_values = values_of(self._scene) | (self._known or {})
         start = round(from_values["length"]), from_values["scaling"]
-        if self._executor is None:
-            self._finish(search.run(*start, anew=self._known is None))
-        else:
-            self._pending = self._executor.submit(search.run, *start, anew=self._known is None)
-
-    def _finish(self, fit: WakeFit | None) -> None:
+        fit = search.run(*start, anew=self._known is None)
         if fit is None:
-            self._estimate, self._known = _waits(self._seconds), None
+            self.estimate, self._known = _waits(self._seconds), None
             return
-        self._estimate = self._judged(fit)
-        sure = self._estimate.identified and _misfit_n(fit) <= _SURE * fit.force_rms_n
+        self.estimate = self._judged(fit)
+        sure = self.estimate.identified and _misfit_n(fit) <= _SURE * fit.force_rms_n
         self._known = dict(fit.values) if sure else None
 
     def _judged(self, fit: WakeFit) -> Estimate:

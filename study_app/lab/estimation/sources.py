@@ -1,17 +1,14 @@
-"""Sources of measured motion and force: a CSV file that grows, an inlet of LSL (``pylsl``), the lab's own telemetry.
+"""Sources of measured motion and force: a CSV file that grows, an inlet of LSL (``pylsl``).
 
 A stream of LSL is used if its channels have the labels of a CSV file's columns (`HEADER`, without ``t_s``); its time
-stamps are the times of the rows. Telemetry has the force that a device sent, or that a sensor in another liquid would
-measure; samples hold the velocity after the knee, so the liquids here have none.
+stamps are the times of the rows.
 """
 
 from __future__ import annotations
 
 import csv
 import importlib
-import importlib.util
 import math
-from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -20,11 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import StudyError
-from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.layout import LIMITER_ESTIMATOR, LIMITER_FADE, LIMITER_GLITCH, STATUS_OK
 from study_app.haptics.model.motion import PLACES, SHOWN, VELOCITIES, refuse_device
-from study_app.haptics.model.scene import Knee, Scene
-from study_app.haptics.runtime.offline import ModelAlong
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -209,26 +202,18 @@ _BUFFER_S: Final = 30
 _OPENS_S: Final = 0.5
 
 
-def available() -> bool:
-    """Return whether ``pylsl`` is installed."""
-    return importlib.util.find_spec("pylsl") is not None
-
-
 class LslForce:
     """The first stream with the labels `LABELS`, and VELOCITIES where they are known, called ``name``, "" for any.
 
-    ``executor`` connects to streams, which may not answer for a second; by default `poll` does so itself. A
-    `StudyError` is raised where ``pylsl`` or its library is not installed.
+    A `StudyError` is raised where ``pylsl`` or its library is not installed.
     """
 
-    def __init__(self, name: str = "", executor: Executor | None = None) -> None:
+    def __init__(self, name: str = "") -> None:
         try:
             self._lsl: Any = importlib.import_module("pylsl")
         except (ImportError, RuntimeError, OSError) as error:  # without its library it raises RuntimeError
             raise StudyError(_INSTALL) from error
         self._resolver = self._lsl.ContinuousResolver(*(("name", name) if name else ()))
-        self._executor = executor
-        self._connecting: Future[tuple[Any, list[str]] | None] | None = None
         self._refused: set[str] = set()
         self._inlet: Any = None
         self._places: list[int] = []
@@ -269,16 +254,7 @@ class LslForce:
 
     def _connected_now(self) -> bool:
         """Use a stream that was opened meanwhile, or search for one; return whether there is one."""
-        if self._executor is None:
-            found = self._connect()
-        elif self._connecting is None:
-            self._connecting = self._executor.submit(self._connect)
-            return False
-        elif not self._connecting.done():
-            return False
-        else:
-            connecting, self._connecting = self._connecting, None
-            found = connecting.result()
+        found = self._connect()
         if found is None:
             return False
         inlet, labels = found
@@ -312,78 +288,3 @@ def _labels(info: Any) -> list[str]:
         labels.append(channel.child_value("label"))
         channel = channel.next_sibling("channel")
     return labels
-
-
-NOISE_N: Final = 0.03
-"""Standard deviation of the simulated sensor along each axis."""
-_SEED: Final = 1
-
-
-def as_measured(scene: Scene) -> Scene:
-    """Return the scene for velocities of telemetry."""
-    return resolve(scene).model_copy(update={"knee": Knee(law="none")})
-
-
-class DeviceForce:
-    """The force that the device sent; usable where no limiter changed it.
-
-    ``began`` tells after `take` that the servo began a new scene, so that the last wake is lost.
-    """
-
-    def __init__(self) -> None:
-        self._serial: int | None = None
-        self.began = False
-
-    def take(self, samples: Any, scene: Scene) -> Rows:
-        """Return rows of the servo's next samples (recarray of ``SAMPLE``) in a scene."""
-        samples = _accepted(samples)
-        self.began = False
-        if len(samples) == 0:
-            return no_rows()
-        changes = np.flatnonzero(
-            np.diff(samples.scene, prepend=samples.scene[0] if self._serial is None else self._serial)
-        )
-        self._serial = int(samples.scene[-1])
-        for first in changes[::-1]:
-            if samples.limiters[first] & LIMITER_FADE:
-                self.began, samples = True, samples[first:]
-                break
-        usable = (samples.limiters & ~LIMITER_ESTIMATOR == 0) & (samples.status == STATUS_OK)
-        return _rows(samples, scene, np.array(samples.device_force_n, np.float64), usable)
-
-
-class OtherLiquidForce:
-    """The force of another liquid on the same motion, with noise of this standard deviation along each axis [N].
-
-    Its values are known, for trials of the estimation.
-    """
-
-    def __init__(self, scene: Scene, noise_n: float = NOISE_N) -> None:
-        self._model = ModelAlong(as_measured(scene), given=True)
-        self._scene, self._noise_n = scene, noise_n
-        self._noise = np.random.default_rng(_SEED)
-
-    def take(self, samples: Any) -> Rows:
-        """Return rows of the servo's next samples (recarray of ``SAMPLE``)."""
-        samples = _accepted(samples)
-        if len(samples) == 0:
-            return no_rows()
-        rows = _rows(samples, self._scene, np.zeros((len(samples), 3)), np.ones(len(samples), bool))
-        force_n = self._model.follow(rows.t_s, rows.position_m, rows.velocity_mps).force_n
-        rows.force_n[:] = force_n + self._noise_n * self._noise.standard_normal(force_n.shape)
-        return rows
-
-
-def _accepted(samples: Any) -> Any:
-    """Return the samples in which the model moved."""
-    return samples[(samples.fresh != 0) & (samples.limiters & LIMITER_GLITCH == 0) & (samples.status == STATUS_OK)]
-
-
-def _rows(samples: Any, scene: Scene, force_n: Floats, usable: Any) -> Rows:
-    return Rows(
-        samples.time_ns * 1e-9,
-        np.array(samples.position_m) * scene.scale + np.asarray(scene.origin_m),
-        np.array(samples.velocity_mps, np.float64),
-        force_n,
-        np.asarray(usable, bool),
-    )

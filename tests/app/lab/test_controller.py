@@ -2,14 +2,18 @@
 
 import subprocess
 import sys
+import threading
 import weakref
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from PySide6.QtWidgets import QMainWindow
 
+from study_app.app.failures import Patience
 from study_app.app.lab_controller import LabController
+from study_app.lab.presets import save
 from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices, Stays, is_let_go
 from tests.compiled import needs_servo
 
@@ -152,3 +156,39 @@ def test_while_blind_nothing_tells_one_from_the_other(felt: LabController, qtbot
     assert not list(tmp_path.iterdir())
     felt.place.ask("blind", False)
     assert not felt.view().workbench.blind
+
+
+def test_no_price_is_no_reason_to_stop(make_lab: Callable[..., LabController], qtbot: Any) -> None:
+    def nobody() -> Prices:
+        raise OSError("no more processes")
+
+    visit = make_lab(make_appraiser=nobody)
+    visit.place.show()
+    qtbot.waitUntil(lambda: visit.live is not None, timeout=OPENS_MS)
+    qtbot.waitUntil(lambda: not visit.view().measuring, timeout=SOON_MS)
+    assert visit.live is not None
+    assert visit.view().trouble == ""
+
+
+def test_a_preset_is_on_the_disk_before_the_program_ends(
+    visit: LabController, monkeypatch: Any, tmp_path: Path
+) -> None:
+    ended = threading.Event()
+
+    written = []
+
+    def slowly(path: Path, text: str) -> None:
+        if path.name == "one.toml":
+            ended.wait(30.0)
+        save(path, text)
+        written.append(path.name)
+
+    monkeypatch.setattr("study_app.app.lab_controller.save", slowly)
+    for name in ("one.toml", "two.toml"):
+        visit.place.ask("save", tmp_path / name, visit.bench.a)
+    assert not list(tmp_path.iterdir())
+    threading.Timer(0.05, ended.set).start()
+    visit.end(Patience(20.0))
+    assert written == ["one.toml", "two.toml"], "in the order in which they were saved"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.toml", "two.toml"]
+    assert str(tmp_path / "two.toml") in [it.source for it in visit.liquids]

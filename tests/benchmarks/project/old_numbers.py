@@ -26,7 +26,7 @@ MEASURES: Final = {
     "scene": MODEL,
     "soak": (*MODEL, "study_app/evidence/soak"),
     "stability": STABILITY,
-    **{f"stability --{part}": STABILITY for part in ("delayed", "delivered", "estimation", "velocity", "withheld")},
+    **{f"stability --{part}": STABILITY for part in ("delayed", "delivered", "velocity", "withheld")},
     "timing --lsl": ("study_app/outlets", "study_app/evidence/outlets"),
     "timing --triggers": ("study_app/outlets", "study_app/evidence/outlets"),
     "timing": ("study_app/haptics/runtime", "study_app/gui/participant", "study_app/evidence/timing"),

@@ -1,8 +1,7 @@
-"""The liquid lab in its states: moved, blind, measuring, refused, estimating."""
+"""The liquid lab in its states: moved, blind, measuring, refused."""
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +10,7 @@ from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
-from study_app.gui.lab.lab_state import LSL, SOURCES, EstimateRow, EstimateShown, Now
+from study_app.gui.lab.lab_state import Now
 from study_app.gui.theme.theme import DARK
 from study_app.gui.theme.themed import apply_theme
 from study_app.lab.ab_comparison import Setting, Workbench
@@ -95,15 +94,6 @@ def held_over_a_switch(place: Any) -> None:
     QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=QPoint(50, 16))
 
 
-FOUND_VALUES = EstimateShown(
-    source="other",
-    sources=(*SOURCES, *LSL),
-    rows=(EstimateRow("Drag coefficient", "0.4203", "0.419 … 0.422"), EstimateRow("Decay", "0.99", "0.98 … 1")),
-    message="Residual 0.052 N, 12 % of the force; 10 s measured",
-    sound=True,
-    may_apply=True,
-    may_follow=True,
-)
 LAB: Actions = {
     "moved": lambda place: place.show_view(still_view(**flowing())),
     "B felt": lambda place: place.show_view(still_view(workbench().switch(), **flowing())),
@@ -113,14 +103,8 @@ LAB: Actions = {
     "refused": refused,
     "Esc leaves what was refused": left_by_escape,
     "a knob held over a switch": held_over_a_switch,
-    "flow curves, blind": lambda place: place.show_view(still_view(blind(slime("ketchup", "honey")))),
-    "flow curves": lambda place: place.show_view(still_view(slime("ketchup", "honey"), estimate=FOUND_VALUES)),
-    "other force limit": lambda place: (
-        clicked("estimate.apply", "estimate.follow")(place),
-        place.show_view(still_view(slime("ketchup", "honey").change("scene.force_limit_n", 4.0), study="own")),
-    ),
-    "estimate fails": of_lab(
-        estimate=replace(FOUND_VALUES, sound=False, may_apply=False, follows=True, message="Too little motion.")
+    "other force limit": lambda place: place.show_view(
+        still_view(slime("ketchup", "honey").change("scene.force_limit_n", 4.0), study="own")
     ),
     "busy": lambda place: (of_lab(busy="Opening the Falcon")(place), shown_now(place)),
     "trouble": in_turn(clicked("note.cancel"), of_lab(trouble="No Falcon answers: check its cable.")),

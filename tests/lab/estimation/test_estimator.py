@@ -1,8 +1,5 @@
 """Planted values are found in measured force, and only where the motion shows them."""
 
-from concurrent.futures import Executor, Future
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -136,20 +133,6 @@ def test_laws_without_the_coefficient_are_refused() -> None:
         OnlineEstimator(load_scene("rek2024", "honey"), NAMES)
     with pytest.raises(StudyError, match="cannot be estimated online"):
         OnlineEstimator(WATER, (DRAG, "decay"))
-
-
-def test_a_search_that_fails_fails_once() -> None:
-    class Failing(Executor):
-        def submit(self, *_words: object, **_options: object) -> Any:
-            failed: Future[None] = Future()
-            failed.set_exception(MemoryError("too many rows"))
-            return failed
-
-    estimator = OnlineEstimator(WATER, NAMES, executor=Failing())
-    rows = measured(planted(), *stirring(2.0))
-    with pytest.raises(MemoryError):
-        fed(estimator, rows)
-    assert not estimator.estimate.identified
 
 
 def test_a_measurement_that_is_short_slow_or_interrupted_is_said() -> None:
