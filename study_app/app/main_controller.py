@@ -18,7 +18,7 @@ from study_app.app.session.timing import collecting_here
 from study_app.devices.descriptor import Backend
 from study_app.devices.registry import backends, descriptor_of
 from study_app.errors import DeviceError, StoreError
-from study_app.gui.application import application_here, open_here
+from study_app.gui.application import application_here
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog, diagnosis
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.display.screens import place
@@ -28,7 +28,6 @@ from study_app.gui.home.study_facts import DraftWords
 from study_app.gui.home.view import HomePlace
 from study_app.gui.kit.devices import (
     DeviceShown,
-    benches_shown,
     device_named,
     devices_shown,
     screen_number,
@@ -175,8 +174,6 @@ class DevicesController(QObject):
                 self._workstation.change(detail)
             case "diagnose":
                 self.diagnose(detail)
-            case "report":
-                open_here(detail)
             case "leave":
                 self.end_diagnosis()
 
@@ -231,7 +228,6 @@ class DevicesController(QObject):
         if self.place is not None:
             self.place.show_looking(self.looking.busy)
             self.place.show_devices(self.shown, self._workstation.settings.device)
-            self.place.show_benches(benches_shown(self._workstation.settings.benches))
             self.place.show_options(self._workstation.settings.device_options)
 
 
@@ -408,6 +404,7 @@ class MainController(QObject):
             saved.connect(self._show_saved)
         self.designer.feeling.asked.connect(self._feel)
         self.designer.place.form.foot.glossary.clicked.connect(lambda: self.show_help("glossary"))
+        self.designer.place.keys_asked.connect(lambda: self.show_help("designer-keys"))
         self.designer.editing.opened_other.connect(self._forget_study)
         self.designer.feeling.returned.connect(lambda: self.window.go("designer"))
         return self.designer.place

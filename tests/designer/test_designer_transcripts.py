@@ -51,7 +51,7 @@ def by_keys(record: Record) -> None:
 def adding_and_deleting(record: Record) -> None:
     record.play("ctrl+1 Insert 'question' Down Return ctrl+z Insert 'Language: Du' Return ctrl+z ctrl+shift+d")
     record.play("@conditions.late ctrl+shift+d '50 100 x' Return Escape")
-    record.play("@liquids.thin ctrl+1 Delete Escape Delete Return ctrl+z ctrl+c ctrl+v shift+Down ctrl+d Delete")
+    record.play("@liquids.thin ctrl+1 Delete Escape Delete Return ctrl+z shift+Down ctrl+d Delete")
 
 
 def problems(record: Record) -> None:
@@ -96,19 +96,10 @@ def series(record: Record) -> None:
     record.play(" ".join(f"@{path} ctrl+shift+d Escape" for path in ("study", "blocks.liquids", "blocks")))
 
 
-def copies(record: Record) -> None:
-    record.play("@conditions.late ctrl+1 ctrl+c")
-    record.lines += QApplication.clipboard().text().splitlines()
-    record.play("ctrl+v ctrl+z")
-    questions, item = "1. How cold was it?\n- Did it smell?\n", ("questionnaires", "liquid", "items", 1)
-    liquid = "[liquids.thin]\n# own\ndensity_kg_m3 = 1000\n"
-    for text, path in ((questions, item), (questions, ("study",)), (liquid, item), ("[study", ("study",))):
-        QApplication.clipboard().setText(text)
-        record.select(*path)
-        record.play("ctrl+1 ctrl+v ctrl+z")
+def entries(record: Record) -> None:
     record.select(*LISTED[:2])
     record.note("first entry", record.designer.field(*LISTED).rows[0].setFocus)
-    record.play("alt+Down shift+Up ctrl+c alt+Down Delete ctrl+z ctrl+z Return alt+Left")
+    record.play("alt+Down shift+Up alt+Down Delete ctrl+z ctrl+z Return alt+Left")
 
 
 def finding(record: Record) -> None:
@@ -140,7 +131,7 @@ def editing(record: Record) -> None:
 
 QUICK = (editing, new_study)
 FLOWS = (
-    each_element, on_disk, by_keys, adding_and_deleting, problems, series, copies, finding, languages, small_window,
+    each_element, on_disk, by_keys, adding_and_deleting, problems, series, entries, finding, languages, small_window,
 )  # fmt: skip
 
 

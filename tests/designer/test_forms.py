@@ -4,9 +4,8 @@ from typing import Any
 
 import pytest
 import shiboken6
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QMouseEvent
-from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
 from study_app.designer.document.steps import AddKey, RenameElement
 from study_app.designer.form.fields import HAND_ON_MS, TypedSentence, TypedText
@@ -49,48 +48,6 @@ ITEMS = (*QUESTIONNAIRE, "items")
 
 def press(qtbot: Any, part: QWidget) -> None:
     qtbot.mouseClick(part, Qt.MouseButton.LeftButton)
-
-
-def test_a_target_is_dragged_moved_by_keys_and_typed(qtbot: Any, designer: Any) -> None:
-    designer.open("kitchen", "tasks", "reach")
-    before = designer.text
-    field = designer.field("tasks", "reach", "targets_mm")
-
-    def targets() -> Any:
-        return designer.value("tasks", "reach", "targets_mm")
-
-    QApplication.processEvents()
-    view = field.front
-    start, end = (view.place(point).toPoint() for point in ((30.0, 0.0, 0.0), (20.0, 12.0, 0.0)))
-    qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=start)
-    for share in (0.3, 0.6, 1.0):
-        QApplication.sendEvent(view, _drag(view, start + (end - start) * share))
-    assert targets() == ((-30, 0, 0), (30, 0, 0))
-    qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=end)
-    x, y, z = targets()[1]
-    assert (x, z) == (pytest.approx(20, abs=1), 0)
-    assert y == pytest.approx(12, abs=1)
-    assert len(designer.steps) == 1
-    field.above.setFocus()
-    qtbot.keyClick(field.above, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
-    assert targets()[1] == (x, y, 5)
-    for _ in range(20):
-        qtbot.keyClick(field.above, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
-    assert targets()[1] == (x, y, 24)
-    assert designer.study.faults == ()
-    qtbot.keyClick(field.above, Qt.Key.Key_PageDown)
-    assert "target 1 of 2" in field.above.accessibleDescription()
-    line = field.lines[0][1]
-    designer.fill(line, "-7.5")
-    assert targets()[0] == (-30, -7.5, 0)
-    assert designer.undo_all() == before
-
-
-def _drag(view: QWidget, at: QPoint) -> QMouseEvent:
-    return QMouseEvent(
-        QEvent.Type.MouseMove, QPointF(at), QPointF(view.mapToGlobal(at)), Qt.MouseButton.NoButton,
-        Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier,
-    )  # fmt: skip
 
 
 def test_a_row_that_stays_keeps_its_widget_caret_and_keyboard(qtbot: Any, designer: Any, editors: None) -> None:

@@ -12,12 +12,10 @@ from study_app.designer.document.additions import (
     copy_with,
     duplicated,
     filled_in,
-    fitted,
     followed,
     listings,
     moved,
     number_row,
-    pasted,
     switched,
     with_language,
     without_language,
@@ -389,28 +387,6 @@ class AddToSession(Request):
 
 
 @dataclass(frozen=True, slots=True)
-class Paste(Request):
-    """Paste a text after an element: elements as TOML, or lines that become questions."""
-
-    path: Path
-    text: str
-
-    def step(self, at: Situation) -> Step:
-        if not at.study.is_toml:
-            raise Refused("the file cannot be read: correct its text first")
-        text, paths = pasted(at.study, self.path, self.text)
-        after, _ = at.study.typed(text)
-        edits: tuple[Edit, ...] = ()
-        now = after
-        for path in paths:
-            if len(path) == 2:
-                more = _beside(now, fitted(at.study, now, path), self.path, path)
-                edits = (*edits, *more)
-                now, _ = now.edited(*more)
-        return Step(f"Paste {titles_of(after, paths)}", edits, paths[0], text=text, several=paths)
-
-
-@dataclass(frozen=True, slots=True)
 class DeleteElement(Request):
     """Delete an element: with all that needs it, with another one in its place, or leaving gaps.
 
@@ -485,7 +461,7 @@ class Several(Request):
 
 Task: TypeAlias = Literal[
     "select", "write", "back", "find", "undo", "redo", "save", "open", "new", "begin", "banner", "add", "copy",
-    "paste", "delete", "series", "judge id", "repair", "repairs",
+    "delete", "series", "judge id", "repair", "repairs",
 ]  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from PySide6.QtGui import QColor, QKeyEvent, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QApplication, QBoxLayout, QGridLayout, QMenu, QVBoxLayout, QWidget
 
 from study_app.designer.document.steps import AddKey, LeaveText, RemoveKey, RenameElement, SetValue, SwitchKey
-from study_app.designer.form.drawn_fields import LEVELS, TARGETS, TRIAL
+from study_app.designer.form.drawn_fields import LEVELS, TRIAL
 from study_app.designer.form.fields import (
     ChecksField,
     ChoiceField,
@@ -137,7 +137,7 @@ MOST_REPAIRS = 3
 EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
     key: editor
     for editor in (
-        CONDITIONS, DESCRIPTION, SENTENCES, ORDER, POINTS, QUESTION_KIND, QUESTION_LIST, LEVELS, TRIAL, TARGETS,
+        CONDITIONS, DESCRIPTION, SENTENCES, ORDER, POINTS, QUESTION_KIND, QUESTION_LIST, LEVELS, TRIAL,
         BLOCK_ORDER, HYPOTHESES,
     )
     for key in editor.keys

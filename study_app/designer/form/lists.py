@@ -1,13 +1,12 @@
 """Lists in the form: entries that are selected, moved, copied and removed together, each time as one step."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
 from PySide6.QtCore import QEvent, QItemSelectionModel, QSize, Qt, Signal
-from PySide6.QtGui import QDropEvent, QFocusEvent, QGuiApplication, QKeyEvent, QKeySequence, QResizeEvent
+from PySide6.QtGui import QDropEvent, QFocusEvent, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QBoxLayout, QFrame, QListWidget, QListWidgetItem, QWidget
 
 from study_app.designer.document.elements import title_of
@@ -19,7 +18,6 @@ from study_app.designer.document.steps import (
     Do,
     DuplicateElement,
     MoveTo,
-    Paste,
     RemoveKey,
     Request,
     SetValue,
@@ -34,9 +32,8 @@ from study_app.designer.place.segments import FIELD_PX, cut_text, dense
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.themed import name_bars
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
-from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
-from study_app.gui.widgets.labels import Elided, figures, label
+from study_app.gui.widgets.labels import Elided, figures
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.number_text import typed_numbers
 from study_app.protocol.source.document import Path
@@ -163,12 +160,7 @@ class EntryList(Field):
         self.list.setAccessibleName(row.label)
         self.list.dropped.connect(self.move_entries)
         self.list.itemDoubleClicked.connect(lambda item: self.open(self.list.row(item)))
-        self.list.keys = {
-            "Return": self._open_current,
-            "Enter": self._open_current,
-            "Ctrl+C": self._copy,
-            "Ctrl+V": self._paste,
-        }
+        self.list.keys = {"Return": self._open_current, "Enter": self._open_current}
         if self.ordered:
             self.list.setDragDropMode(QAbstractItemView.DragDropMode.InternalMove)
             self.list.keys |= {"Alt+Up": partial(self._move_by, -1), "Alt+Down": partial(self._move_by, 1),
@@ -211,10 +203,10 @@ class EntryList(Field):
         return made
 
     def freeze(self) -> None:
-        """Change nothing from now on; entries can still be opened and copied."""
+        """Change nothing from now on; entries can still be opened."""
         self.list.setDragEnabled(False)
         self.list.setAccessibleDescription("")
-        self.list.keys = {keys: do for keys, do in self.list.keys.items() if keys in {"Return", "Enter", "Ctrl+C"}}
+        self.list.keys = {keys: do for keys, do in self.list.keys.items() if keys in {"Return", "Enter"}}
 
     @property
     def chosen(self) -> tuple[int, ...]:
@@ -269,13 +261,6 @@ class EntryList(Field):
             after = (index + rank for rank, index in enumerate(self.chosen, start=1))
             first, *others = map(self.place, self.chosen)
             self._change(DuplicateElement(first, tuple(others), stays=True), after)
-
-    def _copy(self) -> None:
-        self.asked.emit(Do("copy", (tuple(map(self.place, self.chosen)),)))
-
-    def _paste(self) -> None:
-        if text := QGuiApplication.clipboard().text().strip():
-            self.asked.emit(Paste(self.place(self.list.currentRow()), text))
 
 
 class NamesList(Choice):
@@ -416,16 +401,6 @@ class LinesField(EntryList):
             if not (self.refusal and line.property("state")):
                 line.show_text(written(value))
 
-    def _copy(self) -> None:
-        QGuiApplication.clipboard().setText("\n".join(self.lines[at].words() for at in self.chosen))
-
-    def _paste(self) -> None:
-        with suppress(ValueError):  # another text than points
-            lines = filter(str.strip, QGuiApplication.clipboard().text().splitlines())
-            added = tuple(AddEntry(self.row.path, self._value(line)) for line in lines)
-            after = range(len(self.lines), len(self.lines) + len(added))
-            self._change(Several(f"Paste into {self.row.label}", added), after)
-
     def _value(self, text: str) -> Any:
         return text if self.row.kind == "texts" else [number for _, number in typed_numbers(text)]
 
@@ -439,45 +414,6 @@ class LinesField(EntryList):
         self.came.emit()
         if not self.refusal:
             self.asked.emit(SetValue((*self.row.path, at), value, typing=True))
-
-
-class GridField(Field):
-    """A line of fields for each entry, under the heads of their columns, and a button that adds one."""
-
-    def __init__(self, row: FormRow, entry: str, heads: Sequence[str], signs: Sequence[str]) -> None:
-        super().__init__(row)
-        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        grid = grid_of(6, 6)
-        for column, words in enumerate(heads, start=1):
-            grid.addWidget(label(words, "small", "text2"), 0, column)
-        self.lines: list[list[TypedLine]] = []
-        for at, sign in enumerate(signs):
-            grid.addWidget(figures(sign, "label", "text2"), at + 1, 0)
-            self.lines.append([TypedLine(f"{entry} {at + 1}, {words}") for words in heads])
-            for column, line in enumerate(self.lines[-1]):
-                line.typed.connect(partial(self.take, at, column))
-                line.came.connect(partial(self.come, at))
-                grid.addWidget(line, at + 1, column + 1)
-            away = IconButton("cross", f"Remove {entry} {at + 1}", size=FIELD_PX, role="plain")
-            away.clicked.connect(partial(self.remove, at))
-            grid.addWidget(away, at + 1, len(heads) + 1)
-        add_layout(self.box, grid)
-        self.add = add_button(f"Add to {row.label}", entry)
-        self.add.clicked.connect(self.add_entry)
-        self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
-        self.setFocusProxy(self.lines[0][0] if self.lines else self.add)
-
-    def come(self, _at: int) -> None:
-        self.came.emit()
-
-    def take(self, at: int, column: int, text: str) -> None:
-        raise NotImplementedError
-
-    def remove(self, at: int) -> None:
-        self.asked.emit(RemoveKey((*self.row.path, at)))
-
-    def add_entry(self) -> None:
-        self.asked.emit(AddEntry(self.row.path))
 
 
 class LanguageListField(EntryList):

@@ -26,14 +26,13 @@ from study_app.designer.form.fields import (
     kept,
     written,
 )
-from study_app.designer.form.lists import GridField
 from study_app.designer.form.rows import FormRow, QuestionLine, is_right_to_left, question_lines
 from study_app.designer.measures.study_facts import valid_part
 from study_app.designer.place.segments import FIELD_PX, dense, small_button
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import Tone, TypeRole, font
 from study_app.gui.theme.themed import Themed, remove_widget
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
@@ -260,18 +259,35 @@ class BalanceChip(Extra, Chip):
 ORDER: Final = SpecialEditor((("Block", "order"),), adds=lambda _field: BalanceChip(small=True), facts=order_balance)
 
 
-class PointsField(GridField):
-    """A line for each point, a column for each language."""
+class PointsField(Field):
+    """A line for each point, a column for each language, and a button that adds a point."""
 
     def __init__(self, row: FormRow) -> None:
-        last = len(row.facts.points) - 1
-        signs = [f"{at + 1}  {({0: 'lowest', last: 'highest'}).get(at, '')}".strip() for at in range(last + 1)]
-        super().__init__(row, "Point", [language for _code, language in row.facts.languages], signs)
-        for lines in self.lines:
-            for line, (code, language) in zip(lines, row.facts.languages, strict=True):
+        super().__init__(row)
+        self.box.setDirection(QBoxLayout.Direction.TopToBottom)
+        cells, languages, last = grid(6, 6), row.facts.languages, len(row.facts.points) - 1
+        for column, (_code, language) in enumerate(languages, start=1):
+            cells.addWidget(label(language, "small", "text2"), 0, column)
+        self.lines: list[list[TypedLine]] = []
+        for at in range(last + 1):
+            sign = f"{at + 1}  {({0: 'lowest', last: 'highest'}).get(at, '')}".strip()
+            cells.addWidget(figures(sign, "label", "text2"), at + 1, 0)
+            self.lines.append([TypedLine(f"Point {at + 1}, {language}") for _code, language in languages])
+            for column, (line, (code, language)) in enumerate(zip(self.lines[-1], languages, strict=True)):
                 line.setPlaceholderText(f"Missing in {language}")
                 if is_right_to_left(code):
                     line.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
+                line.typed.connect(partial(self.take, at, column))
+                line.came.connect(self.came)
+                cells.addWidget(line, at + 1, column + 1)
+            away = IconButton("cross", f"Remove Point {at + 1}", size=FIELD_PX, role="plain")
+            away.clicked.connect(partial(self.remove, at))
+            cells.addWidget(away, at + 1, len(languages) + 1)
+        add_layout(self.box, cells)
+        self.add = add_button(f"Add to {row.label}", "Point")
+        self.add.clicked.connect(self.add_entry)
+        self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
+        self.setFocusProxy(self.lines[0][0] if self.lines else self.add)
         self.show_value()
 
     def show_value(self) -> None:

@@ -1,7 +1,6 @@
 """The tab Measures: instant numbers once the window is idle after an edit, simulated ones when the keyboard rests."""
 
 import logging
-from collections import OrderedDict
 from dataclasses import replace
 from typing import Final
 
@@ -30,14 +29,9 @@ from study_app.designer.measures.study_facts import facts, valid_part
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows
-from study_app.gui.participant.page_widgets import parts_of
 from study_app.gui.widgets.background import delayed
 from study_app.number_text import capitalised
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.document import Path
-from study_app.protocol.wording.languages import words
-from study_app.session.pages import Progress, QuestionnairePage
-from study_app.session.transitions.page_builder import questions_page
 from study_app.store.study_settings import keep_setting, kept_participants
 from study_app.workers.server import Crashed
 
@@ -47,8 +41,6 @@ ANEW: Final = "simulating …"
 IDLE_MS: Final = 20
 REST_MS: Final = 800
 LOOK_MS: Final = 100
-FIT_REST_MS: Final = 600
-KEPT_PAGES: Final = 60
 MOST_PARTICIPANTS: Final = 500
 FAILED: Final = "the process of the simulations does not start"
 
@@ -72,7 +64,6 @@ class MeasuresController(QObject):
         self._look = QTimer(self)
         self._look.setInterval(LOOK_MS)
         self._look.timeout.connect(self._take)
-        self.fit = PageFit(self)
         self._sound: Study | None = None
         self._participants: int | None = None
         self._thresholds: dict[str, float] = {}
@@ -83,7 +74,6 @@ class MeasuresController(QObject):
         editing.opened_other.connect(self._forget)
         editing.changed.connect(self._idle.start)
         repairs.found.connect(self._repairs_found)
-        self.fit.found.connect(self._idle.start)
         place.pane.tab_shown.connect(self._idle.start)
         place.entered.connect(self._idle.start)
         place.left.connect(self.leave)
@@ -120,9 +110,8 @@ class MeasuresController(QObject):
         if protocol is None or not advises(protocol):
             self._warn(())
         repairs = {row: self._repairs.get(row, ()) for row in problems}
-        parts = self.fit.parts(protocol, focus, path) if self._is_looked_at else None
         earlier = study is not opened.study
-        view = measures_view(study, facts(study), path, controls, self._simulated(), repairs, parts, earlier=earlier)
+        view = measures_view(study, facts(study), path, controls, self._simulated(), repairs, earlier=earlier)
         self._place.measures.show_measures(view)
         self._place.pane.facts.show_measures(view)
 
@@ -264,55 +253,3 @@ class MeasuresController(QObject):
 def _permitted(number: float) -> int:
     """Return the nearest number of participants that can be simulated."""
     return min(MOST_PARTICIPANTS, max(2, round(number)))
-
-
-class PageFit(QObject):
-    """Lays out pages of questions that were never seen; ``found`` follows each."""
-
-    found = Signal()
-
-    def __init__(self, parent: QObject) -> None:
-        super().__init__(parent)
-        self._known: OrderedDict[tuple[QuestionnairePage, str], int] = OrderedDict()
-        self._waiting: list[tuple[QuestionnairePage, str]] = []
-        self.rest = delayed(self, FIT_REST_MS, self._look)
-
-    def parts(self, protocol: Protocol | None, focus: Focus, path: Path) -> int | None:
-        """Return on how many parts the questions of an element stand at most; None: not known yet, or it asks none."""
-        pages = [] if protocol is None else _pages(protocol, focus, path)
-        self._waiting = [one for one in pages if one not in self._known]
-        if self._waiting:
-            self.rest.start()
-            return None
-        return max((self._known[one] for one in pages), default=None)
-
-    def _look(self) -> None:
-        if not self._waiting:
-            return
-        page, language = self._waiting.pop(0)
-        self._known[page, language] = parts_of(page, words(language))
-        while len(self._known) > KEPT_PAGES:
-            self._known.popitem(last=False)
-        if self._waiting:
-            QTimer.singleShot(0, self, self._look)
-        else:
-            self.found.emit()
-
-
-def _pages(protocol: Protocol, focus: Focus, path: Path) -> list[tuple[QuestionnairePage, str]]:
-    """Return the pages of an element's questionnaire in every language, as in the first trial of its block."""
-    name = str(path[1]) if path[0] == "questionnaires" and len(path) > 1 else None
-    if focus.block is not None and focus.block.design is None:
-        name = name or focus.block.questionnaire
-    if name is None or name not in protocol.questionnaires:
-        return []
-    questionnaire, found = protocol.questionnaires[name], []
-    for language in protocol.study.languages:
-        label, progress = name, None
-        if focus.block is not None:
-            label = protocol.text(focus.block.setting_label, language)
-            progress = Progress(focus.block.part, protocol.parts, label, 1, 2)
-        context = questionnaire.context(protocol.scales, language)
-        page = questions_page(protocol, questionnaire, questionnaire.items, context, label)
-        found.append((replace(page, progress=progress), language))
-    return found

@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from study_app.designer.document.elements import SEQUENCE, title_of
-from study_app.designer.document.fields import blocks_using, label_of, languages_of
+from study_app.designer.document.fields import blocks_using, languages_of
 from study_app.designer.document.study import Study
 from study_app.designer.measures.cards import (  # fmt: skip
-    MOST_LINES,
     NARROW_CODES,
     UNKNOWN,
     Figures,
@@ -33,22 +32,13 @@ from study_app.designer.measures.simulation import (
     focus_of,
     hypotheses_of,
 )
-from study_app.designer.measures.study_facts import (
-    Facts,
-    copied_texts,
-    own_texts,
-    revealing,
-    texts_by_language,
-    valid_part,
-)
+from study_app.designer.measures.study_facts import Facts, copied_texts, revealing, valid_part
 from study_app.designer.problems import ProblemRow
-from study_app.haptics.model.gate import calls_for
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.number_text import capitalised, counted, duration, duration_figure, duration_range
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, order_of
-from study_app.protocol.orders.durations import answering_s
 from study_app.protocol.source.document import Path
 from study_app.protocol.wording.languages import language_name
 
@@ -100,19 +90,18 @@ def measures_view(
     controls: Controls,
     simulated: Simulated,
     problems: Mapping[ProblemRow, tuple[str, ...]],
-    parts: int | None = None,
     *,
     earlier: bool = False,
 ) -> MeasuresView:
     """Return what is shown of the selected element.
 
-    ``problems`` has the words of the repairs of each as far as they were found, ``parts`` says on how many parts the
-    questions stand on a small screen, where that is known, ``earlier`` that the study is the last one without faults.
+    ``problems`` has the words of the repairs of each as far as they were found, ``earlier`` says that the study is the
+    last one without faults.
     """
     valid = valid_part(study)
     protocol, focus = valid.protocol, focus_of(valid.protocol, path)
     if protocol is None:
-        cards = _cards(study, facts, path, focus, controls, simulated, parts)
+        cards = _cards(study, facts, path, focus, controls, simulated)
         return MeasuresView(controls, simulated=simulated, cards=tuple(cards), earlier=earlier)
     block, plan = focus.block, focus.plan
     blocks = blocks_card(study, protocol, facts, path, "" if block is None else block.id)
@@ -124,24 +113,21 @@ def measures_view(
     if block is not None and levels is not None and plan is not None:
         lasts = facts.steps_s.get(block.id, 0.0)
         numbers = number_cards(levels, simulated, controls, lasts, order_of(protocol, block))
-        cards = [session_card(study, facts, path), *warnings_card(facts, simulated.warnings)]
+        cards = [session_card(study, facts, path)]
     else:
-        numbers, cards = (), _cards(study, facts, path, focus, controls, simulated, parts)
+        numbers, cards = (), _cards(study, facts, path, focus, controls, simulated)
     return MeasuresView(controls, words, numbers, levels, simulated, own, tuple(cards), asked, blocks, earlier)
 
 
 def _cards(
-    study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, simulated: Simulated, parts: int | None
+    study: Study, facts: Facts, path: Path, focus: Focus, controls: Controls, simulated: Simulated
 ) -> list[MeasureCard]:
     """Return the cards of an element without simulated tracks, those that concern it first."""
     valid, block = valid_part(study), focus.block
     protocol = valid.protocol
-    asked = path[0] == "questionnaires" and protocol is not None and path[1:2] and path[1] in protocol.questionnaires
-    found: list[MeasureCard] = [session_card(study, facts, path, None if asked else parts)]
+    found: list[MeasureCard] = [session_card(study, facts, path)]
     if protocol is None:
-        return found if study.unreadable else [*found, texts_card(study)]
-    if asked:
-        found = [questions_card(protocol, str(path[1]), parts), texts_card(study), *found]
+        return found
     if block is not None:
         found += balance_card(study, protocol, block, controls)
     if block is not None and focus.compares:
@@ -149,13 +135,9 @@ def _cards(
         who = people(controls.participants if known is None else known.participants, controls.planned)
         found.append(detectable_card(study, block, who, simulated))
     found.append(force_card(study, facts, protocol, _liquids(protocol, path, block)))
-    if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids and valid.forces:
-        found.insert(0, effects_card(study, protocol, str(path[1])))
     if block is not None and path[0] == "blocks":
         found.append(block_card(study, facts, protocol, block))
-    if not asked:
-        found.append(texts_card(study))
-    return [*found, *warnings_card(facts, simulated.warnings)]
+    return found
 
 
 def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
@@ -246,9 +228,9 @@ def _people(of: LevelBlock, simulated: Simulated, controls: Controls) -> NumberC
     return NumberCard(title, f"{100 * found.share:.0f}", "% of studies", note, more)
 
 
-def session_card(study: Study, facts: Facts, path: Path, parts: int | None = None) -> MeasureCard:
-    """Return the session in numbers, with the step that is looked at; ``parts`` as of `measures_view`."""
-    verdicts = (*_fit(parts), *text_verdicts(study, facts))
+def session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
+    """Return the session in numbers, with the step that is looked at."""
+    verdicts = text_verdicts(study, facts)
     if facts.expected_s is None or facts.range_s is None:
         unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials"))
         return MeasureCard("Session", "", (Figures(unknown), *_ruled(verdicts)))
@@ -275,20 +257,6 @@ def session_card(study: Study, facts: Facts, path: Path, parts: int | None = Non
 def _ruled(verdicts: Iterable[Verdict]) -> tuple[Part, ...]:
     """Return states below a rule; nothing where there are none."""
     return (None, *found) if (found := tuple(verdicts)) else ()
-
-
-def questions_card(protocol: Protocol, name: str, parts: int | None) -> MeasureCard:
-    """Return a questionnaire in numbers: each time it is asked, and in a session."""
-    questionnaire = protocol.questionnaires[name]
-    count = len(questionnaire.items)
-    blocks = [block for block in protocol.blocks_in_order if block.questionnaire == name]
-    times = sum(order_of(protocol, block).trials for block in blocks) + (name in protocol.forms)
-    figures = (duration_figure(answering_s(questionnaire)), (str(count), _word(count, "answer")))
-    words = f"{counted(count * times, 'answer')} per session, asked {counted(times, 'time')}"
-    asked: Verdict = ("neutral", "info", words)
-    if not times:
-        asked = ("warn", "warning", "It is never asked")
-    return MeasureCard("Each time it is asked", "", (Figures(figures), *_ruled((*_fit(parts), asked))))
 
 
 EQUAL: Final = "no power is computed for an equality"
@@ -330,15 +298,6 @@ def blocks_card(study: Study, protocol: Protocol, facts: Facts, path: Path, show
 
 def _word(count: int | None, word: str) -> str:
     return word if count == 1 else f"{word}s"
-
-
-def _fit(parts: int | None) -> tuple[Verdict, ...]:
-    """Return whether questions fit on one page; nothing where that is not known."""
-    if parts is None:
-        return ()
-    if parts == 1:
-        return (("ok", "check", "One page, no scrolling at 1366 × 768"),)
-    return (("neutral", "info", f"{parts} pages at 1366 × 768"),)
 
 
 def block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> MeasureCard:
@@ -436,46 +395,10 @@ def force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[s
             Line(_title(study, name, "liquids"), f"{it.force_n:.2f} N", min(1.0, it.force_n / limit_n), verdict)
         )
     alike = [one for one in facts.warnings if "hard to tell apart" in one and any(name in one for name in names)]
-    sentences: tuple[Verdict, ...] = tuple(("warn", "warning", _sentence(one)) for one in alike)
+    sentences: tuple[Verdict, ...] = tuple(("warn", "warning", f"{capitalised(one)}.") for one in alike)
     if not sentences and len(names) > 1:
         sentences = (("ok", "check", "No pair is hard to tell apart"),)
     return lines_card("Force of each liquid", f"0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences)
-
-
-def effects_card(study: Study, protocol: Protocol, name: str) -> MeasureCard:
-    """Return which effects act in a liquid, with their bounds, and why others do not."""
-    verdicts = [one for one in calls_for(protocol.scene_of(name)) if one.liquid == name]
-    lines = tuple(
-        Line(
-            label_of(one.effect), f"{one.bound_n:.3g} N", one.share,
-            ("ok", "check", f"in: {one.why}") if one.included else ("neutral", "minus", f"out: {one.why}"),
-        )
-        for one in verdicts
-    )  # fmt: skip
-    said = tuple((*line.verdict[:2], f"{line.title}, {line.verdict[2]}") for line in lines)
-    return lines_card(f"Effects in {_title(study, name, 'liquids')}", "largest force of each", lines, said)
-
-
-def texts_card(study: Study) -> MeasureCard:
-    """Return how many texts each language has, and the texts that reveal a condition."""
-    lines = []
-    counts = texts_by_language(study)
-    with_own = own_texts(study, counts)
-    for code, (there, wanted) in counts.items():
-        own = with_own[code][0]
-        parts = (wanted - there, "missing"), (there - own, "to translate")
-        words = ", ".join(f"{count} {what}" for count, what in parts if count)
-        verdict: Verdict = ("bad", "warning", words) if there < wanted else ("neutral", "info", words)
-        if own == wanted:
-            verdict = ("ok", "check", "complete")
-        lines.append(Line(language_name(code), f"{own} of {wanted}", own / max(1, wanted), verdict))
-    protocol = valid_part(study).protocol
-    found = () if protocol is None else revealing(study, protocol)
-    links = [
-        Link(("warn", "warning", f"{one.element}, {one.key.lower()}: “{one.word}”"), "Go there", one.path[:2])
-        for one in found[:MOST_LINES]
-    ]
-    return MeasureCard("Languages", "texts of the study", (Lines(tuple(lines)), *((None, *links) if links else ())))
 
 
 def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) -> MeasureCard:
@@ -505,14 +428,6 @@ def detectable_card(study: Study, block: Block, who: str, simulated: Simulated) 
     return lines_card(title, who, tuple(lines), (note,), simulated.waiting)
 
 
-def warnings_card(facts: Facts, more: Sequence[str]) -> list[MeasureCard]:
-    """Return the warnings of ``check``, if any; ``more`` are those about a precision, which take simulations."""
-    sentences: list[Verdict] = [("warn", "warning", _sentence(one)) for one in (*facts.warnings, *more)]
-    if more:
-        sentences.append(("neutral", "info", f"{ON_AVERAGE}."))
-    return [lines_card("Warnings", "of check", (), sentences)] if sentences else []
-
-
 def _title(study: Study, name: str, section: str = "") -> str:
     return title_of(study.document, _path(study, name, section))
 
@@ -520,9 +435,3 @@ def _title(study: Study, name: str, section: str = "") -> str:
 def _path(study: Study, name: str, section: str = "") -> Path:
     sections = (section,) if section else ("blocks", "pages", "questionnaires")
     return next((one for one in sections if name in study.document.get(one, {})), "blocks"), name
-
-
-def _sentence(words: str) -> str:
-    """Return words as a sentence; a place in the file, such as "designs.pair.feedback:", stays as it is."""
-    place = "." in words.partition(":")[0].partition(" ")[0]
-    return f"{words if place else capitalised(words)}."

@@ -65,12 +65,6 @@ def copied_texts(study: Study) -> dict[str, int]:
     return {code: count for code, count in counted.items() if count}
 
 
-def own_texts(study: Study, counts: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
-    """Return for each language how many of its texts, of `texts_by_language`, are not copied, and how many it needs."""
-    copied = copied_texts(study)
-    return {code: (there - copied.get(code, 0), wanted) for code, (there, wanted) in counts.items()}
-
-
 def to_translate(study: Study) -> tuple[str, ...]:
     """Return a warning for each language with copied texts; they prevent no session."""
     first = language_name(languages_of(study.document)[0])

@@ -8,9 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QObject, QTimer
-from PySide6.QtGui import QGuiApplication
 
-from study_app.designer.document.additions import copied
 from study_app.designer.document.document import (
     NO_ANSWERS,
     Answers,
@@ -21,8 +19,8 @@ from study_app.designer.document.document import (
     open_unsaved,
     template,
 )
-from study_app.designer.document.fields import named_at, renamed
-from study_app.designer.document.steps import DeleteElement, Do, Paste, RenameElement, Request, Step, Task
+from study_app.designer.document.fields import renamed
+from study_app.designer.document.steps import DeleteElement, Do, RenameElement, Request, Step, Task
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_text import Refused, free_in
 from study_app.designer.form.form import form
@@ -76,7 +74,7 @@ class DesignerController(QObject):
             "select": editing.select, "back": editing.go_back, "undo": editing.undo, "redo": editing.redo,
             "save": self.saving.save, "banner": self.saving.answer_banner, "open": self.open, "new": self.ask_for_new,
             "begin": self.begin, "find": self.find, "add": self._show_addable, "delete": self.ask_to_delete,
-            "series": self.ask_for_series, "copy": self.copy, "paste": self.paste, "judge id": self._judge_id,
+            "series": self.ask_for_series, "judge id": self._judge_id,
             "repair": self.repair, "repairs": self._repairs.show,
         }  # fmt: skip
         place.asked.connect(self.take)
@@ -186,21 +184,6 @@ class DesignerController(QObject):
         self.place.begin_study()
         self.show()
         self.place.nothing.new.setFocus()
-
-    # the clipboard; copying works in read-only studies, too
-
-    def copy(self, paths: tuple[Place, ...]) -> None:
-        """Put elements on the clipboard as TOML; an entry of a list of names stands for what it names."""
-        opened = self.editing.opened
-        if opened is not None and opened.study.is_toml:
-            things = [named_at(opened.study.document, path) or path for path in paths]
-            if text := copied(opened.study, things):
-                QGuiApplication.clipboard().setText(text)
-                self.place.show_step((), "Copied", fresh=False)
-
-    def paste(self) -> None:
-        if (text := QGuiApplication.clipboard().text()).strip():
-            self.editing.ask(Paste(self.editing.selected, text))
 
     # steps that ask first
 

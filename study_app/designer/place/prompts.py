@@ -1,11 +1,11 @@
-"""Cards over the place: questions before a step, and the list of keys."""
+"""Cards over the place: questions before a step."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QHeaderView, QScrollArea, QTableWidget, QTableWidgetItem, QWidget
+from PySide6.QtWidgets import QFrame, QHeaderView, QScrollArea, QTableWidget, QTableWidgetItem, QWidget
 
 from study_app.designer.document.additions import check_values, number_row, number_rows, titles_with
 from study_app.designer.document.elements import element_of, kind_and_title, title_of
@@ -14,12 +14,10 @@ from study_app.designer.document.steps import DeleteElement, MakeSeries, index_o
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.place.segments import dense
-from study_app.gui.kit.commands import COMMANDS, GROUPS, Command
 from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Card, Rule, scrolled
-from study_app.gui.widgets.controls import ActionButton, Cap, Choice, IconButton
+from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
 from study_app.number_text import exact_text, typed_numbers
 from study_app.protocol.source.document import Path, names, value_at
@@ -250,50 +248,3 @@ class SeriesCard(Prompt):
         self.refusal.setText(why)
         self.table.setAccessibleDescription(why)
         self.make.setEnabled(bool(titles))
-
-
-KEYS_HIGHEST, WIDEST = 560, 980
-COLUMNS = ((0,), (1,), (2, 3))
-"""The groups of each column."""
-
-
-class KeysCard(Themed, QFrame):
-    """A list of the keys, in groups, over the place; Esc and a click elsewhere close it."""
-
-    def __init__(self, place: QWidget) -> None:
-        super().__init__(place, Qt.WindowType.Popup)
-        self._place = place
-        self.setAccessibleName("Keys")
-        self.setProperty("role", "card")
-        self.close_button = IconButton("cross", "Close the list of keys", "Close (Esc)", size=36, role="plain")
-        self.close_button.clicked.connect(self.close)
-        self._columns = hbox(spacing=28, margins=(0, 0, 8, 0))
-        for groups in COLUMNS:
-            column = vbox(spacing=5)
-            for group in groups:
-                column.addWidget(label(GROUPS[group], "strong"))
-                for one in (one for one in COMMANDS if one.group == group):
-                    add_layout(column, self._row(one))
-                column.addSpacing(10)
-            column.addStretch()
-            add_layout(self._columns, column, 1)
-        self.area = scrolled(self._columns)
-        self.area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.area.setAccessibleName("Keys")
-        top = hbox(label("Keys", "card"), STRETCH, self.close_button)
-        vbox(top, Rule(), (self.area, 1), spacing=8, margins=18, parent=self)
-
-    @staticmethod
-    def _row(one: Command) -> QHBoxLayout:
-        where = f" ({one.within})" if "outline" in one.within else ""
-        words = label(f"{one.words}{where}", "label", "text2", wraps=True)
-        words.setAccessibleName(f"{one.words}{where}: {' or '.join(one.shown)}")
-        return hbox((words, 1), *(Cap(key) for key in one.shown), spacing=5)
-
-    def open(self) -> None:
-        around = self._place.rect()
-        inner = self._columns.totalSizeHint().height() + self.sizeHint().height() - self.area.sizeHint().height()
-        self.resize(min(WIDEST, around.width()), min(KEYS_HIGHEST, inner + 4, around.height()))
-        self.move(self._place.mapToGlobal(around.center()) - self.rect().center())
-        self.show()
-        self.area.setFocus(Qt.FocusReason.PopupFocusReason)

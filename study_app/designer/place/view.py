@@ -32,7 +32,7 @@ from study_app.designer.new_study_page import NewStudyPage, NoStudyCard, Templat
 from study_app.designer.outline import Addable, AddList, ElementPath, OutlineCard
 from study_app.designer.place.file import FileCard
 from study_app.designer.place.header import DesignerHeader, DesignerView, NoticeCard
-from study_app.designer.place.prompts import KeysCard, Prompt
+from study_app.designer.place.prompts import Prompt
 from study_app.designer.place.segments import Segments, small_button
 from study_app.designer.problems import ProblemRow, ProblemsCard, RepairButton
 from study_app.gui.kit.commands import COMMANDS, add_commands, key_cap, press, tip
@@ -487,6 +487,7 @@ class DesignerPlace(Place):
     entered = Signal()
     left = Signal()
     asked = Signal(object)
+    keys_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -503,7 +504,7 @@ class DesignerPlace(Place):
         self.sides = self.parts.sides
         self.areas = FocusAreas(self.header, self.parts, self.file, self.problems)
         self.problem_steps = ProblemSteps(self.problems, self.form, self.file, self.areas, self.finish)
-        self.adding, self.nothing, self.keys = AddList(self), NoStudyCard(), KeysCard(self)
+        self.adding, self.nothing = AddList(self), NoStudyCard()
         self._lay_out()
         self._connect()
         self._take_keys()
@@ -558,7 +559,7 @@ class DesignerPlace(Place):
         ):  # fmt: skip
             press(button, self.commands[name])
         head.delete.clicked.connect(self.delete)
-        menu = ("add", "duplicate", "copy", "paste", "up", "down", "rename", "delete")
+        menu = ("add", "duplicate", "up", "down", "rename", "delete")
         tree.addActions([self.commands[name] for name in menu])
         for action in own.values():  # elsewhere these keys are those of a list or a text
             action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
@@ -612,8 +613,8 @@ class DesignerPlace(Place):
             self.close_prompt(elsewhere=True)
         writable = not view.header.read_only and not view.form.unreadable
         of_element = writable and view.form.id is not None
-        on = dict.fromkeys(("add", "paste", "up", "down"), writable)  # "up" and "down" say why an element stays
-        on |= dict.fromkeys(("duplicate", "rename", "delete"), of_element) | {"copy": len(view.form.path) > 1}
+        on = dict.fromkeys(("add", "up", "down"), writable)  # "up" and "down" say why an element stays
+        on |= dict.fromkeys(("duplicate", "rename", "delete"), of_element)
         for name, possible in on.items():
             self.commands[name].setEnabled(possible)
         self.parts.path.show_form(view.form)

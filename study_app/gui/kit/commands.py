@@ -8,8 +8,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QAbstractButton, QWidget
 
-GROUPS: Final = ("Go to", "Selected element", "Study", "Inside a field")
-
 
 @dataclass(frozen=True, slots=True)
 class Command:
@@ -21,8 +19,6 @@ class Command:
         Its name in the program, and what it does.
     keys : tuple of str
         Each does it.
-    group : int
-        Its group, of `GROUPS`.
     within : str
         Which part of the window listens to its keys; "" for the whole window.
     held : bool
@@ -34,7 +30,6 @@ class Command:
     id: str
     words: str
     keys: tuple[str, ...]
-    group: int
     within: str = ""
     held: bool = False
     run: Callable[[Any], object] | None = None
@@ -55,44 +50,42 @@ class Command:
 
 LISTS: Final = "outline, lists"
 COMMANDS: Final = (
-    Command("outline", "Outline", ("Ctrl+1",), 0, run=lambda place: place.parts.focus_outline()),
-    Command("form", "Form", ("Ctrl+2",), 0, run=lambda place: place.areas.focus_form()),
-    Command("views", "Views, then their tabs", ("Ctrl+3",), 0, run=lambda place: place.areas.focus_pane()),
-    Command("problems", "Problems", ("Ctrl+4",), 0, run=lambda place: place.areas.focus_problems()),
-    Command("header", "Header", ("Ctrl+5",), 0, run=lambda place: place.areas.focus_header()),
-    Command("next part", "Next of these parts", ("F6",), 0, run=lambda place: place.areas.cycle(1)),
-    Command("part before", "Previous part", ("Shift+F6",), 0, run=lambda place: place.areas.cycle(-1)),
-    Command("find", "Find in the study", ("Ctrl+F",), 0, run=lambda place: place.parts.focus_find()),
-    Command("next problem", "Next problem", ("F8",), 0, run=lambda place: place.open_next_problem()),
-    Command("file", "File, and back", ("Ctrl+E",), 0, run=lambda place: place.areas.switch_to_file()),
-    Command("back", "Previous element", ("Alt+Left",), 0, run=lambda place: place.ask("back")),
-    Command("page", "Participant's page", ("Ctrl+Return",), 0),
-    Command("leave page", "Leave that page", ("Escape",), 0, "page"),
-    Command("language", "That page in the next language", ("Ctrl+L",), 0),
-    Command("add", "Add", ("Insert",), 1, run=lambda place: place.ask_to_add()),
-    Command("open entry", "Open what an entry names", ("Return",), 1, "lists"),
-    Command("duplicate", "Duplicate", ("Ctrl+D",), 1, run=lambda place: place.duplicate()),
-    Command("series", "Copies that differ in one number", ("Ctrl+Shift+D",), 1, run=lambda place: place.make_series()),
-    Command("rename", "Rename", ("F2",), 1, run=lambda place: place.rename()),
-    Command("delete", "Delete", ("Delete",), 1, LISTS, run=lambda place: place.delete()),
-    Command("up", "Move up", ("Alt+Up",), 1, run=lambda place: place.move_by(-1)),
-    Command("down", "Move down", ("Alt+Down",), 1, run=lambda place: place.move_by(1)),
-    Command("copy", "Copy", ("Ctrl+C",), 1, LISTS, run=lambda place: place.ask("copy", place.outline.selected)),
-    Command("paste", "Paste", ("Ctrl+V",), 1, LISTS, run=lambda place: place.ask("paste")),
-    Command("several", "Select several", ("Shift+Up", "Shift+Down"), 1, LISTS),
-    Command("new", "New study …", ("Ctrl+N",), 2, run=lambda place: place.begin_new()),
-    Command("open", "Open file …", ("Ctrl+O",), 2, run=lambda place: place.header.open_file()),
-    Command("save", "Save", ("Ctrl+S",), 2, run=lambda place: place.finish("save")),
-    Command("undo", "Undo", ("Ctrl+Z",), 2, run=lambda place: place.finish("undo")),
-    Command("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), 2, run=lambda place: place.finish("redo")),
-    Command("play", "Play from here", ("F5",), 2),
-    Command("stop", "Stop playing", ("Escape",), 2, "windows while playing", held=True),
-    Command("keys", "Keys", ("Shift+F1",), 2, run=lambda place: place.keys.open()),
-    Command("next field", "Next field", ("Tab",), 3, "field"),
-    Command("accept", "Accept", ("Return",), 3, "field"),
-    Command("restore", "Restore", ("Escape",), 3, "field"),
-    Command("remove", "Remove its key from the file", ("Ctrl+Delete",), 3, "field"),
-    Command("count", "Count up, down", ("Up", "Down"), 3, "field"),
+    Command("outline", "Outline", ("Ctrl+1",), run=lambda place: place.parts.focus_outline()),
+    Command("form", "Form", ("Ctrl+2",), run=lambda place: place.areas.focus_form()),
+    Command("views", "Views, then their tabs", ("Ctrl+3",), run=lambda place: place.areas.focus_pane()),
+    Command("problems", "Problems", ("Ctrl+4",), run=lambda place: place.areas.focus_problems()),
+    Command("header", "Header", ("Ctrl+5",), run=lambda place: place.areas.focus_header()),
+    Command("next part", "Next of these parts", ("F6",), run=lambda place: place.areas.cycle(1)),
+    Command("part before", "Previous part", ("Shift+F6",), run=lambda place: place.areas.cycle(-1)),
+    Command("find", "Find in the study", ("Ctrl+F",), run=lambda place: place.parts.focus_find()),
+    Command("next problem", "Next problem", ("F8",), run=lambda place: place.open_next_problem()),
+    Command("file", "File, and back", ("Ctrl+E",), run=lambda place: place.areas.switch_to_file()),
+    Command("back", "Previous element", ("Alt+Left",), run=lambda place: place.ask("back")),
+    Command("page", "Participant's page", ("Ctrl+Return",)),
+    Command("leave page", "Leave that page", ("Escape",), "page"),
+    Command("language", "That page in the next language", ("Ctrl+L",)),
+    Command("add", "Add", ("Insert",), run=lambda place: place.ask_to_add()),
+    Command("open entry", "Open what an entry names", ("Return",), "lists"),
+    Command("duplicate", "Duplicate", ("Ctrl+D",), run=lambda place: place.duplicate()),
+    Command("series", "Copies that differ in one number", ("Ctrl+Shift+D",), run=lambda place: place.make_series()),
+    Command("rename", "Rename", ("F2",), run=lambda place: place.rename()),
+    Command("delete", "Delete", ("Delete",), LISTS, run=lambda place: place.delete()),
+    Command("up", "Move up", ("Alt+Up",), run=lambda place: place.move_by(-1)),
+    Command("down", "Move down", ("Alt+Down",), run=lambda place: place.move_by(1)),
+    Command("several", "Select several", ("Shift+Up", "Shift+Down"), LISTS),
+    Command("new", "New study …", ("Ctrl+N",), run=lambda place: place.begin_new()),
+    Command("open", "Open file …", ("Ctrl+O",), run=lambda place: place.header.open_file()),
+    Command("save", "Save", ("Ctrl+S",), run=lambda place: place.finish("save")),
+    Command("undo", "Undo", ("Ctrl+Z",), run=lambda place: place.finish("undo")),
+    Command("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), run=lambda place: place.finish("redo")),
+    Command("play", "Play from here", ("F5",)),
+    Command("stop", "Stop playing", ("Escape",), "windows while playing", held=True),
+    Command("keys", "Keys", ("Shift+F1",), run=lambda place: place.keys_asked.emit()),
+    Command("next field", "Next field", ("Tab",), "field"),
+    Command("accept", "Accept", ("Return",), "field"),
+    Command("restore", "Restore", ("Escape",), "field"),
+    Command("remove", "Remove its key from the file", ("Ctrl+Delete",), "field"),
+    Command("count", "Count up, down", ("Up", "Down"), "field"),
 )
 _OF: Final = {one.id: one for one in COMMANDS}
 _NAMES: Final = {"Return": "Enter", "Escape": "Esc", "Insert": "Ins", "Delete": "Del"}

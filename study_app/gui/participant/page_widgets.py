@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from PySide6.QtCore import QSize
-from PySide6.QtGui import QPixmap, QResizeEvent
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtGui import QPixmap
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.participant.forms.questions_page import FormWidget
 from study_app.gui.participant.intervals.answer_page import ChoiceWidget, FeedbackWidget, NumberWidget
 from study_app.gui.participant.pages.page_widget import PageContext, PageWidget
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.pages.text_page import NoticeWidget, PauseWidget, TextWidget
-from study_app.protocol.wording.languages import Words
 from study_app.session.pages import (
     ChoicePage,
     EndPage,
@@ -52,17 +49,3 @@ def _picture(widget: QWidget) -> QPixmap | None:
     if isinstance(widget, PauseWidget):
         return widget.under
     return widget.grab() if widget.width() > 0 else None
-
-
-SMALL_SCREEN: Final = (1366, 768)
-
-
-def parts_of(page: QuestionnairePage, words: Words, size_px: tuple[int, int] = SMALL_SCREEN) -> int:
-    """Return on how many parts a page of questions stands in a window of a size."""
-    kind = QuestionnaireWidget if page.labels else FormWidget
-    made = kind(page, PageContext(words, time.monotonic))
-    made.resize(*size_px)
-    QApplication.sendEvent(made, QResizeEvent(QSize(*size_px), QSize()))  # it is never shown
-    found = len(made.parts)
-    made.deleteLater()
-    return found

@@ -33,12 +33,12 @@ SIZE: Final = (1180, 800)
 PAINT_MS: Final = 15
 VIDEO_HZ: Final = 30
 SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
-PLAY: Final = Command("play again", "Play, pause", ("Space",), 0)
+PLAY: Final = Command("play again", "Play, pause", ("Space",))
 STEPS: Final = (
-    (Command("sample before", "Previous sample", (",",), 0), "sample", -1),
-    (Command("frame before", "Previous frame", ("Left",), 0), "frame", -1),
-    (Command("frame after", "Next frame", ("Right",), 0), "frame", 1),
-    (Command("sample after", "Next sample", (".",), 0), "sample", 1),
+    (Command("sample before", "Previous sample", (",",)), "sample", -1),
+    (Command("frame before", "Previous frame", ("Left",)), "frame", -1),
+    (Command("frame after", "Next frame", ("Right",)), "frame", 1),
+    (Command("sample after", "Next sample", (".",)), "sample", 1),
 )
 """Each with what it steps by, and which way."""
 CAPS: Final = {"Left": "←", "Right": "→"}

@@ -8,12 +8,10 @@ import pytest
 from study_app.designer.document.additions import (
     added,
     check_values,
-    copied,
     filled_in,
     followed,
     moved,
     number_row,
-    pasted,
     texts_of,
     with_language,
 )
@@ -39,7 +37,7 @@ from study_app.protocol.groups import sequences_in
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.source.document import Path, entries
 from tests.designer.document.grown import PROTOCOLS, texts
-from tests.designer.document.random_edits import at, owners
+from tests.designer.document.random_edits import at
 
 NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))
 
@@ -162,8 +160,6 @@ def test_values_are_refused_in_one_sentence(study: Study, values: tuple[float, .
 
 
 TEXTS = texts()
-PASTED = 8
-"""So many elements of each text are copied, evenly spread."""
 
 
 @pytest.mark.slow
@@ -181,43 +177,6 @@ def test_entries_come_together_to_their_place_in_their_order(name: str) -> None:
             wanted = [*rest[:first], *(listed[index] for index in chosen), *rest[first:]]
             assert list(at(after.document, place)) == wanted
             assert [at(after.document, path) for path in paths] == [listed[index] for index in chosen]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", TEXTS)
-def test_a_pasted_copy_has_the_values_and_comments_of_its_original(name: str) -> None:
-    study = Study(TEXTS[name])
-    before = owners(study.text)
-    found = [path for path, value in entries(study.document, "*.*") if isinstance(value, dict)]
-    found += [path for path, _ in entries(study.document, "questionnaires.*.items.*")]
-    for path in found[:: max(1, len(found) // PASTED)]:
-        try:
-            made, (copy,) = pasted(study, path, copied(study, [path]))
-        except Refused:
-            assert path[0] in {"study", "scene", "device", "analysis", "limits"}
-            continue
-        after = Study(made, before=study.document)
-        old, new = at(study.document, path), at(after.document, copy)
-        assert {**old, "id": 0} == {**new, "id": 0}
-        if f"[{path[0]}.{path[1]}]" in study.text or len(path) > 2:
-            comments = owners(made)
-            for (place, comment), count in before.items():
-                if place[: len(path)] == path:
-                    assert comments[(*copy, *place[len(path) :]), comment] >= count, (path, comment)
-        lines = set(study.text.splitlines())
-        assert lines <= set(made.splitlines())
-
-
-def test_keys_before_a_header_do_not_end_up_in_another_table() -> None:
-    study = Study(TEXTS["demo"])
-    made, _ = pasted(study, ("liquids", "thick"), "liquids.honey.density_kg_m3 = 1_420\n")
-    assert Study(made).document["liquids"]["honey"] == {"density_kg_m3": 1420}
-
-
-@pytest.mark.parametrize("text", ["study.name = 'x'", "liquids.x = 5", "# a comment", "liquids = 4", "other.x.y = 1"])
-def test_what_is_no_element_of_a_study_is_refused(text: str) -> None:
-    with pytest.raises(Refused):
-        pasted(Study(TEXTS["demo"]), ("liquids", "thick"), text)
 
 
 TITLE = ("pages", "welcome", "title")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.additions import copied, number_rows
+from study_app.designer.document.additions import number_rows
 from study_app.designer.document.fields import Row, row_at, rows
 from study_app.designer.document.steps import (
     AddElement,
@@ -20,7 +20,6 @@ from study_app.designer.document.steps import (
     DuplicateElement,
     MakeSeries,
     MoveElement,
-    Paste,
     RemoveKey,
     RenameElement,
     Request,
@@ -102,7 +101,6 @@ def of_element(study: Study, path: Path) -> Iterator[Request]:
     yield from (MoveElement(path, by) for by in (-1, 1))
     yield from (DeleteElement(path, how) for how in ("gaps", "all"))
     yield RenameElement(path, "renamed")
-    yield Paste(path, copied(study, (path,)))
     yield from (MakeSeries(path, row.path, (3, 7, 20)) for row in number_rows(document, path)[:2])
     others = [one for one, _ in entries(document, f"{path[0]}.*") if one[1] != path[1]]
     if others and len(path) == 2:
@@ -116,7 +114,6 @@ def of_element(study: Study, path: Path) -> Iterator[Request]:
 
 def of_study(study: Study) -> Iterator[Request]:
     yield from (ChangeLanguage(how, code) for how, code in (("add", "de"), ("remove", "nl"), ("copy", "nl")))
-    yield Paste((), "A question?\nAnother question?")
 
 
 def generic(path: Path) -> Path:

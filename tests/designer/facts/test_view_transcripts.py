@@ -141,7 +141,7 @@ def of_blocks(study: Study, simulated: Simulated) -> Iterator[str]:
     for name in study.document["blocks"]:
         for people in (1, 13):
             controls = Controls(people, threshold=0.19, planned=12)
-            view = measures_view(study, facts(study), ("blocks", name), controls, simulated, {}, 2)
+            view = measures_view(study, facts(study), ("blocks", name), controls, simulated, {})
             yield from value_lines(measures(view))
 
 

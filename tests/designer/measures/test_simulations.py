@@ -1,19 +1,17 @@
 """Numbers of Measures that take simulations: from the worker to their cards, and while a part is broken."""
 
-import time
 from concurrent.futures import Executor, Future
 from dataclasses import replace
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QSize, Qt
 
 from study_app.analysis.planning.threshold_studies import Precisions, plans, sweep, threshold_markdown
 from study_app.designer.document.document import template
 from study_app.designer.document.steps import DuplicateElement, RetypeFile, Situation
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.measures.measures_controller import ANEW, _pages
+from study_app.designer.measures.measures_controller import ANEW
 from study_app.designer.measures.measures_view import FAILED
 from study_app.designer.measures.simulation import (
     ENOUGH,
@@ -27,13 +25,9 @@ from study_app.designer.measures.simulation import (
     simulation_of,
     start_measure_worker,
 )
-from study_app.gui.participant.page_widgets import parts_of
-from study_app.gui.participant.pages.page_widget import PageContext
-from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.protocol.checks.expected_precision import imprecise, threshold_plan
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped_file
-from study_app.protocol.wording.languages import words
 from study_app.workers.server import Crashed, Stopped
 from tests.designer.measures.conftest import Worker, jnd, shown
 
@@ -78,8 +72,6 @@ def test_slow_numbers_come_are_given_up_and_are_kept(qtbot: Any, designer: Any, 
 
     designer.window.go("home")
     assert not worker.works  # a session may begin: nothing is simulated any more
-    designer.controller.measures.fit.found.emit()  # as what was looked for when it was left
-    qtbot.wait(120)
     assert not designer.controller.measures.rest.isActive()
 
 
@@ -240,22 +232,6 @@ def test_what_is_wanted_depends_on_forces_and_tasks_and_on_no_text() -> None:
     assert wanted() == same
     assert wanted() != wanted(Set(("liquids", "honey", "density_kg_m3"), 1300))
     assert wanted() != wanted(Set(("tasks", "explore", "max_s"), 61))
-
-
-PATH = ("questionnaires", "liquid")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("size", "expected"), [((1366, 768), 1), ((1024, 560), 2), ((800, 420), 3)])
-def test_a_page_never_shown_has_the_parts_of_one_that_is(qtbot: Any, size: tuple[int, int], expected: int) -> None:
-    protocol = load("rek2024")
-    (page, language), _ = _pages(protocol, focus_of(protocol, PATH), PATH)
-    shown = QuestionnaireWidget(page, PageContext(words(language), time.monotonic))
-    qtbot.addWidget(shown)
-    shown.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
-    shown.resize(QSize(*size))
-    shown.show()
-    assert parts_of(page, words(language), size) == len(shown.parts) == expected
 
 
 def test_an_order_is_given_up_before_its_first_number() -> None:
