@@ -18,7 +18,7 @@ from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.home.dialogs import NewSessionDialog
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.home.study_facts import Interrupted
-from study_app.gui.kit.devices import BenchShown, devices_shown
+from study_app.gui.kit.devices import devices_shown
 from study_app.gui.preflight.window import computer_checks
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
@@ -93,7 +93,6 @@ DIAGNOSIS: Actions = {
     "saved": lambda made: made.save_support(Path("help.zip")),
     "again": lambda made: made.again.click(),
     "well": says(FALCON_WELL),
-    "a row is opened": lambda made: made.rows[0].more.click(),
     "refused": lambda made: (made.again.click(), says(Refused("'mouse' is none"))(made)),
     "closed": lambda made: made.close_button.click(),
 }
@@ -109,15 +108,12 @@ DEVICES: Actions = {
     "another preferred": of_devices(preferred="falcon-emulated"),
     "looking": lambda place: place.show_looking(True),
     "firmware": lambda place: (place.show_looking(False), place.show_options({"firmware": Path("/there/f.bin")})),
-    "benches": lambda place: place.show_benches(
-        {"falcon": BenchShown("Measured: mass 0.20 kg.", Path("b.md")), "mouse": BenchShown("Missing: /gone.", None)}
-    ),
     "pressed": in_turn(
-        clicked("rows.falcon.title", "rows.falcon.diagnose", "rows.falcon.report", "refresh"),
+        clicked("rows.falcon.title", "rows.falcon.diagnose", "refresh"),
         typed("options.firmware.editor.control", " "),
         lambda place: (place.enter(), place.leave(), place.resize(928, 640)),
     ),
-    "no benches, light": lambda place: (place.show_benches({}), apply_theme(place, LIGHT)),
+    "light": lambda place: apply_theme(place, LIGHT),
 }
 
 

@@ -14,7 +14,7 @@ from study_app.gui.home import dialogs
 from study_app.gui.sessions import session_page
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.main_view import Place
-from tests.gui.results.states import NOW, READ, RECORD, read, waves
+from tests.gui.results.states import NOW, READ, RECORD, read
 from tests.gui.states import STATES
 from tests.gui.transcript import compare, states, steps
 from tests.gui.walk import settle
@@ -39,9 +39,8 @@ def alike_every_time(qapp: QApplication, monkeypatch: pytest.MonkeyPatch, tmp_pa
     two_screens(monkeypatch)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(dialogs, "draw_seed", lambda: SEED)
-    READ.update(record=RECORD, motion=waves())
+    READ.update(record=RECORD)
     monkeypatch.setattr(session_page, "read_record", lambda _folder: read("record"))
-    monkeypatch.setattr(session_page, "motion", lambda _recording: read("motion"))
     for module in CLOCKS:
         monkeypatch.setattr(f"study_app.gui.{module}.datetime", FixedTime)
     flashes_ms = qapp.cursorFlashTime()

@@ -55,7 +55,6 @@ from study_app.session.transitions.events import (
 )
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.blinding import opened
-from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.program_log import DEVICE_FAILED
 from study_app.store.progress import progress_of
@@ -346,8 +345,6 @@ class SessionBridge(QObject):
                 post(RepeatRequested(self._now(), *details))
             case "note" | "mark":
                 post(Note(self._now(), what, *details or ("",)))
-            case "exclude":
-                self._exclude(*details)
             case "end":
                 post(EndRequested(self._now(), *details))
             case "diagnose":
@@ -382,18 +379,6 @@ class SessionBridge(QObject):
         if self.reconnection is not None and self.runner.state.lost_device:
             self.reconnection.begin()
             self._show()
-
-    def _exclude(self, trial: int | None, reason: str) -> None:
-        """Exclude a trial or the session; if that fails, the session continues, and a message appears."""
-        if self.parts.exclude is None:
-            return
-        try:
-            self.parts.exclude(trial, reason)
-        except StudyError as error:
-            self.operator.show_message("It was not excluded", f"{error}.")
-        else:
-            what = "the session" if trial is None else f"trial {trial}"
-            self.record_note(f"excluded from the analysis: {what}: {reason}")
 
     def record_note(self, text: str) -> None:
         """Write a note to the journal while the session runs; after its end do nothing."""
@@ -555,7 +540,6 @@ def connect_windows(
         recorder=store.recorder,
         outlets=store.outlets,
         start=start,
-        exclude=_excluder(chosen),
         reconnect=_reconnecting(rig, videos),
         videos=videos,
         aim_m=_aim(hand, servo),
@@ -602,16 +586,6 @@ def _reconnecting(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any
         return rig.described
 
     return reconnect
-
-
-def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
-    """Return what leaves the session, or one of its trials, out of the analysis for a reason."""
-
-    def leave_out(trial: int | None, reason: str) -> None:
-        by = chosen.operator or "operator"
-        exclude(chosen.results, chosen.participant, chosen.session, trial=trial, by=by, reason=reason)
-
-    return leave_out
 
 
 def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, rig: Rig) -> Session:

@@ -63,11 +63,10 @@ class WatchedJournal:
 class Parts:
     """The parts of a session, except its windows.
 
-    ``session`` is what the operator sees of it throughout; ``key`` is block → code → condition or track
-    and ``secret`` the sealed key's nonce, never shown; ``start``
-    is where a resumed session goes on. ``exclude`` leaves a trial, or with None the session, out of the analysis for a
-    reason. ``aim_m`` gives where hand or pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse
-    on, None where the device is not the mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
+    ``session`` is what the operator sees of it throughout; ``key`` is block → code → condition or track and ``secret``
+    the sealed key's nonce, never shown; ``start`` is where a resumed session goes on. ``aim_m`` gives where hand or
+    pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse on, None where the device is not the
+    mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
     ``outlets`` send its events to other programs; ``videos`` are those of the study, None where it shows none.
     ``reconnect`` opens a device or video that failed again, with the servo at zero force; it may take minutes.
     """
@@ -83,7 +82,6 @@ class Parts:
     outlets: Outlets | None = None
     start: Start = FIRST
     secret: bytes = field(default=b"", repr=False)
-    exclude: Callable[[int | None, str], None] | None = None
     point_to: Callable[[float, float, float], None] | None = None
     press: Callable[[int], None] | None = None
     hand_for: Callable[[Page], Hand | None] | None = None

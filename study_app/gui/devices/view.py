@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QLabel, QWidget
 
 from study_app.devices.descriptor import DeviceOption
-from study_app.gui.kit.devices import BenchShown, DeviceShown, remembered_options
+from study_app.gui.kit.devices import DeviceShown, remembered_options
 from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, file_of
 from study_app.gui.theme.theme import font
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
@@ -25,7 +25,7 @@ INSET = 30  # behind a radio's mark
 
 
 class DeviceRow(QWidget):
-    """One device, and its last bench; ``ask`` is given what is asked for of it."""
+    """One device; ``ask`` is given what is asked for of it."""
 
     def __init__(self, shown: DeviceShown, ask: Callable[..., object]) -> None:
         super().__init__()
@@ -40,19 +40,12 @@ class DeviceRow(QWidget):
         self.diagnose.setAccessibleName(f"Diagnose {shown.title}")
         self.diagnose.setVisible(shown.diagnosable)
         self.diagnose.clicked.connect(lambda: ask("diagnose", self.name))
-        self.bench = _words("text2")
-        self.report = ActionButton("file", "Bench report", height=36)
-        self.report.setAccessibleName(f"Bench report of {shown.title}")
-        self.report.clicked.connect(lambda: ask("report", self._report))
-        self._report: Path | None = None
         inset = () if shown.choosable else (INSET,)
         head = hbox(*inset, self.title, STRETCH, self.chip, spacing=10)
-        words = vbox(self.can, self.why, self.by, self.bench, STRETCH, spacing=4)
-        buttons = vbox(self.diagnose, self.report, STRETCH, spacing=8)
-        below = hbox((words, 1), buttons, spacing=16, margins=(INSET, 0, 0, 0))
+        words = vbox(self.can, self.why, self.by, STRETCH, spacing=4)
+        below = hbox((words, 1), (self.diagnose, 0, Qt.AlignmentFlag.AlignTop), spacing=16, margins=(INSET, 0, 0, 0))
         vbox(head, below, spacing=2, margins=(0, 6, 0, 6), parent=self)
         self.show_device(shown)
-        self.show_bench(None)
 
     def show_device(self, shown: DeviceShown) -> None:
         self.chip.show_state(shown.tone, shown.sign, shown.word)
@@ -66,13 +59,6 @@ class DeviceRow(QWidget):
             line.setVisible(bool(words))
         set_ink(self.why, "warn" if shown.tone == "warn" else "text2")
         self.title.setAccessibleName(f"{shown.title}. {shown.word}. {shown.can} {shown.why}".strip())
-
-    def show_bench(self, bench: BenchShown | None) -> None:
-        """Show the last bench of the device; None: it was not measured."""
-        self._report = None if bench is None else bench.report
-        self.bench.setText("" if bench is None else bench.words)
-        self.bench.setVisible(bench is not None)
-        self.report.setVisible(self._report is not None)
 
 
 def _words(ink: str, *, small: bool = False) -> QLabel:
@@ -109,7 +95,7 @@ class HelpCard(Card):
             "Connect the USB cable and the power adapter, then press “Refresh”.",
             "“Diagnose …” finds, opens, loads, homes and tests the device without force, and says what is wrong.",
             "“liquid-study devices calibrate” measures its force with a known weight.",
-            "“liquid-study devices bench” measures any device with force in ten minutes; the result is shown here.",
+            "“liquid-study devices bench” measures any device with force in ten minutes.",
         ):
             line = label(words, "label", "text2", wraps=True, weight=400)
             line.setMinimumWidth(LEAST_WORDS)
@@ -119,8 +105,8 @@ class HelpCard(Card):
 class DevicesPlace(Place):
     """Every device with its state.
 
-    ``asked(what, detail)``: to "look" at the machine again, to "choose" a device by its name, to "diagnose" one, to
-    open a "report"; of an "option" its name and a path or None; "leave" where the place is left.
+    ``asked(what, detail)``: to "look" at the machine again, to "choose" a device by its name, to "diagnose" one; of
+    an "option" its name and a path or None; "leave" where the place is left.
     """
 
     asked = Signal(str, object)
@@ -180,10 +166,6 @@ class DevicesPlace(Place):
         if isinstance(row.title, Radio):
             self._group.addButton(row.title)
             row.title.clicked.connect(lambda: self.asked.emit("choose", device.name))
-
-    def show_benches(self, benches: Mapping[str, BenchShown]) -> None:
-        for name, row in self.rows.items():
-            row.show_bench(benches.get(name.partition(":")[0]))
 
     def show_options(self, values: Mapping[str, Path]) -> None:
         for name, card in self.options.items():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtGui import QScreen
@@ -16,51 +15,11 @@ from study_app.errors import DeviceError
 from study_app.gui.display.screens import BY_CLOCK, LOCKED, describe_screen, has_card, screen_shown, screens_shown
 from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.store import workstation
-from study_app.store.workstation import DEFAULTS, REMEMBERED_OPTIONS, DeviceBench, MachineSettings
+from study_app.store.workstation import DEFAULTS, REMEMBERED_OPTIONS, MachineSettings
 from study_app.user_folder import settings_file
 
 if TYPE_CHECKING:
     from study_app.gui.theme.theme import Tone
-
-
-@dataclass(frozen=True, slots=True)
-class BenchShown:
-    """The last bench of a device: date and numbers in ``words``; its ``report``, None where that file is missing."""
-
-    words: str
-    report: Path | None
-
-
-def benches_shown(benches: Iterable[DeviceBench]) -> dict[str, BenchShown]:
-    """Return the first bench of each device in ``benches`` (newest first), by the device's name."""
-    shown: dict[str, BenchShown] = {}
-    for bench in benches:
-        shown.setdefault(bench.name, _bench_shown(bench))
-    return shown
-
-
-def _bench_shown(bench: DeviceBench) -> BenchShown:
-    serial = f", serial number {bench.serial}" if bench.serial else ""
-    numbers = [
-        f"mass {_range(bench.mass_kg, 2)} kg",
-        f"damping {_range(bench.damping_nspm, 1)} N·s/m",
-        f"friction {_range(bench.friction_n, 2)} N",
-        f"delay {_range(bench.delay_ms, 1)} ms",
-        f"stable damping {_range(bench.stable_nspm, 0)} N·s/m",
-    ]
-    if bench.gain is not None:
-        numbers.append(f"{bench.gain:.2f} N on the scale per newton sent")
-    words = f"Measured {bench.measured}{serial}: {', '.join(numbers)}."
-    report = None if bench.report is None else Path(bench.report)
-    if report is not None and not report.is_file():
-        return BenchShown(f"{words} The report is missing: {report}.", None)
-    return BenchShown(words, report)
-
-
-def _range(of_axes: tuple[float, float, float], digits: int) -> str:
-    """Return the least and the greatest of three axes, once where they are equal."""
-    least, most = (f"{value:.{digits}f}" for value in (min(of_axes), max(of_axes)))
-    return least if least == most else f"{least} to {most}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""What the operator can do: stop the force, pause, repeat, exclude, end, write a note, have the device examined."""
+"""What the operator can do: stop the force, pause, repeat, end, write a note, have the device examined."""
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
@@ -32,13 +32,12 @@ class Actions(Card):
         self.pause = ActionButton("pause", "Pause", key="P")
         self.repeat = ActionButton("repeat", "Repeat trial …", key="R")
         self.hint = label("", "label", "text2", wraps=True, weight=400)
-        self.exclude = ActionButton("flag", "Exclude …", key="X")
         self.end = ActionButton("cross", "End session …", role="danger")
         self.close_session = ActionButton("check", "Close session", role="primary")
         self._resumes = False
         self._signs = True
-        row = hbox(self.pause, self.repeat, self.exclude, STRETCH, self.end, self.close_session, spacing=10)
-        for button in (self.pause, self.repeat, self.exclude, self.end, self.close_session):
+        row = hbox(self.pause, self.repeat, STRETCH, self.end, self.close_session, spacing=10)
+        for button in (self.pause, self.repeat, self.end, self.close_session):
             button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # its padding gives way
         self.close_session.hide()
         add_parts(self.column, row, self.hint)
@@ -46,7 +45,7 @@ class Actions(Card):
     def narrow(self, yes: bool) -> None:
         """Do without the buttons' signs where there is no room for them."""
         self._signs = not yes
-        for button, sign in ((self.repeat, "repeat"), (self.exclude, "flag"), (self.end, "cross")):
+        for button, sign in ((self.repeat, "repeat"), (self.end, "cross")):
             button.show_action("" if yes else sign, button.text())
         self._show_pause()
 

@@ -13,27 +13,20 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hb
 from study_app.gui.widgets.cards import Card, Chip, Icon, MaskedPanel
 from study_app.gui.widgets.labels import Elided, Ink, figures, label
 from study_app.gui.widgets.live_plots import (
-    LINE_PX,
     NAME_MARGIN,
     NAMES,
     NOTHING,
-    STROKE,
     Floats,
     LatenessPlot,
-    Plot,
     TracePlot,
-    draw_quickly,
     lateness_histogram,
     number,
-    step_for,
-    time_ticks,
 )
 
 FIELD = QSize(320, 210)
 """What the card asks for, whether it shows the force or hides it."""
 LEAST_SHARE = 1 / 16  # of the limit: a plot of less would show noise as large as force
 NARROWS_BELOW = 0.8  # of the reach that would do, so that a force at its edge does not make the scale come and go
-LEAST_WAKE_MPS = 0.1
 FILL_ALPHA = 46
 
 
@@ -97,78 +90,23 @@ class ForcePlot(TracePlot):
             self.size_field.setBrush(field)
 
 
-class WakePlot(Plot):
-    """How fast the liquid at the ball moves by itself, from zero up."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._asked = self.reach = LEAST_WAKE_MPS
-        self.rows_and_step: tuple[int, float] = (0, 0.0)
-        self.curve = pg.PlotCurveItem(antialias=True)
-        draw_quickly(self.curve, solid=True)
-        self.box.addItem(self.curve)
-        self.box.sigResized.connect(self._make_room)
-        self.show_ticks("bottom", time_ticks(TRACE_WINDOW_S))
-        self._right = 0.0
-        self._make_room()
-        self.apply_theme(LIGHT)
-
-    def keep_right(self, seconds: float) -> None:
-        """Leave as much room right of now as the plot above, so that both share their times."""
-        if seconds != self._right:
-            self._right = seconds
-            self._make_room()
-
-    def show_wake(self, times_s: Floats, speeds_mps: Floats) -> None:
-        """Draw speeds (n,) [m/s] over ``times_s`` (n,)."""
-        peak = max(float(speeds_mps.max(initial=0.0)), LEAST_WAKE_MPS)
-        if peak > self.reach or peak < 0.4 * self.reach:
-            self._asked = peak
-            self._make_room()
-        self.curve.setData(times_s, speeds_mps)
-
-    def _make_room(self) -> None:
-        height = max(2.0 * LINE_PX, self.box.height())
-        step = step_for(self._asked, max(1, int(height / LINE_PX / 1.5) - 1))
-        step = step if step <= self._asked else step_for(self._asked / 2.6, 1)  # one line at least above zero
-        rows = int(self._asked / step + 1e-9)
-        self.reach = self._asked
-        if (rows, step) != self.rows_and_step:
-            self.rows_and_step = (rows, step)
-            self.show_ticks("left", [(k * step, number(k * step)) for k in range(rows + 1)])
-        half = 0.5 * self.reach * LINE_PX / (height - LINE_PX)
-        self.box.setYRange(-half, self.reach + half, padding=0)
-        self.box.setXRange(-1.02 * TRACE_WINDOW_S, self._right or 0.08 * TRACE_WINDOW_S, padding=0)
-
-    def apply_theme(self, theme: Theme) -> None:
-        super().apply_theme(theme)
-        self.curve.setPen(self.stroke(theme.accent, STROKE))
-
-
 class ForceCard(Card):
-    """Force and wake, one above the other over the same ten seconds."""
+    """The force over the last ten seconds."""
 
     def __init__(self, limit_n: float) -> None:
         aside = label(f"last {TRACE_WINDOW_S:.0f} s, N; limit {limit_n:g}", "small", "text2")
         super().__init__("Force", aside, padding=16, gap=2)
         self.plot = ForcePlot(limit_n)
-        self.wake = WakePlot()
-        add_parts(self.column, (self.plot, 5), label("Wake speed, m/s in the scene", "small", "text2"), (self.wake, 3))
-        for plot in (self.plot, self.wake):
-            plot.setMinimumHeight(48)
+        self.plot.setMinimumHeight(48)
+        self.column.addWidget(self.plot, 1)
         span = f"over the last {TRACE_WINDOW_S:.0f} s"
         force = f"Force along x, y and z and its magnitude {span}, in N, with the limit of {limit_n:g} N."
         describe_plot(self.plot, "Force on the hand", force)
-        describe_plot(self.wake, "Wake speed", f"Speed of the wake in the scene {span}, in m/s.")
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
-        """Draw force and wake as of now, on the servo's clock."""
-        times_s, forces_n, wakes_mps = forces.trace(now_ns)
-        self.plot.show_forces(times_s, forces_n)
-        self.wake.keep_right(float(self.plot.box.viewRange()[0][1]))
-        self.wake.show_wake(times_s, wakes_mps)
-        for plot in (self.plot, self.wake):
-            plot.paint_now()
+        """Draw the force as of now, on the servo's clock."""
+        self.plot.show_forces(*forces.trace(now_ns))
+        self.plot.paint_now()
 
     def sizeHint(self) -> QSize:
         return FIELD

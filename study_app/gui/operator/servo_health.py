@@ -206,7 +206,7 @@ STEP_NS = round(TRACE_STEP_S * 1e9)
 ROWS = round(TRACE_WINDOW_S / TRACE_STEP_S) + 2
 LIMITERS = tuple(limiter for limiter in ALL_LIMITERS if not limiter.expected)
 """Limiters that are counted: fading in and the stop are no sign of anything, and are said elsewhere."""
-FORCE, SIZE, WAKE = slice(0, 3), 3, 4
+FORCE, SIZE = slice(0, 3), 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,7 +244,7 @@ class Forces:
     def __init__(self, limit_n: float) -> None:
         self.limit_n = limit_n
         self._steps = np.full(ROWS, -1, np.int64)  # which 20 ms, on the servo's clock
-        self._rows = np.zeros((ROWS, 5))  # x, y, z, size [N], wake [m/s]
+        self._rows = np.zeros((ROWS, 4))  # x, y, z, size [N]
         self._written = 0
         self._scene = 0
         self._now_n = self._most_n = 0.0
@@ -255,21 +255,19 @@ class Forces:
         """Take new samples, in order (a recarray of ``layout.SAMPLE``)."""
         if len(samples) == 0:
             return
-        rows = np.empty((len(samples), 5))
+        rows = np.empty((len(samples), 4))
         rows[:, FORCE] = samples["device_force_n"]
         rows[:, SIZE] = np.sqrt(np.einsum("ij,ij->i", rows[:, FORCE], rows[:, FORCE]))
-        rows[:, WAKE] = np.sqrt(np.einsum("ij,ij->i", samples["wake_mps"], samples["wake_mps"]))
         self._keep(samples["time_ns"] // STEP_NS, rows)
         self._count(samples, rows[:, SIZE])
 
-    def trace(self, now_ns: int) -> tuple[Floats, Floats, Floats]:
-        """Return times before now [s] (n,), oldest first, forces [N] (n, 4: x, y, z, size) and wake speeds [m/s]."""
+    def trace(self, now_ns: int) -> tuple[Floats, Floats]:
+        """Return times before now [s] (n,), oldest first, and forces [N] (n, 4: x, y, z, size)."""
         kept = min(self._written, ROWS)
         order = np.arange(self._written - kept, self._written) % ROWS
         times_s: Floats = (self._steps[order] * STEP_NS - now_ns).astype(np.float64) * 1e-9
         recent = times_s >= -TRACE_WINDOW_S
-        rows = self._rows[order][recent]
-        return times_s[recent], rows[:, : SIZE + 1], rows[:, WAKE]
+        return times_s[recent], self._rows[order][recent]
 
     def figures(self) -> ForceFigures:
         counted = tuple(

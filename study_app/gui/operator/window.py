@@ -203,7 +203,6 @@ class OperatorWindow(Themed, QMainWindow):
             signal.connect(partial(self._press, what))
         buttons.pause.clicked.connect(lambda: ask(buttons.paused))
         buttons.repeat.clicked.connect(self.ask_to_repeat)
-        buttons.exclude.clicked.connect(self.ask_to_exclude)
         buttons.end.clicked.connect(self.ask_to_end)
         buttons.close_session.clicked.connect(self.close)
         self.notes.note_written.connect(partial(ask, "note"))
@@ -249,7 +248,7 @@ class OperatorWindow(Themed, QMainWindow):
         self.draw(self.position.show_health, health, now_s)
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
-        """Draw force and wake (30 times a second), where they are not hidden."""
+        """Draw the force (30 times a second), where they are not hidden."""
         if isinstance(self.force, ForceCard):
             self.draw(self.force.show_forces, forces, now_ns)
 
@@ -269,22 +268,6 @@ class OperatorWindow(Themed, QMainWindow):
                 needs={"reason": REASON},
             )
             self._asks_about = setting
-
-    def ask_to_exclude(self) -> None:
-        """Ask what does not count, and why."""
-        if self._view is not None:
-            trial = () if self._view.trial is None else ((self._view.trial, _setting(self._view)),)
-            self._ask(
-                "exclude",
-                "Exclude this from the analysis?",
-                "Nothing is deleted. The list of exclusions records what was excluded, by whom and why.",
-                ActionButton("flag", "Exclude", role="primary"),
-                fields=(
-                    Field("what", "Scope", "radio", (*trial, (None, "Whole session"))),
-                    Field("reason", "Reason", placeholder="For example: talked during the trial"),
-                ),
-                needs={"reason": REASON},
-            )
 
     def ask_to_end(self) -> None:
         if self._view is not None and not self._view.over:

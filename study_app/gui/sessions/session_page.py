@@ -7,10 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QDialog, QScrollArea, QStackedWidget, QWidget
+from PySide6.QtWidgets import QDialog, QScrollArea, QWidget
 
 from study_app.errors import StoreError
 from study_app.gui.kit.dialogs import REASON, Question
@@ -26,28 +24,22 @@ from study_app.gui.sessions.session_facts import (
 )
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme, remove_widget
-from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.gui.widgets.live_plots import NAMES, TracePlot
 from study_app.gui.widgets.row_table import CHIP_ROLE, Rows, Table
 from study_app.number_text import counted
-from study_app.session.watch import motion_hidden
 from study_app.store.blinded.blinding import opened, opened_key
 from study_app.store.delivered import beyond_limits
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include
-from study_app.store.folders import SessionFolder, locate
+from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Answer, Event, Note, Repeat, TrialStarted, start_of
 from study_app.store.progress import progress_of
 from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import row_of
-
-MOST_POINTS = 2000  # of a drawn curve
-NO_MOTION = "This trial has no recording."
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,14 +61,13 @@ class TrialRecord:
     answers: int
     unconfirmed: tuple[str, ...]
     notes: str
-    recording: Path | None
     lost: str
     excluded: str | None
 
 
 @dataclass(frozen=True, slots=True)
 class SessionRecord:
-    """A session's page; ``motion_hidden`` is why no motion is shown, "" where it may be."""
+    """A session's page."""
 
     facts: SessionFacts
     about: str
@@ -85,7 +76,6 @@ class SessionRecord:
     notes: tuple[str, ...]
     files: tuple[tuple[str, int], ...]
     left_out: tuple[Exclusion, ...]
-    motion_hidden: str
 
 
 def read_record(folder: Path) -> SessionRecord:
@@ -106,7 +96,7 @@ def read_record(folder: Path) -> SessionRecord:
     own = tuple(one for one in listed if one.what[:2] == (facts.participant, facts.session))
     start = start_of(lines)
     rows = session_tables.SessionRows(lines).trials
-    trials = _trials(session, rows, lines, start.limits, own)
+    trials = _trials(rows, lines, start.limits, own)
     return SessionRecord(
         facts=facts,
         about=_about(lines, incidents(facts)),
@@ -119,7 +109,6 @@ def read_record(folder: Path) -> SessionRecord:
             if path.is_file()
         ),
         left_out=own,
-        motion_hidden=motion_hidden(start, key),
     )
 
 
@@ -139,28 +128,8 @@ def limits_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
     )
 
 
-def motion(recording: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return times (n,) [s] and positions of the hand (n, 3) [m] of a recording, thinned to at most `MOST_POINTS`.
-
-    Raises
-    ------
-    StoreError
-        It cannot be read.
-    """
-    from study_app.store.recordings import read_samples  # noqa: PLC0415 - pyarrow: only once it is needed
-
-    samples = read_samples(recording)
-    thinned = samples[:: max(1, -(-len(samples) // MOST_POINTS))]
-    times_s = (thinned["time_ns"] - (thinned["time_ns"][0] if len(thinned) else 0)) * 1e-9
-    return np.asarray(times_s, np.float64), np.array(thinned["position_m"], np.float64)
-
-
 def _trials(
-    session: SessionFolder,
-    rows: Sequence[Mapping[str, Any]],
-    lines: Sequence[Event],
-    limits: Mapping[str, float],
-    own: Sequence[Exclusion],
+    rows: Sequence[Mapping[str, Any]], lines: Sequence[Event], limits: Mapping[str, float], own: Sequence[Exclusion]
 ) -> tuple[TrialRecord, ...]:
     reasons = {one.trial: one.reason for one in own}
     answered: dict[tuple[int, int], int] = {}
@@ -179,7 +148,6 @@ def _trials(
             answers=answered.get((row["trial"], row["attempt"]), 0),
             unconfirmed=_choices(unconfirmed.get((row["trial"], row["attempt"]), {})),
             notes=" · ".join(_row_notes(row)),
-            recording=session.path / row["recording"] if row["recording"] else None,
             lost=row["recording_lost"] or "",
             excluded=reasons.get(row["trial"]),
         )
@@ -326,47 +294,6 @@ def take_back_question(parent: QWidget, theme: Theme, what: str, reason: str) ->
     )
 
 
-HEIGHT = 150
-LEAST_MM = 5.0
-
-
-class MotionPlot(QStackedWidget):
-    """Three curves [mm] over the trial's time [s], or a sentence in their place."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setFixedHeight(HEIGHT)
-        self.plot, self.sentence = TracePlot(1.0, LEAST_MM), label("", "label", "text2", wraps=True)
-        self.sentence.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        drawn = QWidget()
-        vbox(label("Motion of the hand, mm", "small", "text2"), (self.plot, 1), spacing=2, margins=0, parent=drawn)
-        self.addWidget(self.sentence)
-        self.addWidget(drawn)
-        self.points = 0
-        describe_plot(self.plot, "Motion of the hand", "")
-
-    def show_motion(self, times_s: NDArray[np.float64], positions_m: NDArray[np.float64]) -> None:
-        """Draw positions (n, 3) [m] over times (n,) [s]."""
-        whole = np.isfinite(positions_m).all(axis=1)
-        self.points = int(whole.sum())
-        if not self.points:
-            self.show_sentence(NO_MOTION)
-            return
-        mm, lasted_s = positions_m[whole] * 1e3, max(1e-9, float(times_s[-1]))
-        low, high = mm.min(axis=0), mm.max(axis=0)
-        ranges = ", ".join(f"{n} {a:.0f} to {b:.0f}" for n, a, b in zip(NAMES, low, high, strict=True))
-        self.plot.setAccessibleDescription(f"Position of the hand over {lasted_s:.0f} s in mm: {ranges}.")
-        self.plot.show_span(lasted_s, [(-lasted_s, "0 s"), (0.0, f"{lasted_s:.0f} s")])
-        self.plot.show_reach(max(LEAST_MM, float(np.abs(mm).max())))
-        self.plot.show_traces(times_s[whole] - lasted_s, mm)
-        self.setCurrentIndex(1)
-
-    def show_sentence(self, sentence: str) -> None:
-        self.points = 0
-        self.sentence.setText(sentence)
-        self.setCurrentIndex(0)
-
-
 HEADINGS = ("Trial", "Presented", "Ended", "Limits", "Answers", "Notes")
 WIDTHS = ((20, 56), (120, 130), (60, 90), (60, 134), (30, 70), (160, 120))
 SIZE = (1040, 700)
@@ -429,16 +356,14 @@ class SessionPage(Themed, QDialog):
         self.facts = facts
         self.record: SessionRecord | None = None
         self.decision: Question | None = None
-        self._reader, self._mover = Background(self), Background(self)
+        self._reader = Background(self)
         self._reader.done.connect(self._show)
-        self._mover.done.connect(self._show_motion)
         self.setWindowTitle(f"{facts.name}, {facts.study}")
         self.status, self.validity = Chip(*status_chip(facts)), Chip(*validity_chip(facts))
         self.about, self.limits = label("", "body", "text2", wraps=True), label("", "body", wraps=True)
         self.model = Rows({heading: heading for heading in HEADINGS}, trial_cell)
         self.trials = Table(self.model, WIDTHS, "Trials")
         self.trial = label("", "label", "text2", wraps=True)
-        self.motion = MotionPlot()
         self.notes, self.files = (label("", "label", "text2", wraps=True) for _ in range(2))
         self.watch = ActionButton("play", "Watch again", height=36)
         self.leave_out = ActionButton("minus", "Exclude …", height=36)
@@ -471,7 +396,7 @@ class SessionPage(Themed, QDialog):
         title = label(f"{self.facts.name}  ·  {self.facts.study}{kind}", "title_dense")
         head = hbox(title, self.status, self.validity, STRETCH, spacing=12)
         trials = Card("Trials", self.watch, padding=16, gap=8)
-        add_parts(trials.column, (self.trials, 1), self.trial, self.motion)
+        add_parts(trials.column, (self.trials, 1), self.trial)
         left = vbox((trials, 1))
         out = Card("Excluded", self.leave_out, padding=16, gap=8)
         self._out = out.column
@@ -540,22 +465,10 @@ class SessionPage(Themed, QDialog):
         trial = self.chosen
         self.watch.setEnabled(trial is not None)
         if trial is None or self.record is None:
-            self.trial.setText("")
-            self.motion.show_sentence("No trials yet.")
+            self.trial.setText("No trials yet.")
             return
         self.trial.setText(trial_words(trial))
         set_ink(self.trial, "warn" if trial.broken else "text2")
-        if self.record.motion_hidden or trial.recording is None:
-            self.motion.show_sentence(NO_MOTION if trial.recording is None else self.record.motion_hidden)
-            return
-        self.motion.show_sentence("Reading …")
-        self._mover.run(partial(_result, motion, trial.recording))
-
-    def _show_motion(self, motion: Any) -> None:
-        if isinstance(motion, StoreError):
-            self.motion.show_sentence(f"The recording cannot be read: {motion}.")
-        else:
-            self.motion.show_motion(*motion)
 
     def _ask_leave_out(self) -> None:
         assert self.record is not None  # noqa: S101 - the button is off until it was read

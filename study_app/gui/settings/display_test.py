@@ -1,4 +1,4 @@
-"""The display test: the photodiode's patch, greys, lines and frames, full-screen where a participant would look.
+"""The display test: the photodiode's patch and frames, full-screen where a participant would look.
 
 Frames are asked for as a session asks for them, and the time of each painting is kept; the patch is the tank's own.
 """
@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from PySide6.QtCore import QRect, QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QColor, QImage, QKeyEvent, QPainter, QPaintEvent, QScreen
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtCore import QRect, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QScreen
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QWidget
 
 from study_app.gui.display.screens import Frames
 from study_app.gui.kit.fields import LEAST_WORDS, Editor, choice, number
 from study_app.gui.participant.tank.layers import paint_patch, patch_place
-from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.gui.theme.theme import PARTICIPANT
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton
@@ -85,9 +85,6 @@ NAMES = ("Frames painted", "Median gap", "99 % of gaps within", "Missed in 10 s"
 LEAST = QSize(960, 600)
 HOWS = ("photodiode", "high-speed camera", "data sheet")
 DECIMALS = 2
-GREYS = 17
-LABEL = 20
-FIELD = 120
 WIDEST_FORM = 460
 
 
@@ -148,62 +145,6 @@ def offset_words(offset: DisplayOffset | None, screen: str) -> str:
     return f"{text} by {offset.how}{when}{where}."
 
 
-class GreyRamp(QWidget):
-    """Seventeen greys from black to white, each distinguishable from the next."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setMinimumSize(17 * 24, 80)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("Seventeen greys from black to white")
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setFont(font("key", tabular=True))
-        for step, (left, right) in enumerate(steps(self.width())):
-            value = round(255 * step / (GREYS - 1))
-            painter.fillRect(QRect(left, 0, right - left, self.height() - LABEL), QColor(value, value, value))
-            painter.setPen(QColor(PARTICIPANT.text2))
-            below = QRectF(left, self.height() - LABEL, right - left, LABEL)
-            painter.drawText(below, Qt.AlignmentFlag.AlignCenter, str(value))
-
-
-class LineField(QWidget):
-    """Black and white lines, ``thick`` device pixels each, standing or lying: grey or shimmering where scaled."""
-
-    def __init__(self, thick: int, *, standing: bool) -> None:
-        super().__init__()
-        self.thick, self.standing = thick, standing
-        self.setMinimumSize(FIELD, FIELD - 40)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        way = "standing" if standing else "lying"
-        self.setAccessibleName(f"Lines of {thick} pixels, {way}")
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        ratio = self.devicePixelRatioF()
-        painter = QPainter(self)
-        painter.drawImage(0, 0, lines(round(self.width() * ratio), round(self.height() * ratio), ratio, self))
-
-
-def lines(width: int, height: int, ratio: float, field: LineField) -> QImage:
-    """Return the picture of lines, ``width`` by ``height`` device pixels."""
-    image = QImage(width, height, QImage.Format.Format_RGB32)
-    image.fill(Qt.GlobalColor.black)
-    painter = QPainter(image)
-    for start in range(0, width if field.standing else height, 2 * field.thick):
-        size = (field.thick, height) if field.standing else (width, field.thick)
-        painter.fillRect(QRect(*((start, 0) if field.standing else (0, start)), *size), QColor(Qt.GlobalColor.white))
-    painter.end()
-    image.setDevicePixelRatio(ratio)
-    return image
-
-
-def steps(width: int) -> list[tuple[int, int]]:
-    """Return from where to where each grey goes, without a gap between two."""
-    edges = [round(width * step / GREYS) for step in range(GREYS + 1)]
-    return list(pairwise(edges))
-
-
 class DisplayTest(QWidget):
     """One screen under test; Esc leaves.
 
@@ -256,8 +197,7 @@ class DisplayTest(QWidget):
     def _lay_out(self, screen_words: str) -> None:
         titles = vbox(label("Display test", "title"), label(screen_words, "body", "text2"), spacing=2)
         head = hbox(titles, STRETCH, (self.leave, 0, Qt.AlignmentFlag.AlignTop))
-        ramp, fields = (GreyRamp(), 2), (self._fields(), 3)
-        vbox(head, self._figures(), ramp, fields, self._foot(), spacing=14, margins=(40, 20, 40, 20), parent=self)
+        vbox(head, self._figures(), self._foot(), STRETCH, spacing=14, margins=(40, 20, 40, 20), parent=self)
 
     def _figures(self) -> QGridLayout:
         cells = grid(40, 2)
@@ -267,20 +207,6 @@ class DisplayTest(QWidget):
             cells.addWidget(value, 1, place)
         cells.setColumnStretch(len(NAMES), 1)
         return cells
-
-    def _fields(self) -> QBoxLayout:
-        fields = [(LineField(thick, standing=standing), 2) for thick in (1, 2) for standing in (True, False)]
-        words = label(
-            "Every line is 1 or 2 pixels wide. If a field looks uniformly grey, shimmers or shows broad bands, the "
-            "system scales the picture: set the screen to its native resolution. All seventeen greys above should "
-            "differ.",
-            "label",
-            "text2",
-            wraps=True,
-            weight=400,
-        )
-        words.setMinimumWidth(LEAST_WORDS)
-        return hbox(*fields, (words, 3), spacing=16)
 
     def _foot(self) -> QBoxLayout:
         toggling = vbox(label("Photodiode's patch", "card"), self.interval, STRETCH, spacing=6)

@@ -165,11 +165,6 @@ class TracePlot(Plot):
         self._make_room()
         self.apply_theme(LIGHT)
 
-    def show_span(self, span_s: float, ticks: list[tuple[float, str]]) -> None:
-        self._span_s = span_s
-        self.show_ticks("bottom", ticks)
-        self._make_room()
-
     def show_reach(self, reach: float) -> None:
         """Show values from −reach to reach, and as much more as makes even ticks."""
         if reach != self._asked:

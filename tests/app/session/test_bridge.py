@@ -149,7 +149,6 @@ def pushes(world: World, count: int = 400) -> Any:
     samples.scene = world.serial
     samples.fresh = 1
     samples.device_force_n = (1.5, 0.0, np.sqrt(9 - 1.5**2))
-    samples.wake_mps = (0.3, 0.0, 0.4)
     samples.permitted_n, samples.withheld_n = 4.0, 0.25
     samples.limiters = LIMITER_FADE
     samples.limiters[:7] |= LIMITER_NORM
@@ -174,7 +173,6 @@ def test_the_operator_sees_forces_in_a_single_blind_study_alone_and_the_particip
             x_n, size_n = (card.plot.curves[curve].getData()[1] for curve in (0, 3))
             assert x_n == pytest.approx(1.5)
             assert size_n == pytest.approx(3.0)
-            assert card.wake.curve.getData()[1] == pytest.approx(0.5)
             assert len(bridge.operator.position.plot.curves[0].getData()[0]) > 0
         else:
             assert not hasattr(card, "plot")

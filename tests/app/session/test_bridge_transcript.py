@@ -12,7 +12,7 @@ from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
-from study_app.errors import DeviceNotFound, ServoFault, StoreError, VideoError
+from study_app.errors import DeviceNotFound, ServoFault, VideoError
 from study_app.gui.operator.session_panels import Strip
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
 from study_app.session.transitions.events import Continue, ForceStopped
@@ -105,9 +105,6 @@ STEPS: dict[str, Any] = {
     "repeat": ask("repeat", "phone rang"),
     "stop": ask("stop"),
     "fade in": ask("resume"),
-    "exclude a trial": ask("exclude", 1, "asleep"),
-    "exclude all": ask("exclude", None, "no consent"),
-    "exclude again": ask("exclude", 9, "again"),
     "participant stops": event(ForceStopped, "participant"),
     "part fails": ask("failed", "ValueError: no plot", ValueError("no plot")),
     "thread ends": lambda bridge, _: bridge._thread_exceptions.ended.emit("the writer ended"),
@@ -134,7 +131,7 @@ STEPS: dict[str, Any] = {
 BEGUN = "wait, go on, shown, push"
 PLAYS = {
     "requests": f"{BEGUN}, pointer, buttons, painted, left, note, mark, pause, resume, shown, repeat, shown, stop, "
-    "push, fade in, shown, exclude a trial, exclude all, exclude again, participant stops, fade in, shown, "
+    "push, fade in, shown, participant stops, fade in, shown, "
     "part fails, thread ends, diagnose, late, wait, withdraw, note, thread ends, wait, diagnose, close",
     "full disk": f"{BEGUN}, disk is full, mark, note, stop, wait, diagnose, disk has space, wait, fade in, shown, "
     "wait, disk is full, abort, close, close",
@@ -165,18 +162,13 @@ def paged(page: Any) -> list[str]:
 def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, caplog: Any, monkeypatch: Any) -> None:
     world = Recorded()
 
-    def exclude(trial: int | None, reason: str) -> None:
-        if reason == "again":
-            raise StoreError("trial 9 is already excluded")
-        world.call("exclude")(trial, reason)
-
     recorder = SimpleNamespace(
         start=world.call("recorder.start"), append=lambda *_: None, frame=world.call("recorder.frame"),
         stop=world.call("recorder.stop"), settled=lambda: True, lost=(), dropped=2,
     )  # fmt: skip
     bridge = make(
         blinding, servo=world, journal=world, clock=world.seconds, point_to=world.call("point_to"), recorder=recorder,
-        press=world.call("press"), exclude=exclude, reconnect=world.call("reconnect", {"name": "mouse"}),
+        press=world.call("press"), reconnect=world.call("reconnect", {"name": "mouse"}),
         strip=Strip() if name == "bug" else None, force_limit_n=6.0 if blinding == "single" else None,
     )  # fmt: skip
     for signal in ("done", "diagnose_asked"):

@@ -62,11 +62,11 @@ def asking(ask: str) -> Callable[[Bridge], QWidget]:
     return open_
 
 
-repeating, leaving_out, ending = (asking(f"ask_to_{what}") for what in ("repeat", "exclude", "end"))
+repeating, ending = (asking(f"ask_to_{what}") for what in ("repeat", "end"))
 
 
 def told(bridge: Bridge) -> QWidget:
-    bridge.operator.show_message("It was not excluded", "trial 1 is already excluded.")
+    bridge.operator.show_message("The display could not be measured", "It was disconnected.")
     return next(one for one in bridge.operator.findChildren(QDialog) if one.isVisible())
 
 
@@ -79,7 +79,7 @@ def by_itself(bridge: Bridge) -> QWidget:
     return bridge.kept  # type: ignore[attr-defined,no-any-return]
 
 
-WINDOWS = (participant, operator, repeating, leaving_out, ending, told, above_the_operator, by_itself)
+WINDOWS = (participant, operator, repeating, ending, told, above_the_operator, by_itself)
 every_window = pytest.mark.parametrize("open_", WINDOWS, ids=lambda one: one.__name__)
 # What a key leads to is the same in all: that it arrives in each of them is `test_held_escape_stops_the_force`.
 two_windows = pytest.mark.parametrize(

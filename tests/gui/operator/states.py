@@ -23,7 +23,6 @@ def pushes(limiters: int) -> Any:
     samples.scene = 1
     turn = samples.tick / 300
     samples.device_force_n = np.column_stack((2 * np.sin(turn), -np.cos(turn), 0.5 * np.sin(2 * turn)))
-    samples.wake_mps = np.column_stack((0.2 * np.cos(turn), 0 * turn, 0.1 + 0 * turn))
     samples.limiters = np.where(samples.tick < 1500, limiters, 0)
     samples.permitted_n, samples.withheld_n = 2.0, 0.1
     return samples
@@ -111,7 +110,7 @@ RUNNING: Actions = {
     "pressed": in_turn(
         clicked("buttons.pause", "notes.mark", "notes.add", "device.diagnose", "stop.stop", "header.page"),
         typed("notes.field", "left-handed"),
-        *(reasoned(f"ask_to_{what}") for what in ("repeat", "exclude", "end")),
+        *(reasoned(f"ask_to_{what}") for what in ("repeat", "end")),
     ),
     "paused": told(PAUSED),
     "resumed": in_turn(
@@ -147,7 +146,6 @@ DISK: Actions = {
     "waiting for the disk": told(force_on=False, trouble="no space left on the disk: free some", waits=True),
     "recording lost": told(("recording_lost", {"trial": 3, "attempt": 1, "reason": "No space left on device"})),
     "asks to repeat": lambda window: window.ask_to_repeat(),
-    "asks to exclude": lambda window: window.ask_to_exclude(),
     "asks to end": lambda window: window.ask_to_end(),
     "says something": lambda window: window.show_message("It cannot be", "The disk is full."),
     "small": lambda window: window.resize(window.minimumSize()),

@@ -92,7 +92,7 @@ def forces() -> Iterator[str]:
             samples(100, device_force_n=(0.0, 4.5, 0.0)),
             samples(100, first=100, device_force_n=(1.5, 0.0, 0.0)),
             samples(100, first=200, scene=0),
-            samples(100, first=300, scene=2, device_force_n=(0.6, 0.0, 0.0), wake_mps=(0.3, 0.0, -0.4)),
+            samples(100, first=300, scene=2, device_force_n=(0.6, 0.0, 0.0)),
         ],
         "limiters of a trial": [
             samples(500, limiters=LIMITER_FADE, permitted_n=4.0, withheld_n=0.25),
@@ -110,7 +110,7 @@ def forces() -> Iterator[str]:
                 it.take(part)
                 end = int(part.time_ns[-1]) + MS
             yield from value_lines(it.figures())
-        yield from (ends(*one) for one in zip(("times", "forces", "wakes"), it.trace(end), strict=True))
+        yield from (ends(*one) for one in zip(("times", "forces"), it.trace(end), strict=True))
 
 
 def frame_times() -> Iterator[str]:

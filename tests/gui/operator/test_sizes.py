@@ -53,7 +53,6 @@ def pushes() -> Any:
     samples.time_ns = samples.tick * 1_000_000
     samples.scene = 1
     samples.device_force_n = (1.0, -1.0, np.sqrt(2.0))
-    samples.wake_mps = (0.2, 0.0, 0.1)
     samples.limiters = LIMITER_NORM
     return samples
 

@@ -6,7 +6,6 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from study_app.analysis.worker_messages import FigureDrawn, Progress
@@ -19,8 +18,6 @@ from study_app.store.exclusions import Exclusion
 from tests.gui.results.sample import LEFT_OUT, SVG, facts, view
 from tests.gui.transcript import Actions, clicked, in_turn
 from tests.gui.windows import results, shown
-
-HIDDEN = "Hidden while the study is blinded: with this device, the recorded motion would reveal the liquid."
 
 NOW = datetime(2026, 11, 24, 12, tzinfo=UTC)
 STARTED = NOW - timedelta(days=1)
@@ -87,7 +84,7 @@ WRITING: Actions = {
     "opened": lambda dialog: dialog.go_on.click(),
 }
 
-TRIAL = TrialRecord(1, 1, "Part 1, L2", "complete", True, (), 9, (), "", Path("trial.parquet"), "", None)
+TRIAL = TrialRecord(1, 1, "Part 1, L2", "complete", True, (), 9, (), "", "", None)
 BROKEN = replace(
     TRIAL,
     number=2,
@@ -105,16 +102,15 @@ RECORD = SessionRecord(
     trials=(
         TRIAL,
         BROKEN,
-        replace(TRIAL, number=3, valid=None, outcome="running", answers=0, recording=None, lost="its thread ended"),
+        replace(TRIAL, number=3, valid=None, outcome="running", answers=0, lost="its thread ended"),
         replace(TRIAL, number=4, excluded="phone rang", attempt=2),
     ),
     notes=("09:31, trial 2: phone rang",),
     files=(("journal.jsonl", 1_234_567), ("receipt.json", 90), ("trials.csv", 5400)),
     left_out=(Exclusion("P007", 1, 4, "AK", "phone rang", STARTED.isoformat()),),
-    motion_hidden="",
 )
 READ: dict[str, Any] = {}
-"""What the page of a session reads: its record and its motion, or an error."""
+"""What the page of a session reads: its record, or an error."""
 
 
 def read(what: str) -> Any:
@@ -122,11 +118,6 @@ def read(what: str) -> Any:
     if isinstance(READ[what], Exception):
         raise READ[what]
     return READ[what]
-
-
-def waves() -> tuple[Any, Any]:
-    times_s = np.linspace(0.0, 30.0, 600)
-    return times_s, np.column_stack([0.03 * np.sin(times_s * k + k) for k in (1.0, 1.7, 0.4)])
 
 
 def page(qtbot: Any) -> SessionPage:
@@ -147,9 +138,8 @@ def read_again(**changed: Any) -> Callable[[Any], None]:
 
 PAGE: Actions = {
     **{f"trial {row + 1}": lambda made, row=row: made.trials.selectRow(row) for row in (1, 2, 3)},  # type: ignore[misc]
-    "motion unread": lambda made: (READ.update(motion=StoreError("it is cut")), made.trials.selectRow(0)),
     "excluding": lambda made: made.leave_out.click(),
-    "sealed": read_again(record=replace(RECORD, motion_hidden=HIDDEN, left_out=(), notes=())),
+    "sealed": read_again(record=replace(RECORD, left_out=(), notes=())),
     "session excluded": read_again(
         record=replace(
             RECORD,

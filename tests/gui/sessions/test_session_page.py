@@ -13,7 +13,6 @@ from study_app.gui.sessions.session_page import SessionPage, read_record
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
@@ -114,22 +113,10 @@ def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot,
     compare(Path(__file__).parent / "golden" / "page.txt", lines, pytestconfig, mask=re.compile(r"\d\d:\d\d|\d+ kB"))
 
 
-def test_a_page_shows_the_motion_of_a_trial_once_it_may_be_seen(qtbot, study):
-    sealed = page_of(qtbot, study)
-    assert sealed.motion.sentence.text().startswith("Hidden while the study is blinded")
-    assert "once the study is unblinded" in sealed.limits.text()
-    unblind(study, by="AK", reason="over")
-    page = page_of(qtbot, study)
-    qtbot.waitUntil(lambda: page.motion.points > 100)
-    assert page.motion.plot.accessibleDescription().startswith("Position of the hand over ")
-    row = next(row for row, one in enumerate(page.model.rows) if one.number != page.chosen.number)
-    page.trials.selectRow(row)
-    assert page.motion.points == 0, "another trial's motion is not shown meanwhile"
-    qtbot.waitUntil(lambda: page.motion.points > 100)
-
-
 def test_no_page_names_a_condition_of_a_sealed_study(study):
-    text = repr(read_record(next(iter(StudyFolder(study).sessions())).path))
+    record = read_record(next(iter(StudyFolder(study).sessions())).path)
+    assert "once the study is unblinded" in record.limits
+    text = repr(record)
     protocol = load("demo")
     assert [name for name in protocol.conditions if re.search(rf"\b{name}\b", text)] == []
 

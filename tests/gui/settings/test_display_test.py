@@ -1,4 +1,4 @@
-"""The display test: the tank's own patch toggles when due, greys and lines are what they say."""
+"""The display test: the tank's own patch toggles when due."""
 
 from types import SimpleNamespace
 
@@ -8,7 +8,6 @@ from PySide6.QtGui import QColor
 
 from study_app.gui.participant.tank.layers import PATCH
 from study_app.gui.participant.tank_widget import TankWidget
-from study_app.gui.settings.display_test import GREYS, GreyRamp, LineField, lines
 from study_app.protocol.wording.languages import words
 from tests.gui.small import task_page
 from tests.gui.windows import display_test
@@ -45,24 +44,3 @@ def test_frames_are_asked_for_while_it_is_shown_and_no_longer(qtbot):
         qtbot.keyClick(made, Qt.Key.Key_Escape)
     assert not made.frames.findChild(QTimer).isActive()
     assert not made.report_timer.isActive()
-
-
-def test_greys_lie_beside_each_other_and_each_differs(qtbot):
-    ramp = GreyRamp()
-    qtbot.addWidget(ramp)
-    ramp.resize(944, 96)
-    image = ramp.grab().toImage()
-    greys = [image.pixelColor(x, 10).red() for x in range(image.width())]
-    assert greys == sorted(greys)
-    assert (greys[0], greys[-1], len(set(greys))) == (0, 255, GREYS)
-
-
-@pytest.mark.parametrize("thick", [1, 2])
-@pytest.mark.parametrize("standing", [True, False])
-@pytest.mark.parametrize("ratio", [1.0, 1.5])
-def test_lines_are_so_many_device_pixels_thick(qtbot, thick, standing, ratio):
-    field = LineField(thick, standing=standing)
-    qtbot.addWidget(field)
-    image = lines(60, 60, ratio, field)
-    along = [image.pixelColor(*((n, 7) if standing else (7, n))).red() for n in range(8 * thick)]
-    assert along == ([255] * thick + [0] * thick) * 4

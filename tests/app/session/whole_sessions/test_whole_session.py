@@ -6,7 +6,6 @@ import shutil
 import signal
 import threading
 from contextlib import suppress
-from dataclasses import astuple
 from pathlib import Path
 
 import pytest
@@ -22,7 +21,6 @@ from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.store import workstation
-from study_app.store.exclusions import exclusions
 from study_app.store.recordings import read_frames
 from study_app.store.study_versions import kept_content
 from study_app.store.workstation import MachineSettings
@@ -184,7 +182,6 @@ def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypat
     def look(participant):
         corner = participant.grab().toImage().pixelColor(2, 2).name()
         seen.extend((participant.isFullScreen(), participant.frame_px > 0, corner, participant.windowTitle()))
-        window(OperatorWindow).ask("exclude", None, "tried alone")
         os.kill(os.getpid(), signal.SIGTERM)
 
     person = Person(once=look)
@@ -195,8 +192,6 @@ def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypat
     folder = tmp_path / "results" / "demo-pilot"
     assert not (tmp_path / "results" / "demo").exists()
     assert json.loads((folder / "data" / "sub-test" / "ses-01" / "receipt.json").read_text())["pilot"] is True
-    ((*left_out, _),) = [astuple(row) for row in exclusions(folder)]
-    assert left_out == ["test", 1, None, "operator", "tried alone"]
 
 
 def test_the_preflight_is_told_before_anything_is_created(short_demo, results):
