@@ -26,6 +26,7 @@ from study_app.store.tables.csv_files import Column
 EXCLUDED: Final = 97
 CANNOT_JUDGE: Final = 98
 NOT_ANSWERED: Final = 99
+CODES: Final = frozenset((EXCLUDED, CANNOT_JUDGE, NOT_ANSWERED))
 NAME_BYTES: Final = 64
 LABEL_BYTES: Final = 255
 FILE_LABEL_BYTES: Final = 64
@@ -43,6 +44,7 @@ def long_sav(study: Study, table: Delivered) -> bytes:
     levels = dict(zip(LEVELS, next(iter(labels)), strict=True)) if len(labels) == 1 else {}
     words = {block.cannot_judge for block in study.blocks if block.cannot_judge}
     coded = {"response": _levels(levels, " / ".join(sorted(words)))}
+    del coded["response"][EXCLUDED]  # a row keeps its answer; the column `excluded` says so
     return sav(study, Delivered(table.name, table.columns, frame.assign(response=answers)), coded)
 
 
@@ -119,7 +121,7 @@ def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]]) -> 
                 name: {value: _cut(label, LABEL_BYTES // 2) for value, label in found.items()}
                 for name, found in (levels | flags).items()
             },
-            missing_ranges={name: [EXCLUDED, CANNOT_JUDGE, NOT_ANSWERED] for name in levels},
+            missing_ranges={name: [*sorted(CODES & found.keys())] for name, found in levels.items()},
             variable_measure={name: _measure(column, name in levels) for name, column in columns.items()},
             variable_format={
                 name: form for name, column in columns.items() if (form := _format(column, table.frame[column.name]))
