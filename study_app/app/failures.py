@@ -12,17 +12,20 @@ from contextlib import contextmanager
 from functools import wraps
 from io import FileIO
 from pathlib import Path
-from types import TracebackType
-from typing import Concatenate, ParamSpec, Protocol, TypeVar
+from types import FunctionType, TracebackType
+from typing import Concatenate, Final, ParamSpec, Protocol, TypeVar
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, SignalInstance
 from PySide6.QtGui import QGuiApplication, QSessionManager
+from PySide6.QtWidgets import QGraphicsItem, QWidget
 
 from study_app.app.session.timing import end_at_once
 from study_app.errors import SessionError
 from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
 
 log = logging.getLogger(__name__)
+
+PAINTING: Final = ("paintEvent", "paint")  # of widgets; of items of a scene
 
 
 class UncaughtExceptions:
@@ -38,6 +41,7 @@ class UncaughtExceptions:
         self.previous = sys.excepthook
 
     def install(self) -> None:
+        guard_painting()
         self.previous, sys.excepthook = sys.excepthook, self.hook
 
     def remove(self) -> None:
@@ -52,6 +56,34 @@ class UncaughtExceptions:
     def hook(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if not self._handle(error):
             self.previous(kind, error, trace)
+
+
+def guard_painting() -> None:
+    """Hand every exception of a painting method to ``sys.excepthook``, in each class of widgets and items so far.
+
+    Qt goes on painting other parts while the exception is pending; PySide6 6.12 then loses references to their methods
+    until the process ends by a segmentation fault.
+    """
+    kinds: list[type] = [QWidget, QGraphicsItem]
+    while kinds:
+        kind = kinds.pop()
+        kinds += kind.__subclasses__()
+        for name in PAINTING:
+            method = vars(kind).get(name)
+            if isinstance(method, FunctionType) and not hasattr(method, "__wrapped__"):
+                setattr(kind, name, _told(method))
+
+
+def _told(method: Callable[..., None]) -> Callable[..., None]:
+    @wraps(method)
+    def painted(*arguments: object) -> None:
+        try:
+            method(*arguments)
+        except Exception as error:  # noqa: BLE001 - the hook decides
+            trace = error.__traceback__ and error.__traceback__.tb_next
+            sys.excepthook(type(error), error.with_traceback(trace), trace)
+
+    return painted
 
 
 class ThreadExceptions(QObject):

@@ -12,12 +12,13 @@ import logging
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from inspect import unwrap
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
-from study_app.app.failures import ThreadExceptions, UncaughtExceptions, guarded_session_slot
+from study_app.app.failures import PAINTING, ThreadExceptions, UncaughtExceptions, guarded_session_slot
 from study_app.app.session.operator import OperatorMonitor, Parts, Reconnection, WatchedJournal
 from study_app.app.session.timing import FrameBudget, ThreadPriority, freeze_garbage, unfreeze_garbage
 from study_app.devices.hand import HandOrders, hand_of
@@ -229,11 +230,13 @@ class SessionBridge(QObject):
     def _handle_uncaught(self, error: BaseException) -> bool:
         """Handle an exception that no slot caught; return whether it only kept the operator's window from painting."""
         frame = None if error.__traceback__ is None else error.__traceback__.tb_frame
-        if frame is None or not isinstance(error, Exception) or frame.f_code.co_name not in {"paint", "paintEvent"}:
+        if frame is None or not isinstance(error, Exception) or frame.f_code.co_name not in PAINTING:
             paints_here = False
         else:
             parts = (self.participant, *self.participant.findChildren(QWidget))  # also of plug-ins
-            paints_here = all(getattr(type(one).paintEvent, "__code__", None) is not frame.f_code for one in parts)
+            paints_here = all(
+                getattr(unwrap(type(one).paintEvent), "__code__", None) is not frame.f_code for one in parts
+            )
         (self.operator.tell_of_failure if paints_here else self.fail)(error)
         return paints_here
 

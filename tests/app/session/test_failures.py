@@ -160,6 +160,7 @@ def test_a_part_of_the_participants_window_from_elsewhere_that_cannot_be_painted
         ("operator.controls.NotesCard", "show_view", mark),
         ("operator.plots.PositionCard", "show_health", lambda it: it.show_traces()),
         ("widgets.live_plots.TracePlot", "paintEvent", paint_position),
+        ("widgets.live_plots.pg.PlotCurveItem", "paint", paint_position),
         ("operator.session_panels.Tally", "show_view", mark),
     ],
 )
