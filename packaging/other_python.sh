@@ -28,7 +28,8 @@ fi
 if [ ! -e "$root/work" ]; then
     git clone --quiet "$here" "$root/work"
 fi
-git -C "$root/work" pull --quiet --ff-only "$here" HEAD
+git -C "$root/work" fetch --quiet "$here" HEAD
+git -C "$root/work" reset --quiet --hard FETCH_HEAD
 
 # In namespaces of mounts and processes of its own: whatever is left running or mounted ends with it.
 export root

@@ -17,7 +17,7 @@ from typing import Concatenate, Final, ParamSpec, Protocol, TypeVar
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, SignalInstance
 from PySide6.QtGui import QGuiApplication, QSessionManager
-from PySide6.QtWidgets import QGraphicsItem, QWidget
+from PySide6.QtWidgets import QGraphicsItem, QStyledItemDelegate, QWidget
 
 from study_app.app.session.timing import end_at_once
 from study_app.errors import SessionError
@@ -64,7 +64,7 @@ def guard_painting() -> None:
     Qt goes on painting other parts while the exception is pending; PySide6 6.12 then loses references to their methods
     until the process ends by a segmentation fault.
     """
-    kinds: list[type] = [QWidget, QGraphicsItem]
+    kinds: list[type] = [QWidget, QGraphicsItem, QStyledItemDelegate]
     while kinds:
         kind = kinds.pop()
         kinds += kind.__subclasses__()
@@ -80,8 +80,9 @@ def _told(method: Callable[..., None]) -> Callable[..., None]:
         try:
             method(*arguments)
         except Exception as error:  # noqa: BLE001 - the hook decides
-            trace = error.__traceback__ and error.__traceback__.tb_next
-            sys.excepthook(type(error), error.with_traceback(trace), trace)
+            # No name holds the traceback: it would hold this frame, and with it a painter that Qt waits for.
+            error.__traceback__ = error.__traceback__ and error.__traceback__.tb_next
+            sys.excepthook(type(error), error, error.__traceback__)
 
     return painted
 

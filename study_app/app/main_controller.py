@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QEventLoop, QObject, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 
-from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, ended_from_outside
+from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, ended_from_outside, guard_painting
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.session.timing import collecting_here
 from study_app.devices.descriptor import Backend
@@ -36,6 +36,7 @@ from study_app.gui.kit.devices import (
 )
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.widgets.background import Background, wait_for_jobs
+from study_app.gui.widgets.main_view import Place
 from study_app.session.start import NewSession
 from study_app.store import workstation
 from study_app.store.workstation import DisplayOffset, MachineSettings, create_workspace
@@ -277,6 +278,15 @@ def home(results: Path | None = None, *, then: Callable[[MainController], None] 
     return controller.code
 
 
+def _with_guarded_painting(make: Callable[[], Place]) -> Callable[[], Place]:
+    def guarded() -> Place:
+        made = make()  # imports its classes
+        guard_painting()
+        return made
+
+    return guarded
+
+
 class MainController(QObject):
     """The home window's stay: one session at a time, and home again after it."""
 
@@ -289,16 +299,17 @@ class MainController(QObject):
         self.results = results if results is not None else workspace().results
         self.question: WorkspaceDialog | None = None
         self.check: ComputerCheck | None = None
+        makers: dict[str, Callable[[], Place]] = {
+            "home": self._home,
+            "designer": self._designer,
+            "results": self._results,
+            "lab": self._lab,
+            "devices": self.devices.make_place,
+            "machine": self._machine,
+            "help": self._help,
+        }
         self.window = MainWindow(
-            {
-                "home": self._home,
-                "designer": self._designer,
-                "results": self._results,
-                "lab": self._lab,
-                "devices": self.devices.make_place,
-                "machine": self._machine,
-                "help": self._help,
-            },
+            {name: _with_guarded_painting(make) for name, make in makers.items()},
             theme=theme_named(self.machine.settings.theme),
         )
         self.loop = QEventLoop()

@@ -152,13 +152,18 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @REASON
 def exclude(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
     """Exclude a session or a trial from the analysis, with a reason; nothing is deleted."""
-    from study_app.store.blinded.unblinding import all_opened
     from study_app.store.exclusions import exclude as exclude_from
     from study_app.store.exclusions import named
     from study_app.store.sites.merged import own_place
 
     new = exclude_from(*own_place(results, participant), session, trial=trial, by=by, reason=reason)
     click.echo(named(replace(new, participant=participant)))
+    _warn_if_opened(results)
+
+
+def _warn_if_opened(results: Path) -> None:
+    from study_app.store.blinded.unblinding import all_opened
+
     if all_opened(results):
         click.echo("warning: the key is open; the report states that this was decided afterwards", err=True)
 
@@ -178,6 +183,7 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
 
     taken = include_in(*own_place(results, participant), session, trial=trial, by=by, reason=reason)
     click.echo(f"counts again: {named(replace(taken, participant=participant))}")
+    _warn_if_opened(results)
 
 
 @click.command()

@@ -241,7 +241,10 @@ class HandOrders:
         DeviceError
             The motion is empty, of other shapes, not finite, or its times do not increase.
         """
-        times, places = np.asarray(t_s, np.float64), np.asarray(position_m, np.float64)
+        try:
+            times, places = np.asarray(t_s, np.float64), np.asarray(position_m, np.float64)
+        except (TypeError, ValueError) as error:
+            raise DeviceError(f"a motion needs numbers: {error}") from error
         if times.ndim != 1 or times.size == 0 or places.shape != (times.size, 3):
             raise DeviceError(
                 f"a motion needs times (n,) and positions (n, 3) with n > 0, got {times.shape} and {places.shape}"

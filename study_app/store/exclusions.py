@@ -148,17 +148,23 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
 
 def reversals(folder: Path) -> tuple[Exclusion, ...]:
     """Return the reversed exclusions of the study in ``folder``, in the order of the reversals."""
+    return tuple(taken for taken, _ in dated_reversals(folder))
+
+
+def dated_reversals(folder: Path) -> tuple[tuple[Exclusion, str], ...]:
+    """Return each reversed exclusion with the time of its reversal."""
     path = StudyFolder(folder).reversed_exclusions
     lines = (read_if_there(path) or b"").split(b"\n")  # a reason may contain other line endings
     return tuple(_reversed(path, number, line) for number, line in enumerate(lines, start=1) if line.strip())
 
 
-def _reversed(path: Path, number: int, line: bytes) -> Exclusion:
+def _reversed(path: Path, number: int, line: bytes) -> tuple[Exclusion, str]:
     with contextlib.suppress(ValueError, KeyError, TypeError):
-        taken = Exclusion(**parse_json(line)["exclusion"])
+        record = parse_json(line)
+        taken = Exclusion(**record["exclusion"])
         texts = (taken.participant, taken.rule_or_person, taken.reason, taken.excluded_at)
         if all(isinstance(text, str) for text in texts) and isinstance(taken.session, int):
-            return taken
+            return taken, str(record.get("at", ""))
     raise StoreError(f"{path}, line {number} is not a reversed exclusion: restore it from a copy, or remove the line")
 
 

@@ -152,8 +152,8 @@ class Study:
     ``responses`` and ``trials`` have the columns of ``store.tables.columns``, with ``session_status``, ``excluded``,
     ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three. ``blocks``
     are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
-    the key is sealed; ``exclusions`` is what was decided to leave out, ``late`` those of them that a person decided
-    after the key was opened; ``doubts`` are files that are not as they were
+    the key is sealed; ``exclusions`` is what was decided to leave out, ``late`` what of it a person decided or
+    reversed after the key was opened; ``doubts`` are files that are not as they were
     recorded, and are used as they are. ``decided`` is what the protocol decided about the analysis, ``protocol`` the
     first session's, as its receipt holds it. ``levels`` are the blocks with a design, ``intervals`` the
     intervals of their trials; ``others`` are the questions that no block of statements holds;

@@ -128,7 +128,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if study.late:
         yield (
             f"Decided after the key was opened, when the effect on the results could be seen: {_late(study)}. Compare "
-            "with the report without them."
+            "with the report of a copy in which `include` or `exclude` takes these decisions back."
         )
     if study.n == 1:
         yield "One participant: all results concern this person alone, and do not generalise to others."
@@ -196,7 +196,7 @@ def _sample(study: Study) -> str:
         whole = all(set(people_a_setting(study, block).values()) == {study.n} for block in study.blocks)
         under = ", each under all settings" if whole else _fewer_settings(study)
     late = ""
-    if study.revealed and any(one.rule_or_person != RULE for one in study.exclusions):
+    if study.revealed and any(one.rule_or_person != RULE for one in (*study.exclusions, *study.late)):
         late = " Exclusions were decided while the key was sealed."
         if study.late:
             late = f" Decided after the key was opened: {_late(study)}."
@@ -216,12 +216,16 @@ def _fewer_settings(study: Study) -> str:
         fewer |= {who for who, code in zip(gone["participant"], gone["code"], strict=True) if (who, code) not in left}
     if not fewer:
         return ", not all of them under all settings"
-    return f"; of {counted(len(fewer), 'participant')}, exclusions of single trials leave fewer than all settings"
+    people = counted(len(fewer), "participant")
+    return f"; {people} {'lacks' if len(fewer) == 1 else 'lack'} a setting, because single trials were excluded"
 
 
 def _late(study: Study) -> str:
-    """Return how many exclusions were decided after the key was opened."""
-    return f"{counted(len(study.late), 'exclusion')} of {len(study.exclusions)}"
+    """Return how many exclusions were decided, and how many reversed, after the key was opened."""
+    decided = sum(one in study.exclusions for one in study.late)
+    back = len(study.late) - decided
+    told = [f"{counted(decided, 'exclusion')} of {len(study.exclusions)}"] if decided else []
+    return listed([*told, *([f"the reversal of {counted(back, 'exclusion')}"] if back else [])])
 
 
 def version_words(study: Study) -> str:

@@ -234,9 +234,9 @@ class SessionBridge(QObject):
             paints_here = False
         else:
             parts = (self.participant, *self.participant.findChildren(QWidget))  # also of plug-ins
-            paints_here = all(
-                getattr(unwrap(type(one).paintEvent), "__code__", None) is not frame.f_code for one in parts
-            )
+            kinds = {kind for part in parts for kind in type(part).__mro__}
+            methods = (unwrap(vars(kind)[name]) for kind in kinds for name in PAINTING if name in vars(kind))
+            paints_here = all(getattr(one, "__code__", None) is not frame.f_code for one in methods)
         (self.operator.tell_of_failure if paints_here else self.fail)(error)
         return paints_here
 

@@ -1,7 +1,7 @@
 """Estimates parameters of a liquid from a stream of measured force, or gives the reason without an estimate.
 
 The drag coefficient alone follows each batch of rows by recursive least squares (`fits.RecursiveDrag`). With length and
-scaling of the wake the newest rows are searched once per second of the stream (``wake_fit``). A value counts only if
+scaling of the wake the newest rows are searched every 2 s of the stream (``wake_fit``). A value counts only if
 the motion identifies it (``information``).
 """
 

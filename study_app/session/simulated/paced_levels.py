@@ -31,22 +31,21 @@ def undelivered_levels(protocol: Protocol) -> Iterator[str]:
         if stimulus.vary in OF_CONDITION:
             continue
         t_s = np.arange(round(task.limit_s * protocol.device.rate_hz)) / protocol.device.rate_hz
-        motion, shares = Motion(t_s, np.array([task.target_m(one) for one in t_s.tolist()])), dict[str, float]()
+        hand_m, missed = np.array([task.target_m(one) for one in t_s.tolist()]), list[str]()
         for standard, level, scene in ends(protocol, block):
             if not any(INERTIAL & set(liquid.effects) for liquid in resolve(scene).liquids):
                 continue
             presented = Stimulated(
                 condition_of(protocol, stimulus), stimulus.vary, stimulus.comparison(standard, level)
             )
-            samples = judged(samples_along(scene, motion))
-            samples["time_ns"] = np.rint(1e9 * t_s)
+            samples = judged(samples_along(scene, Motion(t_s, scene.origin_m + scene.scale * hand_m)))
+            samples["time_ns"], samples["position_m"] = np.rint(1e9 * t_s), hand_m
             found = delivered(protocol, presented, task, samples)
-            if [*undelivered(protocol.limits, presented, task, found)]:
-                shares[f"{level:.3g}"] = found.force_share or 0.0
-        if shares:
+            if "level_error_percent" in undelivered(protocol.limits, presented, task, found):
+                missed.append(f"{level:.3g}")
+        if missed:
             yield (
-                f"{where}: a hand that follows the target is sent {min(shares.values()):.0%} of the force at level "
-                f"{' and '.join(shares)}: the liquid returns energy, which the safety layer removes: such trials are "
-                "repeated, and stay unanswered: choose a smaller scene.scale, or effects without added_mass, history "
-                "and unsteady_drag"
+                f"{where}: level {' and '.join(missed)} is not delivered to a hand that follows the target: the safety "
+                "layer removes energy that the liquid returns. Such trials are repeated, and stay unanswered. Choose a "
+                "smaller scene.scale, or effects without added_mass, history and unsteady_drag"
             )

@@ -19,7 +19,7 @@ from study_app.store import receipt
 from study_app.store.atomic import is_there, read_if_there, read_own, study_root, sweep, sweep_old, write_file
 from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol
 from study_app.store.checksums import replace_checksums
-from study_app.store.exclusions import Exclusion, exclude, exclusions, reversals
+from study_app.store.exclusions import Exclusion, dated_reversals, exclude, exclusions, reversals
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Event, Recorded, TrialStarted, start_of
@@ -109,10 +109,11 @@ def unblind_folder(folder: Path, by: str, reason: str) -> dict[str, Unblinded]:
 
 
 def decided_late(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ...]:
-    """Return the exclusions of a study that a person decided after its key was opened; none of a merged study."""
+    """Return the exclusions that a person decided or reversed after the key was opened; none of a merged study."""
     opened_at = min(filter(None, (_moment(one["at"]) for one in reveals(folder))), default=None)
-    times = ((row, _moment(row.excluded_at)) for row in rows if row.rule_or_person != RULE)
-    return tuple(row for row, at in times if opened_at is not None and at is not None and at > opened_at)
+    dated = (*((row, row.excluded_at) for row in rows if row.rule_or_person != RULE), *dated_reversals(folder))
+    times = ((row, _moment(text)) for row, text in dated)  # reveals are recorded in whole seconds
+    return tuple(row for row, at in times if opened_at and at and at.replace(microsecond=0) > opened_at)
 
 
 def _moment(text: str) -> datetime | None:

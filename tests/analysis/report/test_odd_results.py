@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
 from study_app.store.blinded.unblinding import unblind
-from study_app.store.exclusions import exclude
+from study_app.store.exclusions import exclude, include
 from tests.analysis.conftest import Results, make_results, twelve
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
@@ -47,15 +48,17 @@ def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_sta
     gone = [trial.number for trial in build_schedule(small.protocol, "A", seed=1).trials if trial.code == "L1"]
     for trial in gone:
         small.exclude("A", trial=trial)
+    exclude(small.folder, "C", 1, by="AB", reason="late")
     small.open()
-    exclude(small.folder, "B", 1, by="AB", reason="the phone rang")
+    later = datetime.now().astimezone() + timedelta(seconds=2)
+    exclude(small.folder, "B", 1, by="AB", reason="the phone rang", now=later)
+    include(small.folder, "C", 1, by="AB", reason="it was complete", now=later)
     report(small.folder, tmp_path / "report")
     told = " ".join((tmp_path / "report" / "methods.txt").read_text("utf-8").split())
     assert (
-        "in 2 different files); of 1 participant, exclusions of single trials leave fewer than all settings; 1 further"
-        in told
+        "in 2 different files); 1 participant lacks a setting, because single trials were excluded; 1 further" in told
     )
-    assert f"Decided after the key was opened: 1 exclusion of {len(gone) + 1}." in told
+    assert f"Decided after the key was opened: 1 exclusion of {len(gone) + 1} and the reversal of 1 exclusion." in told
     rows = json.loads((tmp_path / "report" / "report.json").read_text("utf-8"))["exclusions"]
     assert [row["participant"] for row in rows if row["after_unblinding"]] == ["B"]
 

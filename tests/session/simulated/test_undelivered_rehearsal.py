@@ -127,22 +127,24 @@ INERTIA = """
 format = 2
 study.name = "inertia"
 scene.scale = {scale}
-liquids.goo = {{ density_kg_m3 = 1200, viscosity_pa_s = 1.0, effects = ["unsteady_drag"] }}
+liquids.goo = {{ density_kg_m3 = 1200, {liquid} }}
 tasks.stir.kind = "follow"
-stimuli.viscosity = {{ vary = "viscosity_pa_s", levels = [0.02, 0.6] }}
-blocks.thicker = {{ stimulus = "viscosity", design = "2ifc", method = "m" }}
+stimuli.resistance = {{ vary = "{vary}", levels = [0.02, 0.6] }}
+blocks.thicker = {{ stimulus = "resistance", design = "2ifc", method = "m" }}
 methods.m = {{ kind = "questplus", trials = 2 }}
 """
+GOO = ("viscosity_pa_s", 'viscosity_pa_s = 1.0, effects = ["unsteady_drag"]')
+DAMPER = ("damping_nspm", 'drag = { law = "linear", damping_nspm = 3 }, effects = ["drag", "added_mass"]')
 
 
-@pytest.mark.parametrize(("scale", "notes"), [(3, 0), (4, 1)])
+@pytest.mark.parametrize(("goo", "scale", "notes"), [(GOO, 3, 0), (GOO, 4, 1), (DAMPER, 2, 0)])
 def test_check_notes_levels_of_a_liquid_with_inertia_that_a_rehearsal_does_not_deliver(
-    scale: int, notes: int, tmp_path: Path
+    goo: tuple[str, str], scale: int, notes: int, tmp_path: Path
 ) -> None:
     file = tmp_path / "inertia.toml"
-    file.write_text(INERTIA.format(scale=scale), encoding="utf-8")
-    said = CliRunner().invoke(commands, ["check", str(file)]).output
-    assert said.count("sent 94% of the force at level 0.6 and 0.02") == notes
+    file.write_text(INERTIA.format(scale=scale, vary=goo[0], liquid=goo[1]), encoding="utf-8")
+    said = " ".join(CliRunner().invoke(commands, ["check", str(file)]).output.split())
+    assert said.count("level 0.6 and 0.02 is not delivered to a hand") == said.count("is not delivered") == notes
     study = rehearse(file, participants=1, seed=1, results=tmp_path / "results")
     valid = {row["valid"] for row in rows_of(StudyFolder(study).sessions()[0].path, "trials")}
     assert valid == {"false" if notes else "true"}
