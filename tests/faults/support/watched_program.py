@@ -88,7 +88,7 @@ def traces_of(operator: OperatorWindow) -> set[str]:
     named = set()
     plots = [operator.lateness.plot, operator.position.plot]
     if isinstance(operator.force, ForceCard):
-        plots += [operator.force.plot, operator.force.wake]
+        plots.append(operator.force.plot)
     for plot in plots:
         for item in plot.items():
             named |= {str(getattr(item, "toPlainText", str)()), str(getattr(item, "labelText", ""))}
