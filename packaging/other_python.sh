@@ -40,7 +40,7 @@ exec unshare --mount --pid --fork bash -c '
         chroot "$root" bash -euc "
             cd /work
             [ -e .venv ] || python3 -m venv .venv
-            .venv/bin/pip install --quiet --upgrade --upgrade-strategy eager -e \".[test,proofs]\"
+            .venv/bin/pip install --quiet --upgrade --upgrade-strategy eager -e \".[test]\"
             .venv/bin/python --version
             .venv/bin/pip list | grep -iE \"^(pyside6_essentials|numpy|numba|pandas|pyarrow|pyqtgraph|scipy) \"
             [ \$# -gt 0 ] || exec bash .ci/run

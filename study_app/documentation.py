@@ -140,8 +140,8 @@ def search(words: str) -> tuple[Section, ...]:
 
 def _stems(words: str) -> list[str]:
     """Return the begins of the words that matter; of all words if none does."""
-    typed = _WORD.findall(words.casefold())
-    return [_ENDING.sub("", word) for word in typed if word not in _NO_MATTER.split()] or typed
+    typed, left_out = _WORD.findall(words.casefold()), _NO_MATTER.split()
+    return [_ENDING.sub("", word) for word in typed if word not in left_out] or typed
 
 
 def _has(text: str, stem: str, begins: re.Pattern[str]) -> bool:

@@ -63,7 +63,7 @@ _SENT: Final[Mapping[str, tuple[bytes | None, ...]]] = {
     "an error of HTTP": (b"HTTP/1.1 500 no\r\nContent-Length: 2\r\n\r\nno",),
     "a negative length by HTTP": (HTTP_OK + b"Content-Length: -1\r\n\r\nx", CLOSE),
     "a part of a body by HTTP": (HTTP_OK + b"Content-Length: 99\r\n\r\nx", CLOSE),
-    "a chunk of no number by HTTP": (CHUNKED + b"x\r\n", CLOSE),
+    "a chunk without a valid size by HTTP": (CHUNKED + b"x\r\n", CLOSE),
     "HTTP's way to itself": (b"HTTP/1.1 302 Found\r\nLocation: /\r\n\r\n",),
     "HTTP's way to a file": (b"HTTP/1.1 302 Found\r\nLocation: file:///etc/hostname\r\n\r\n",),
 }

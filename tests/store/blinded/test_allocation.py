@@ -184,7 +184,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
         assert store.lines[0].entry == 5
     assert errors() == ""
     assert "it stays unused" in "\n".join(map(str, verify(study.path).warnings))
-    (study.allocated / "\u00b2.json").write_text("{}")  # a digit that is no number
+    (study.allocated / "\u00b2.json").write_text("{}")  # a digit that int() refuses
     (loop := study.allocated / "006.json").symlink_to(loop)
     assert errors() == "blinding/allocated/006.json: was changed: restore it from a copy"
 
