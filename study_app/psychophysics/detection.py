@@ -18,7 +18,7 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from study_app.psychophysics.families import Floats, erfc
+from study_app.psychophysics.families import Floats, normal_cdf
 
 Model: TypeAlias = Literal["differencing", "independent"]
 
@@ -83,7 +83,7 @@ def d_prime_at(task: str, proportion: float) -> float:
 def forced_choice(d_prime: float, intervals: int) -> float:
     """Return P(the comparison is the largest of ``intervals``): ∫ φ(x − d′) Φ(x)^(m−1) dx."""
     x, weights = _rule(-ENDS, ENDS)
-    return float((weights * _cdf(x + d_prime) ** (intervals - 1)).sum())
+    return float((weights * normal_cdf(x + d_prime) ** (intervals - 1)).sum())
 
 
 def yes_no(hits: float, signals: float, false_alarms: float, noises: float) -> Sensitivity | None:
@@ -197,10 +197,6 @@ def _rule(low: float, high: float) -> tuple[Floats, Floats]:
     return x, 0.5 * (high - low) * weights * np.exp(-0.5 * x**2) / math.sqrt(2.0 * math.pi)
 
 
-def _cdf(x: Floats) -> Floats:
-    return np.asarray(0.5 * erfc(-x / math.sqrt(2.0)), float)
-
-
 def _abx(d_prime: float, divisor: float) -> float:
     """Return P(correct): both comparisons have the correct sign, or both the wrong sign."""
     first, second = NORMAL.cdf(d_prime / math.sqrt(2.0)), NORMAL.cdf(d_prime / divisor)
@@ -211,7 +207,9 @@ def _oddity(d_prime: float) -> float:
     """Return P(correct) of the triangle test: 2 ∫₀^∞ [Φ(−z√3 + d′√⅔) + Φ(−z√3 − d′√⅔)] φ(z) dz."""
     z, weights = _rule(0.0, ENDS)
     away = d_prime * math.sqrt(2.0 / 3.0)
-    return float(2.0 * (weights * (_cdf(-z * math.sqrt(3.0) + away) + _cdf(-z * math.sqrt(3.0) - away))).sum())
+    return float(
+        2.0 * (weights * (normal_cdf(-z * math.sqrt(3.0) + away) + normal_cdf(-z * math.sqrt(3.0) - away))).sum()
+    )
 
 
 def _same_different_differencing(d_prime: float) -> float:

@@ -23,8 +23,12 @@ LOGIT_95: Final = math.log(19.0)
 CLIP: Final = 1e-9
 """ψ stays this far from 0 and 1, so that one answer cannot exclude a cell."""
 
-erfc: Final = np.vectorize(math.erfc, otypes=[float])
-"""The complementary error function."""
+_erfc: Final = np.vectorize(math.erfc, otypes=[float])
+
+
+def normal_cdf(x: Floats) -> Floats:
+    """Return the normal distribution function."""
+    return np.asarray(0.5 * _erfc(-x / math.sqrt(2.0)), float)
 
 
 def rise(family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike) -> Floats:
@@ -51,7 +55,7 @@ def rise(family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike) -
         case "weibull":
             return np.negative(np.expm1(-math.log(2.0) * 10.0 ** np.minimum(KAPPA * distance, 300.0)))
         case "normal":
-            return np.asarray(0.5 * erfc(-math.sqrt(2.0) * Z_95 * distance), float)
+            return np.asarray(0.5 * _erfc(-math.sqrt(2.0) * Z_95 * distance), float)
         case "logistic":
             return np.asarray(1.0 / (1.0 + np.exp(np.minimum(-2.0 * LOGIT_95 * distance, 700.0))), float)
     assert_never(family)

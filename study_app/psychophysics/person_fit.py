@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from study_app.psychophysics.families import CLIP, Floats, erfc, success
+from study_app.psychophysics.families import CLIP, Floats, normal_cdf, success
 from study_app.psychophysics.grid import Grid, Posterior, Values, log_likelihood, posterior, tables
 
 PREFERENCE_SD: Final = 1.0
@@ -177,7 +177,7 @@ def change_score(given: Given, found: Posterior, shifts: Floats) -> tuple[float,
 def _normal_table() -> tuple[Floats, Floats]:
     """Return z and the normal distribution function there: interpolated, it is correct to 1e-7."""
     z = np.linspace(-8.0, 8.0, 16001)
-    return z, np.asarray(0.5 * erfc(-z / math.sqrt(2.0)), float)
+    return z, normal_cdf(z)
 
 
 def _moved(shares: ArrayLike, shift: ArrayLike) -> Floats:
