@@ -51,7 +51,6 @@ if TYPE_CHECKING:
     from study_app.designer.place.view import DesignerPlace
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.sessions.session_facts import SessionFacts
-    from study_app.gui.sessions.session_page import SessionPage
     from study_app.lab.ab_comparison import Setting, Side
 
 
@@ -149,6 +148,7 @@ class DevicesController(QObject):
         self._workstation, self.backends = workstation, look
         self.looking = Background(self)
         self.looking.done.connect(self._show_found)
+        self.looking.failed.connect(self._show_unexamined)
         self._ended = False
         self.shown: tuple[DeviceShown, ...] = ()
         self.place: DevicesPlace | None = None
@@ -183,7 +183,7 @@ class DevicesController(QObject):
             return
         if self.place is not None:
             self.place.show_looking(True)
-        self.looking.run(self._look)
+        self.looking.run(lambda: devices_shown(self.backends()))
 
     def end(self, patience_s: float = PATIENCE_S) -> None:
         """Look no more, wait for a look that is under way, and show nothing of it: the windows go."""
@@ -208,22 +208,16 @@ class DevicesController(QObject):
     def _forget_dialog(self) -> None:
         self.dialog = None
 
-    def _look(self) -> tuple[DeviceShown, ...] | Exception:
-        try:
-            return devices_shown(self.backends())
-        except Exception as error:  # noqa: BLE001 - a bug of a driver is told as what it is of the machine
-            return error
-
-    def _show_found(self, found: tuple[DeviceShown, ...] | Exception) -> None:
-        if self._ended:
-            return
-        if isinstance(found, Exception):
+    def _show_found(self, found: tuple[DeviceShown, ...]) -> None:
+        if not self._ended:
+            self.shown = found
             self._show()
-            self.troubled.emit("This machine could not be examined", f"{found}.")
-            return
-        self.shown = found
-        self._show()
-        self.looked.emit(found)
+            self.looked.emit(found)
+
+    def _show_unexamined(self, error: Exception) -> None:
+        if not self._ended:
+            self._show()
+            self.troubled.emit("This machine could not be examined", f"{error}.")
 
     def _show(self) -> None:
         if self.place is not None:
@@ -236,6 +230,7 @@ def load_modules() -> None:
     """Load the modules of lab and designer, the compiler, and what the first page is computed from."""
     import study_app.app.lab_controller  # noqa: PLC0415
     import study_app.app.session.playing  # noqa: PLC0415
+    import study_app.gui.watch.window  # noqa: PLC0415
     import study_app.lab.live  # noqa: F401, PLC0415
     from study_app.gui.participant.tank.glass import brightness  # noqa: PLC0415
     from study_app.protocol.source.json_schema import schema  # noqa: PLC0415
@@ -249,7 +244,6 @@ LOOK_AFTER_MS = 300  # the window stands by then
 JOBS_PATIENCE_S = 5.0
 
 if TYPE_CHECKING:
-    from study_app.app.results_controller import ResultsController
     from study_app.app.session.preflight_controller import ComputerCheck
     from study_app.gui.help.view import HelpPlace
     from study_app.gui.results.view import ResultsPlace
@@ -322,7 +316,7 @@ class MainController(QObject):
         self.help: HelpPlace | None = None
         self._called_off: list[LiveSession] = []
         self._bugs: set[str] = set()
-        self.results_controller: ResultsController | None = None
+        self.results_place: ResultsPlace | None = None
         self.window.closed.connect(self._leave)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
@@ -458,7 +452,6 @@ class MainController(QObject):
         made.edit_asked.connect(self.open_designer)
         made.new_asked.connect(self.begin_study)
         made.device.display.clicked.connect(self._test_display)
-        made.watch_asked.connect(_watch)
         made.show_machine(self.machine.settings, self.devices.preferred)
         self._home_place = made
         return made
@@ -475,8 +468,8 @@ class MainController(QObject):
         if self._follows_machine and here.results != self.results and self._home_place is not None:
             self.results = here.results
             self._home_place.show_results(self.results)
-            if self.results_controller is not None:
-                self.results_controller.show_results(self.results)
+            if self.results_place is not None:
+                self.results_place.show_results(self.results)
             if self.designer is not None:
                 self.designer.editing.results = self.results
         self._show_machine()
@@ -488,16 +481,16 @@ class MainController(QObject):
 
     def _show_study(self, folder: Path) -> None:
         self.window.place("results")
-        assert self.results_controller is not None  # noqa: S101 - made with its place
-        self.results_controller.choose(folder)
+        assert self.results_place is not None  # noqa: S101 - just made
+        self.results_place.choose(folder)
         self.window.go("results")
 
     def _results(self) -> ResultsPlace:
-        from study_app.app.results_controller import ResultsController  # noqa: PLC0415 - only once it is needed
+        from study_app.gui.results.view import ResultsPlace  # noqa: PLC0415 - only once it is needed
 
-        self.results_controller = ResultsController(self.results)
-        self.results_controller.place.version_asked.connect(self.show_version)
-        return self.results_controller.place
+        self.results_place = ResultsPlace(self.results)
+        self.results_place.version_asked.connect(self.show_version)
+        return self.results_place
 
     def _help(self) -> HelpPlace:
         from study_app.gui.help.view import HelpPlace  # noqa: PLC0415 - only once it is needed
@@ -563,8 +556,8 @@ class MainController(QObject):
             return
         if live.theme is not self.window.theme:  # it was changed in the cockpit
             self.machine.change({"theme": live.theme.name})
-        if live.began and self.results_controller is not None:
-            self.results_controller.choose(live.chosen.results)
+        if live.began and self.results_place is not None:
+            self.results_place.choose(live.chosen.results)
         self.window.come_back()
         if isinstance(live.error, DeviceError) and not live.began:
             name = live.chosen.device
@@ -584,12 +577,6 @@ class MainController(QObject):
     def _leave(self) -> None:
         if self.live is None:
             self.loop.quit()
-
-
-def _watch(page: SessionPage) -> None:
-    from study_app.gui.watch.window import watch  # noqa: PLC0415 - pyqtgraph: only once it is needed
-
-    watch(page)
 
 
 def _draft_words() -> DraftWords:

@@ -176,7 +176,7 @@ def test_the_sidebar_has_one_width_per_size_of_window_at_every_place(visit: Main
 def test_results_show_what_was_run_last(visit: MainController, monkeypatch: Any) -> None:
     shown: list[Path] = []
     monkeypatch.setattr(main_controller, "LiveSession", Held)
-    monkeypatch.setattr(visit, "results_controller", SimpleNamespace(choose=shown.append))
+    monkeypatch.setattr(visit, "results_place", SimpleNamespace(choose=shown.append))
     visit.window.place("home").session_asked.emit(CHOSEN)
     assert (shown, visit.live) == ([CHOSEN.results], None)
 

@@ -12,10 +12,10 @@ from PySide6.QtWidgets import QApplication, QDialog, QLabel
 from study_app.analysis import worker_messages as of
 from study_app.app import main_controller
 from study_app.app.main_controller import DevicesController, MainController, WorkstationController
-from study_app.app.results_controller import ResultsController
 from study_app.app.session.live_session import BUG
 from study_app.devices.descriptor import NONE, READY, Backend
 from study_app.errors import DeviceNotFound
+from study_app.gui.results.view import ResultsPlace
 from study_app.gui.theme.theme import DARK
 from study_app.session.start import NewSession
 from study_app.store.exclusions import Exclusion
@@ -83,8 +83,8 @@ RESULTS: list[tuple[str, Any]] = [
     ("answer", FOUND), ("tables_asked", (Path("to"), ("wide",))), ("written", of.Progress("writing", 0.5)),
     ("stop_asked", ()), ("written", of.Done((Path("to", "a.csv"),))), ("report_asked", (Path("to"), ())),
     ("written", Crashed(2)), ("report_asked", (Path("to"), ())), ("written", Refused("full", stopped=False)),
-    ("open_asked", (Path("to"),)), ("none", of.StudiesFound(())), ("choose", OTHER), ("left", ()), ("entered", ()),
-    ("answer", FOUND), ("others", Path("elsewhere")), ("left", ()),
+    ("open_asked", (Path("to"),)), ("none", of.StudiesFound(())), ("choose", (OTHER,)), ("left", ()), ("entered", ()),
+    ("answer", FOUND), ("others", (Path("elsewhere"),)), ("left", ()),
 ]  # fmt: skip
 
 
@@ -96,33 +96,38 @@ def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
         workers.append(Worker(done))
         return workers[-1]
 
-    controller = ResultsController(Path("results"), opener=lambda file: done.append(f"open {file}"), start_worker=start)
-    controller._listening.setInterval(10**8)
-    qtbot.addWidget(controller.place)
-    controller.place.message.connect(lambda *words: done.append(f"message {words}"))
+    place = ResultsPlace(Path("results"), opener=lambda file: done.append(f"open {file}"), start_worker=start)
+    place._listening.setInterval(10**8)
+    qtbot.addWidget(place)
+    asks: dict[str, Any] = {
+        "entered": place.enter, "left": place.leave, "study_asked": place._choose, "remedy_asked": place._mend,
+        "leave_out_asked": lambda asked: place._decide("leaving out", of.LeaveOut, *asked),
+        "take_back_asked": lambda asked: place._decide("taking the exclusion back", of.TakeBack, *asked),
+        "unblind_asked": lambda *asked: place._decide("opening the key", of.OpenKey, *asked),
+        "tables_asked": lambda *asked: place._write(of.WriteTables, *asked),
+        "report_asked": lambda to, _extras: place._write(of.WriteReport, to), "stop_asked": place._stop_writing,
+        "open_asked": place._opener, "choose": place.choose, "others": place.show_results,
+    }  # fmt: skip
+    place.message.connect(lambda *words: done.append(f"message {words}"))
     lines, before = [], list[str]()
     for name, given in RESULTS:
         done.clear()
-        reader: Any = controller.reader
+        reader: Any = place.reader
         match name:
             case "answer" | "slow" | "late" | "none":
                 if name == "none":
-                    controller.look()
+                    place.look()
                 reader.told = [(reader.number - (name == "late"), given)]
-                controller._since_s -= 10.0 * (name == "slow")
-                controller._listen()
+                place._since_s -= 10.0 * (name == "slow")
+                place._listen()
             case "written":
                 workers[-1].told = [(1, given)]
-                controller._listen()
+                place._listen()
             case "dead":
                 reader.works = False
-            case "choose":
-                controller.choose(given)
-            case "others":
-                controller.show_results(given)
             case _:
-                getattr(controller.place, name).emit(*given)
-        after = [f"busy: {controller.busy} {controller._listening.isActive()}", *value_lines(controller.view, "view")]
+                asks[name](*given)
+        after = [f"busy: {place.busy} {place._listening.isActive()}", *value_lines(place.view, "view")]
         lines += [f"== {name} {given}", *done, *changed(before, after)]
         before = after
     compare(GOLDEN / "results.txt", lines, pytestconfig)
@@ -273,7 +278,7 @@ STAY: dict[str, Any] = {
 
 def test_the_stay(visit: MainController, monkeypatch: Any, pytestconfig: pytest.Config) -> None:
     monkeypatch.setattr(main_controller, "LiveSession", Live)
-    monkeypatch.setattr(ResultsController, "look", lambda self: Live.done.append(f"look at {self.view.chosen}"))
+    monkeypatch.setattr(ResultsPlace, "look", lambda self: Live.done.append(f"look at {self.view.chosen}"))
     monkeypatch.setattr(DevicesController, "look", lambda _self: Live.done.append("look for devices"))
     lines: list[str] = []
     visit.window.closed.connect(lambda: Live.done.append("closed"))

@@ -150,8 +150,8 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     visit = MainController(designer.results)
     visit.window.show()
     visit.window.place("results")
-    assert visit.results_controller is not None
-    card = visit.results_controller.place.sessions
+    assert visit.results_place is not None
+    card = visit.results_place.sessions
     facts = SessionFacts(
         "P001", 1, "kitchen", datetime.now().astimezone(), "completed", "valid", 8, 8, False, False, folder
     )

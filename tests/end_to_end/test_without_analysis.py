@@ -26,14 +26,14 @@ from study_app.app.main_controller import home
 
 def visit_all(visit):
     def step():
-        controller = visit.results_controller
-        if controller is None or controller.view.trouble is None:
+        place = visit.results_place
+        if place is None or place.view.trouble is None:
             return
-        view = controller.view
+        view = place.view
         if not visit.asked:
             visit.asked = True
-            controller.place.exclusions.leave_out.click()
-            dialog = controller.place.dialog
+            place.exclusions.leave_out.click()
+            dialog = place.dialog
             dialog.editors["session"].show_value(("P001", 1))
             dialog.editors["by"].show_value("AB")
             dialog.editors["reason"].show_value("asleep")

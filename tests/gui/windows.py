@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from PySide6.QtWidgets import QWidget
@@ -21,7 +21,7 @@ from study_app.gui.home.study_facts import study_facts
 from study_app.gui.kit.devices import devices_shown
 from study_app.gui.lab.view import LabPlace
 from study_app.gui.preflight.window import LEAST as LEAST_PREFLIGHT
-from study_app.gui.preflight.window import PreflightView, PreflightWindow, preflight_view
+from study_app.gui.preflight.window import PreflightView, PreflightWindow, planned_rows
 from study_app.gui.results.figures import unblinded_words
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.settings import view as settings_view
@@ -109,10 +109,17 @@ def two_screens(monkeypatch: Any) -> None:
     monkeypatch.setattr(settings_view, "screens_shown", lambda: SCREENS)
 
 
-def checked(facts: Measurements, **more: Any) -> PreflightView:
+def checked(
+    facts: Measurements,
+    *,
+    busy: bool = False,
+    goes_on: tuple[tuple[str, str], ...] = (),
+    error_n: float | None = None,
+    **more: Any,
+) -> PreflightView:
     protocol = load("rek2024")
-    now = datetime(2026, 3, 2, 14, 20)
-    return preflight_view(protocol, facts, checks(facts, protocol), "Participant P007", now=now, **more)
+    rows = (*goes_on, *planned_rows(protocol, datetime(2026, 3, 2, 14, 20), error_n, **more))
+    return PreflightView("rek2024", "Participant P007", facts, checks(facts, protocol), rows, busy=busy)
 
 
 def preflight(
@@ -125,14 +132,35 @@ def preflight(
     return made
 
 
+class Idle:
+    """Keeps its orders, in place of the process that reads studies."""
+
+    works = True
+
+    def __init__(self) -> None:
+        self.orders: list[Any] = []
+
+    def order(self, order: Any) -> int:
+        self.orders.append(order)
+        return len(self.orders)
+
+    def stop(self) -> None:
+        """Go on: nothing is under way."""
+
+    close = stop
+
+
 def results(qtbot: Any, seen: Any = None) -> ResultsPlace:
     """Return the results in their main window, with drawn figures."""
-    window = MainWindow({"home": Place, "results": lambda: ResultsPlace(handed_to=Path(os.sep, "somewhere"))})
+    where, idle = Path(os.sep, "somewhere", "results"), cast("Any", Idle)
+    window = MainWindow({"home": Place, "results": lambda: ResultsPlace(where, opener=str, start_worker=idle)})
     qtbot.addWidget(window)
     window.resize(1366, 768)
     window.show()
-    window.go("results")
     place: Any = window.place("results")
+    place._listening.setInterval(10**8)  # there are no answers,
+    place._choose = lambda _folder: None  # so that this study stays
+    window.go("results")
     place.main = window  # or it would be collected here
     place.show_view(seen or view())
     qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.settled for card in place.figures.cards))

@@ -13,7 +13,6 @@ from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.settings.display_test import DisplayTest
 from study_app.gui.theme.theme import Theme
-from study_app.gui.watch.window import watch
 from tools.screenshots.capture import Camera, shown
 from tools.screenshots.example_study import STUDY, WATCHED
 
@@ -78,7 +77,8 @@ def _take_watched(camera: Camera, controller: MainController, theme: Theme) -> N
     page.show()
     camera.until(lambda: page.record, "the session's page")
     camera.take(page, f"session-{theme.name}")
-    window: Any = watch(page)
+    page.watch.click()
+    window: Any = page.watched
     stage = camera.until(lambda: window.stage, "the trial")
     stage.show_moment(WATCHED_S)
     camera.take(window, f"watch-{theme.name}", WATCHED_SIZE)

@@ -18,9 +18,10 @@ from study_app.evidence.appraisal import Costs, Errors, Question, start_appraisa
 from study_app.gui.display.screens import place
 from study_app.gui.preflight.window import (
     ComputerWindow,
+    PreflightView,
     PreflightWindow,
     computer_checks,
-    preflight_view,
+    planned_rows,
     resumed_rows,
 )
 from study_app.gui.theme.theme import Theme
@@ -128,6 +129,7 @@ class Preflight(QObject):
         self._goes_on = _goes_on(chosen, protocol)
         self.measuring = Background(self)
         self.measuring.done.connect(self._take)
+        self.measuring.failed.connect(self.failed)
         self._ending = threading.Event()
         self.appraisal = Appraisal(study_scenes(protocol), _dynamics(ready.facts, protocol))
         self.window = PreflightWindow(
@@ -175,18 +177,12 @@ class Preflight(QObject):
             self.failed.emit(error)
             return
         self._outlets_shown = facts.outlets
+        error_n, now = self.appraisal.error_n, datetime.now().astimezone()
+        asked_error = error_n is not None or not self.appraisal.over
+        planned = planned_rows(self._protocol, now, error_n, asked_error=asked_error)
+        found, rows = checks(facts, self._protocol), (*self._goes_on, *planned)
         self.window.show_view(
-            preflight_view(
-                self._protocol,
-                facts,
-                checks(facts, self._protocol),
-                self._who,
-                error_n=self.appraisal.error_n,
-                asked_error=self.appraisal.error_n is not None or not self.appraisal.over,
-                now=datetime.now().astimezone(),
-                busy=self.measuring.busy,
-                goes_on=self._goes_on,
-            )
+            PreflightView(self._protocol.study.name, self._who, facts, found, rows, busy=self.measuring.busy)
         )
 
     def _look(self) -> None:
@@ -209,25 +205,17 @@ class Preflight(QObject):
     def _again(self) -> None:
         """Measure anew, in a thread of its own: it looks at the servo for two seconds."""
         if not self.measuring.busy:
-            self.measuring.run(self._measure)
+            ready, sleep = self._ready, self._ending.wait
+            self.measuring.run(lambda: measured(ready.rig, self._chosen, ready.videos, sleep=sleep))
             self._show()
 
-    def _measure(self) -> Measurements | Exception:
-        try:
-            return measured(self._ready.rig, self._chosen, self._ready.videos, sleep=self._ending.wait)
-        except Exception as error:  # noqa: BLE001 - whoever opened the session prints it
-            return error
-
-    def _take(self, found: object) -> None:
-        if isinstance(found, Measurements):
-            self._ready = replace(self._ready, facts=found)
-            dynamics = _dynamics(found, self._protocol)
-            if dynamics != self.appraisal.dynamics:  # the delay has changed since, and with it what is withheld
-                self.appraisal.close()
-                self.appraisal, self._appraised = Appraisal(study_scenes(self._protocol), dynamics), False
-            self._show()
-        else:
-            self.failed.emit(found)
+    def _take(self, found: Measurements) -> None:
+        self._ready = replace(self._ready, facts=found)
+        dynamics = _dynamics(found, self._protocol)
+        if dynamics != self.appraisal.dynamics:  # the delay has changed since, and with it what is withheld
+            self.appraisal.close()
+            self.appraisal, self._appraised = Appraisal(study_scenes(self._protocol), dynamics), False
+        self._show()
 
     def _start(self) -> None:
         facts = replace(self._ready.facts, tick_s=self.appraisal.tick_s)
@@ -287,7 +275,7 @@ class ComputerCheck(QObject):
         self.window = ComputerWindow(parent, theme)
         self._background = Background(self)
         self._background.done.connect(self._show)
-        self._background.failed.connect(self._tell_bug)
+        self._background.failed.connect(self._tell)
         self._compiled.connect(self.window.show_compiled, Qt.ConnectionType.QueuedConnection)
         self.window.asked.connect(self.measure)
         self.window.finished.connect(self._close)
@@ -297,33 +285,29 @@ class ComputerCheck(QObject):
         self.window.show_measuring()
         self._background.run(self._look)
 
-    def _look(self) -> tuple[Check, ...] | StudyError:
+    def _look(self) -> tuple[Check, ...]:
         from study_app.devices.registry import backends  # noqa: PLC0415 - the compiler: only in this thread
         from study_app.devices.rig import open_rig, study_settings  # noqa: PLC0415
         from study_app.haptics.kernels.compiled import CACHE, following_compilation  # noqa: PLC0415
         from study_app.protocol.load import load  # noqa: PLC0415
         from study_app.session.preflight_measurements import measure  # noqa: PLC0415
 
-        try:
-            study = load(STUDY)
-            with following_compilation(self._compiled.emit) as counter:
-                rig = open_rig("scripted", study_settings(study, Random(1)))  # noqa: S311 - a simulated tremor
-                try:
-                    facts = measure(
-                        rig.servo,
-                        self._results,
-                        device=rig.device.name,
-                        screen=self._screen,
-                        participant="P001",
-                        recordings=True,
-                        lasts_s=MEASURED_S,
-                    )
-                finally:
-                    rig.stop()
-            found = backends()
-        except StudyError as error:
-            return error
-        return computer_checks(facts, study, found, cache=CACHE, compiled=counter.compiled)
+        study = load(STUDY)
+        with following_compilation(self._compiled.emit) as counter:
+            rig = open_rig("scripted", study_settings(study, Random(1)))  # noqa: S311 - a simulated tremor
+            try:
+                facts = measure(
+                    rig.servo,
+                    self._results,
+                    device=rig.device.name,
+                    screen=self._screen,
+                    participant="P001",
+                    recordings=True,
+                    lasts_s=MEASURED_S,
+                )
+            finally:
+                rig.stop()
+        return computer_checks(facts, study, backends(), cache=CACHE, compiled=counter.compiled)
 
     def _close(self) -> None:
         """Go away, once nothing is measured any more: the thread still speaks to this object."""
@@ -332,13 +316,15 @@ class ComputerCheck(QObject):
             self.window.deleteLater()
             self.deleteLater()
 
-    def _tell_bug(self, error: BaseException) -> None:
-        self._show(StudyError(f"{type(error).__name__}: {error}; the terminal shows the details"))
-
-    def _show(self, found: tuple[Check, ...] | StudyError) -> None:
+    def _tell(self, error: BaseException) -> None:
         if self._closed:
             self._close()
-        elif isinstance(found, StudyError):
-            self.window.show_sentence(f"{found}.")
+        else:
+            bug = f"{type(error).__name__}: {error}; the terminal shows the details"
+            self.window.show_sentence(f"{error if isinstance(error, StudyError) else bug}.")
+
+    def _show(self, found: tuple[Check, ...]) -> None:
+        if self._closed:
+            self._close()
         else:
             self.window.show_checks(found)

@@ -66,7 +66,7 @@ class HomePlace(Place):
 
     ``session_asked`` carries what an operator chose, ``results_asked`` the folder of a study, ``protocol_opened`` the
     file of a study that was opened here, ``edit_asked`` the source of a study that is to be edited, ``new_asked`` that
-    of one that is to be copied, "" for any, ``watch_asked`` the `SessionPage` whose chosen trial is to be watched.
+    of one that is to be copied, "" for any.
 
     Parameters
     ----------
@@ -79,7 +79,6 @@ class HomePlace(Place):
     protocol_opened = Signal(object)
     edit_asked = Signal(str)
     new_asked = Signal(str)
-    watch_asked = Signal(object)
 
     def __init__(self, results: Path, draft_words: LoadWords = None) -> None:
         super().__init__()
@@ -325,7 +324,6 @@ class HomePlace(Place):
 
         page = SessionPage(self, self.theme, session, open_here)
         page.changed.connect(self.show_sessions)
-        page.watch_asked.connect(self.watch_asked)
         self._open(page)
 
     def end(self) -> None:

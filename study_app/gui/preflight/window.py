@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QAccessible, QCloseEvent, QColor, QKeyEvent, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractSlider, QLabel, QProgressBar, QWidget
@@ -40,16 +39,14 @@ WAITING = "measuring …"
 class PreflightView:
     """Everything on the window.
 
-    ``rows`` are (label, value) of what will run; ``lateness_us`` is what was measured of the servo's ticks (n,), and
-    ``limit_us`` what the protocol allows. While it is ``busy`` nothing can be begun.
+    ``rows`` are (label, value) of what will run, ``facts`` what was measured; while ``busy`` nothing can be begun.
     """
 
     study: str
     who: str
+    facts: Measurements
     checks: tuple[Check, ...]
     rows: tuple[tuple[str, str], ...]
-    lateness_us: NDArray[np.float64]
-    limit_us: float
     busy: bool = False
 
     @property
@@ -75,34 +72,6 @@ class PreflightView:
         return "Start"
 
 
-def preflight_view(
-    protocol: Protocol,
-    facts: Measurements,
-    found: tuple[Check, ...],
-    who: str,
-    *,
-    error_n: float | None = None,
-    asked_error: bool = True,
-    now: datetime,
-    busy: bool = False,
-    goes_on: tuple[tuple[str, str], ...] = (),
-) -> PreflightView:
-    """Return what to show of ``facts``; ``goes_on`` are the rows of a session that goes on (`resumed_rows`).
-
-    ``error_n`` is the largest difference of a scene's force from the exact definition [N], None while it is not
-    known; where no one was asked (``asked_error``) its line is left out.
-    """
-    return PreflightView(
-        study=protocol.study.name,
-        who=who,
-        checks=found,
-        rows=(*goes_on, *_rows(protocol, now, error_n, asked_error=asked_error)),
-        lateness_us=facts.lateness_ns / 1e3,
-        limit_us=protocol.limits.lateness_ms * 1e3,
-        busy=busy,
-    )
-
-
 def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Event]) -> tuple[tuple[str, str], ...]:
     """Return where the session with these journal lines goes on, and how much of it is kept.
 
@@ -124,9 +93,14 @@ def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Event])
     return ("Continues at", here), ("Kept", kept)
 
 
-def _rows(
-    protocol: Protocol, now: datetime, error_n: float | None, *, asked_error: bool
+def planned_rows(
+    protocol: Protocol, now: datetime, error_n: float | None, *, asked_error: bool = True
 ) -> tuple[tuple[str, str], ...]:
+    """Return the rows of what will run.
+
+    ``error_n`` is the largest difference of a scene's force from the exact definition [N], None while it is not
+    known; where no one was asked (``asked_error``) its line is left out.
+    """
     extent = extent_of(protocol)
     ends = now + timedelta(seconds=max(extent.expected_s))
     error = WAITING if error_n is None else "< 0.01 N" if error_n < 0.01 else f"{error_n:.2f} N"
@@ -327,8 +301,9 @@ class PreflightWindow(QWidget):
         self._busy = view.busy
         self._show_checks(view)
         self._show_rows(view)
-        p99_us = float(np.percentile(view.lateness_us, 99)) if len(view.lateness_us) else None
-        self.plot.show_histogram(*lateness_histogram(view.lateness_us), p99_us)
+        late_us = view.facts.lateness_ns / 1e3
+        p99_us = float(np.percentile(late_us, 99)) if len(late_us) else None
+        self.plot.show_histogram(*lateness_histogram(late_us), p99_us)
 
     def _show_chip(self, view: PreflightView) -> None:
         if view.busy:

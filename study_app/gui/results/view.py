@@ -1,18 +1,51 @@
 """Results: sessions, exclusions, figures, exports."""
 
-from collections.abc import Sequence
+import importlib.util
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
 
-from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtCore import QSignalBlocker, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QDialog, QLineEdit, QScrollArea, QSizePolicy, QWidget
 
+from study_app.analysis.worker_messages import (
+    AnalysisClient,
+    Answer,
+    Done,
+    FigureDrawn,
+    FindStudies,
+    LeaveOut,
+    OpenKey,
+    Order,
+    Progress,
+    ReadStudy,
+    SessionsFound,
+    StudiesFound,
+    StudyFound,
+    TakeBack,
+    WriteReport,
+    WriteTables,
+    start_analysis_worker,
+)
+from study_app.gui.application import open_here
 from study_app.gui.kit.dialogs import Work
 from study_app.gui.kit.fields import Field
-from study_app.gui.results.figures import FiguresPanel, ResultsView, excluded_words, in_figures, kind_of, time_of
-from study_app.gui.sessions.session_facts import Column, SessionFacts, matching, started_words, states_of
+from study_app.gui.results.figures import (
+    FiguresPanel,
+    ResultsView,
+    Trouble,
+    excluded_words,
+    in_figures,
+    kind_of,
+    time_of,
+    unblinded_words,
+)
+from study_app.gui.sessions.session_facts import Column, SessionFacts, matching, session_facts, started_words, states_of
 from study_app.gui.sessions.session_page import LeaveOutDialog, SessionPage, take_back_question, unblind_question
 from study_app.gui.sessions.sessions_table import SessionsTable
 from study_app.gui.theme.theme import font
@@ -24,6 +57,9 @@ from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
 from study_app.number_text import counted
 from study_app.store.exclusions import Exclusion
+from study_app.store.folders import StudyFolder
+from study_app.store.sites.merged import FOLDER, folders_of
+from study_app.workers.server import Crashed, Refused
 
 WIDTH = 600
 WARNED = 3
@@ -45,11 +81,11 @@ class WriteDialog(Work):
     ----------
     to : the folder that is suggested
     extras : what can be written in addition
-    opens : the words on the button that opens what was written
+    opens_file : whether the first file is what opens, not the folder
     """
 
     def __init__(
-        self, *words: Any, go_on: str, to: Path, extras: Sequence[Extra] = (), opens: str = "Open the folder"
+        self, *words: Any, go_on: str, to: Path, extras: Sequence[Extra] = (), opens_file: bool = False
     ) -> None:
         checks = (Field(extra.name, extra.words, "check", hint=extra.why_not) for extra in extras)
         folder = Field("to", "Folder", "folder", hint="Existing files will be overwritten.")
@@ -60,7 +96,7 @@ class WriteDialog(Work):
             needs={"to": "Please choose a folder."},
             width=WIDTH,
         )
-        self._opens = opens
+        self._opens_file = opens_file
         self.result_path: Path | None = None
         self._extras = [extra.name for extra in extras]
         for extra in extras:
@@ -73,11 +109,12 @@ class WriteDialog(Work):
         """The folder, and the names of the extras."""
         return Path(self.value("to")).expanduser(), tuple(name for name in self._extras if self.value(name))
 
-    def show_written(self, files: Sequence[Path], opens: Path, warnings: Sequence[str]) -> None:
-        self.result_path = opens
+    def show_written(self, files: Sequence[Path], warnings: Sequence[str]) -> None:
+        self.result_path = files[0] if self._opens_file else self.asked[0]
         more = f" {len(warnings) - WARNED} more." if len(warnings) > WARNED else ""
+        opens = "Open the report" if self._opens_file else "Open the folder"
         warned = "".join(f"\n{line}" for line in warnings[:WARNED])
-        self.show_done(f"{counted(len(files), 'file')} in {files[0].parent}.{warned}{more}", self._opens)
+        self.show_done(f"{counted(len(files), 'file')} in {files[0].parent}.{warned}{more}", opens)
 
 
 COLUMNS = (
@@ -210,6 +247,12 @@ def _line(one: Exclusion, back: ActionButton) -> QWidget:
     return made
 
 
+def exclusions_at(study: Path) -> Path:
+    """Return the list of exclusions; of a merged study the folder of its sites, each of which has one."""
+    folders = folders_of(study)
+    return StudyFolder(study).exclusions if "" in folders else study / FOLDER
+
+
 STACKED_BELOW = 1160
 PANEL_PX, PANEL_WIDE_PX, WIDE_FROM = 400, 430, 1700
 STACKED_HEIGHT, EXCLUSIONS = 330, 360
@@ -222,37 +265,57 @@ EXTRAS: Final = (
 )
 
 
-class ResultsPlace(Place):
-    """Draws a `ResultsView` and says what is asked for.
+LISTEN_MS: Final = 40
+PATIENCE_S: Final = 0.3
+"""What takes longer than this says that it goes on."""
+NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install 'liquid-study[analysis]'"
+MISTAKE: Final = Trouble(
+    "A bug in the program stopped the evaluation", "The terminal shows the details.", "Refresh", "again"
+)
 
-    Signals: ``entered`` and ``left``; ``study_asked`` (folder); ``remedy_asked`` (a `Remedy`); ``leave_out_asked``
-    and ``take_back_asked`` (participant, session, trial or None, by, reason); ``unblind_asked`` (by, reason);
-    ``tables_asked`` and ``report_asked`` (folder, extras); ``stop_asked`` (giving up what is being written);
-    ``open_asked`` (path); ``version_asked`` (the `SessionFacts` of a session, to compare the study with its version);
-    ``watch_asked`` (the `SessionPage` whose chosen trial is to be watched).
+Decided: TypeAlias = LeaveOut | TakeBack | OpenKey
+REFUSALS: Final = {
+    LeaveOut: "It was not excluded",
+    TakeBack: "It is still excluded",
+    OpenKey: "The study is still blinded",
+}
+
+
+class ResultsPlace(Place):
+    """The studies, and what is asked of the process that reads and evaluates them while the place is shown.
+
+    Reports and tables are written by a process of their own. Nothing here waits. ``version_asked`` carries the
+    `SessionFacts` of a session, to compare the study with its version.
+
+    Parameters
+    ----------
+    results : folder that holds the studies' folders; it need not exist
     """
 
-    entered = Signal()
-    left = Signal()
-    study_asked = Signal(object)
-    remedy_asked = Signal(str)
-    leave_out_asked = Signal(object)
-    take_back_asked = Signal(object)
-    unblind_asked = Signal(str, str)
-    tables_asked = Signal(object, object)
-    report_asked = Signal(object, object)
-    stop_asked = Signal()
-    open_asked = Signal(object)
     version_asked = Signal(object)
-    watch_asked = Signal(object)
 
-    def __init__(self, *, handed_to: Path, no_sav: str = "") -> None:
+    def __init__(
+        self,
+        results: Path,
+        *,
+        opener: Callable[[Path], object] = open_here,
+        start_worker: Callable[[], AnalysisClient] = start_analysis_worker,
+    ) -> None:
         super().__init__()
+        self.results = results
         self.view = ResultsView()
         self.dialog: QDialog | None = None
         self.writing: WriteDialog | None = None
-        self._handed_to = handed_to
-        self._no_sav = no_sav
+        self._opener, self._start_worker = opener, start_worker
+        self.reader: AnalysisClient | None = None
+        self._writer: AnalysisClient | None = None
+        self._orders: dict[int, Order] = {}
+        self._since_s = 0.0
+        self._going: Progress | None = None
+        self._redrawn: set[str] = set()
+        self._blocks = 0
+        self._listening = QTimer(self, interval=LISTEN_MS)
+        self._listening.timeout.connect(self._listen)
         self.study = Choice()
         self.study.setAccessibleName("Study")
         self.study.setFont(font("body"))
@@ -271,14 +334,14 @@ class ResultsPlace(Place):
         self.show_view(ResultsView())
 
     def _connect(self) -> None:
-        self.study.activated.connect(lambda: self.study_asked.emit(self.study.currentData()))
+        self.study.activated.connect(lambda: self._choose(self.study.currentData()))
         self.unblind.clicked.connect(self._ask_unblind)
         self.export.clicked.connect(self._ask_tables)
         self.report.clicked.connect(self._ask_report)
         self.exclusions.leave_out.clicked.connect(self._ask_leave_out)
         self.exclusions.take_back_asked.connect(self._ask_take_back)
-        self.exclusions.open.clicked.connect(lambda: self.open_asked.emit(self.view.exclusions_file))
-        self.figures.asked.connect(self._remedy)
+        self.exclusions.open.clicked.connect(lambda: self._opener(self.view.exclusions_file or self.results))
+        self.figures.asked.connect(self._mend)
         self.sessions.rows.opened.connect(self._open_session)
         self.sessions.rows.version_asked.connect(self.version_asked)
 
@@ -302,14 +365,19 @@ class ResultsPlace(Place):
         self.area = scrolled(inside)
         vbox(self.area, margins=0, parent=self)
 
-    def hand_to(self, folder: Path) -> None:
-        self._handed_to = folder
-
     def enter(self) -> None:
-        self.entered.emit()
+        self.look()
 
     def leave(self) -> None:
-        self.left.emit()
+        self._listening.stop()
+        for process in (self.reader, self._writer):
+            if process is not None:
+                process.close()
+        self.reader = self._writer = None
+        self._orders = {}
+        if self.writing is not None:
+            self.writing.stopped()
+        self._show(drawing=None, testing=None)
 
     def show_view(self, view: ResultsView) -> None:
         """Show what there is; only what has changed is made anew."""
@@ -363,41 +431,34 @@ class ResultsPlace(Place):
                 self.chips.append(chip)
             self._arrange()
 
-    def _remedy(self, remedy: str) -> None:
-        if remedy == "home":
-            self.go_asked.emit("home")
-        else:
-            self.remedy_asked.emit(remedy)
-
     def _ask_unblind(self) -> None:
         open_ones = sum(one.needs_care for one in self.view.sessions)
         dialog = unblind_question(self, self.theme, self._name(), running=open_ones)
-        dialog.accepted.connect(lambda: self.unblind_asked.emit(dialog.value("by"), dialog.value("reason")))
+        decide = partial(self._decide, "opening the key", OpenKey)
+        dialog.accepted.connect(lambda: decide(dialog.value("by"), dialog.value("reason")))
         self._open(dialog)
 
     def _open_session(self, session: SessionFacts) -> None:
-        page = SessionPage(self, self.theme, session, self.open_asked.emit)
-        page.changed.connect(self.entered)
-        page.watch_asked.connect(self.watch_asked)
+        page = SessionPage(self, self.theme, session, self._opener)
+        page.changed.connect(self.look)
         self._open(page)
 
     def _ask_leave_out(self) -> None:
         there = [one for one in self.view.sessions if one.excluded is None]
         dialog = LeaveOutDialog(self, self.theme, there, self.view.trials, self.sessions.rows.chosen)
-        dialog.accepted.connect(
-            lambda: self.leave_out_asked.emit((*dialog.chosen, dialog.value("by"), dialog.value("reason")))
-        )
+        decide = partial(self._decide, "leaving out", LeaveOut)
+        dialog.accepted.connect(lambda: decide(*dialog.chosen, dialog.value("by"), dialog.value("reason")))
         self._open(dialog)
 
     def _ask_take_back(self, one: Exclusion) -> None:
         dialog = take_back_question(self, self.theme, excluded_words(one), one.reason)
-        dialog.accepted.connect(
-            lambda: self.take_back_asked.emit((*one.what, dialog.value("by"), dialog.value("reason")))
-        )
+        decide = partial(self._decide, "taking the exclusion back", TakeBack, *one.what)
+        dialog.accepted.connect(lambda: decide(dialog.value("by"), dialog.value("reason")))
         self._open(dialog)
 
     def _ask_tables(self) -> None:
-        extras = [extra._replace(why_not=self._no_sav) if extra.name == "sav" else extra for extra in EXTRAS]
+        no_sav = "" if importlib.util.find_spec("pyreadstat") else NO_SAV
+        extras = [extra._replace(why_not=no_sav) if extra.name == "sav" else extra for extra in EXTRAS]
         dialog = WriteDialog(
             self,
             self.theme,
@@ -405,10 +466,10 @@ class ResultsPlace(Place):
             "Answers, trials and counts of all participants as CSV, with a codebook that explains every column."
             f"{self._by_code()}",
             go_on="Export",
-            to=self._handed_to / f"{self._name()}-tables",
+            to=self.results.resolve().parent / f"{self._name()}-tables",
             extras=extras,
         )
-        dialog.begun.connect(lambda: self.tables_asked.emit(*dialog.asked))
+        dialog.begun.connect(lambda: self._write(WriteTables, *dialog.asked))
         self._open_writing(dialog)
 
     def _ask_report(self) -> None:
@@ -419,20 +480,20 @@ class ResultsPlace(Place):
             "One page with figures, tests and conclusions, and every number, table and figure as a file. Large studies "
             f"take some minutes.{self._by_code()}",
             go_on="Write the report",
-            to=self._handed_to / f"{self._name()}-report",
-            opens="Open the report",
+            to=self.results.resolve().parent / f"{self._name()}-report",
+            opens_file=True,
         )
-        dialog.begun.connect(lambda: self.report_asked.emit(*dialog.asked))
+        dialog.begun.connect(lambda: self._write(WriteReport, dialog.asked[0]))
         self._open_writing(dialog)
 
     def _open_writing(self, dialog: WriteDialog) -> None:
         self.writing = dialog
-        dialog.stop_asked.connect(self.stop_asked)
-        dialog.opened.connect(lambda: self.open_asked.emit(dialog.result_path))
-        dialog.finished.connect(self._written)
+        dialog.stop_asked.connect(self._stop_writing)
+        dialog.opened.connect(lambda: self._opener(dialog.result_path or self.results))
+        dialog.finished.connect(self._forget_writing)
         self._open(dialog)
 
-    def _written(self) -> None:
+    def _forget_writing(self) -> None:
         self.writing = None
 
     def _open(self, dialog: QDialog) -> None:
@@ -445,6 +506,215 @@ class ResultsPlace(Place):
 
     def _name(self) -> str:
         return "" if self.view.chosen is None else self.view.chosen.name
+
+    @property
+    def busy(self) -> bool:
+        """Whether something was asked for and has not come to its end."""
+        return bool(self._orders) or self._writer is not None
+
+    def show_results(self, results: Path) -> None:
+        self.results = results
+        self.show_view(ResultsView())
+        if self.reader is not None:
+            self.look()
+
+    def look(self) -> None:
+        """Look which studies there are, and read the chosen one again."""
+        self._ask(FindStudies(self.results), "looking for studies")
+
+    def choose(self, folder: Path) -> None:
+        """Show this study when the place is entered next."""
+        self.show_view(ResultsView(studies=self.view.studies, chosen=folder))
+
+    def _ask(self, order: Order, what: str) -> None:
+        if self.reader is None or not self.reader.works:
+            if self.reader is not None:
+                self.reader.close()
+            self.reader = self._start_worker()
+            self._orders = {}
+        self._orders[self.reader.order(order)] = order
+        self._since_s = time.monotonic()
+        self._going = Progress(what, 0.0)
+        self._listening.start()
+
+    def _listen(self) -> None:
+        """Take the answers to the last request; say what goes on where that takes long."""
+        if self.reader is not None and self._orders:
+            for number, answer in self.reader.answers():
+                self._take(number, answer)
+            if self._orders and time.monotonic() - self._since_s > PATIENCE_S:
+                if self._blocks and len(self._redrawn) >= self._blocks:
+                    self._show(testing=self._going, drawing=None)
+                else:
+                    self._show(drawing=self._going, testing=None)
+        self._listen_to_writer()
+        if not self.busy:
+            self._listening.stop()
+
+    def _take(self, number: int, answer: Answer | Refused | Crashed) -> None:
+        order = self._orders.get(number)
+        if order is None:
+            return
+        newest = number == max(self._orders)
+        match answer:
+            case Done():
+                del self._orders[number]
+                if isinstance(order, OpenKey) and answer.warnings:
+                    self.message.emit("Some tables were not updated", "\n".join(answer.warnings))
+                self._end(order, newest=newest)
+            case Refused():
+                del self._orders[number]
+                if newest or isinstance(order, Decided):
+                    self._refused(order, answer)
+            case Crashed():
+                self._orders = {}
+                self._show(trouble=MISTAKE, figures=(), drawing=None, testing=None)
+            case Progress() if newest:
+                self._going = answer
+            case StudiesFound() if newest:
+                self._take_studies(answer)
+            case SessionsFound() if newest:
+                self._take_sessions(answer)
+            case StudyFound() if newest:
+                self._blocks = answer.blocks
+                nothing = Trouble("No figures", "This study has no questionnaire.", "Refresh", "again")
+                self._show(
+                    trials=answer.trials,
+                    doubts=answer.doubts,
+                    colours=answer.colours,
+                    trouble=None if answer.blocks else nothing,
+                )
+            case FigureDrawn() if newest:
+                self._redrawn.add(answer.name)
+                there = [figure.name for figure in self.view.figures]
+                figures = [answer if figure.name == answer.name else figure for figure in self.view.figures]
+                self._show(figures=tuple(figures if answer.name in there else [*figures, answer]))
+
+    def _take_studies(self, found: StudiesFound) -> None:
+        there = [one.folder for one in found.studies]
+        chosen = self.view.chosen if self.view.chosen in there else None
+        if chosen is None and there:
+            chosen = max(found.studies, key=lambda one: one.newest_s).folder
+        if chosen is None:
+            sentence = f"The first session of a study creates its folder in {self.results}."
+            self.show_view(ResultsView(trouble=Trouble("No studies yet", sentence, "Go to Home", "home")))
+            return
+        self._show(studies=found.studies)
+        self._read(chosen)
+
+    def _choose(self, folder: Path) -> None:
+        if folder != self.view.chosen:
+            self._read(folder)
+
+    def _read(self, folder: Path) -> None:
+        """Read a study; what is shown of it stays until it is known anew."""
+        if folder != self.view.chosen:
+            self.show_view(ResultsView(studies=self.view.studies, chosen=folder))
+            self._blocks = 0
+        self._redrawn = set()
+        self._show(trouble=None, untested=False, listed=False)
+        self._ask(ReadStudy(folder), f"reading {folder.name}")
+
+    def _take_sessions(self, found: SessionsFound) -> None:
+        facts = session_facts(found.folder, found.rows, found.exclusions, {})
+        facts.sort(key=lambda one: (not one.needs_care, one.participant, one.session))
+        reveal = found.reveal
+        self._show(
+            sessions=tuple(facts),
+            listed=True,
+            left_out=found.exclusions,
+            exclusions_file=exclusions_at(found.folder),
+            sealed=reveal is None,
+            opened="" if reveal is None else unblinded_words(reveal),
+        )
+
+    def _end(self, order: Order, *, newest: bool) -> None:
+        if isinstance(order, Decided):
+            self._read(order.folder)
+        elif isinstance(order, ReadStudy) and newest:
+            kept = tuple(figure for figure in self.view.figures if figure.name in self._redrawn)
+            self._show(figures=kept, drawing=None, testing=None)
+
+    def _refused(self, order: Order, refused: Refused) -> None:
+        sentence = f"{refused.sentence}."
+        if isinstance(order, Decided):
+            self.message.emit(REFUSALS[type(order)], sentence)
+            self._read(order.folder)  # it may have changed meanwhile, and what was being read was given up
+        elif refused.stopped:
+            all_drawn = self._blocks and len(self._redrawn) >= self._blocks
+            trouble = None if all_drawn else Trouble("Stopped", "There are no figures yet.", "Go on", "read")
+            self._show(untested=bool(all_drawn), trouble=trouble, drawing=None, testing=None)
+        elif isinstance(order, FindStudies):
+            trouble = Trouble("The results folder cannot be read", sentence, "Refresh", "again")
+            self.show_view(ResultsView(trouble=trouble))
+        elif refused.lacks_extra:
+            sentence = sentence.replace("this needs", "Figures need")
+            trouble = Trouble("Your data are complete", sentence, "Refresh", "again")
+            self._show(trouble=trouble, figures=(), drawing=None, testing=None)
+        elif self.view.listed and not self.view.sessions:
+            sentence = "Results appear after the first session has started."
+            trouble = Trouble("No sessions yet", sentence, "Go to Home", "home")
+            self._show(trouble=trouble, figures=(), drawing=None, testing=None)
+        else:
+            trouble = Trouble("The study cannot be read", sentence, "Refresh", "again")
+            self._show(trouble=trouble, figures=(), drawing=None, testing=None)
+
+    def _show(self, **changes: Any) -> None:
+        view = replace(self.view, **changes)
+        if view != self.view:
+            self.show_view(view)
+
+    def _mend(self, remedy: str) -> None:
+        if remedy == "home":
+            self.go_asked.emit("home")
+        elif remedy == "stop":
+            if self.reader is not None:
+                self.reader.stop()
+        elif remedy == "read" and self.view.chosen is not None:
+            self._read(self.view.chosen)
+        else:
+            self._show(trouble=None)
+            self.look()
+
+    def _decide(self, what: str, order: Callable[..., Decided], *details: Any) -> None:
+        if self.view.chosen is not None:
+            self._ask(order(self.view.chosen, *details), what)
+
+    def _write(self, make: Callable[..., WriteTables | WriteReport], *details: Any) -> None:
+        if self.view.chosen is not None:
+            self._writer = self._start_worker()
+            self._writer.order(make(self.view.chosen, *details))
+            self._listening.start()
+
+    def _stop_writing(self) -> None:
+        if self._writer is not None:
+            self._writer.stop()
+
+    def _listen_to_writer(self) -> None:
+        """Pass on how far it is; where it has come to its end, end the process."""
+        dialog = self.writing
+        if self._writer is None:
+            return
+        last: Done | Refused | None = None
+        for _, answer in self._writer.answers():
+            if isinstance(answer, Progress) and dialog is not None:
+                dialog.show_progress(f"{answer.what[:1].upper()}{answer.what[1:]} …", answer.share)
+            elif isinstance(answer, (Done, Refused)):
+                last = answer
+            elif isinstance(answer, Crashed):
+                last = Refused(f"a bug ended the process that writes the files: {answer.sentence}")
+        if last is None:
+            return
+        self._writer.close()
+        self._writer = None
+        if dialog is None:
+            return
+        if isinstance(last, Done):
+            dialog.show_written(last.files, last.warnings)
+        elif last.stopped:
+            dialog.stopped()
+        else:
+            dialog.show_refused(f"{last.sentence}.")
 
     def _arrange(self) -> None:
         """Put the figures below the sessions in a narrow window, and the chips below the heading where they must be."""

@@ -344,20 +344,20 @@ def trial_words(trial: TrialRecord) -> str:
 class SessionPage(Themed, QDialog):
     """One session in full, read in a thread.
 
-    ``changed`` comes when something was left out or taken back, ``watch_asked`` with the page when the trial that is
-    chosen is to be watched again.
+    ``changed`` comes when something was left out or taken back; ``watched`` is the window of the trial watched last.
     """
 
     changed = Signal()
-    watch_asked = Signal(object)
 
     def __init__(self, parent: QWidget, theme: Theme, facts: SessionFacts, opener: Callable[[Path], object]) -> None:
         super().__init__(parent)
         self.facts = facts
         self.record: SessionRecord | None = None
         self.decision: Question | None = None
+        self.watched: QDialog | None = None
         self._reader = Background(self)
         self._reader.done.connect(self._show)
+        self._reader.failed.connect(self._show_unread)
         self.setWindowTitle(f"{facts.name}, {facts.study}")
         self.status, self.validity = Chip(*status_chip(facts)), Chip(*validity_chip(facts))
         self.about, self.limits = label("", "body", "text2", wraps=True), label("", "body", wraps=True)
@@ -374,7 +374,7 @@ class SessionPage(Themed, QDialog):
         self._lay_out()
         self.trials.selectionModel().selectionChanged.connect(lambda *_changes: self._choose_trial())
         for asks in (self.watch.clicked, self.trials.opened):
-            asks.connect(lambda _how: self.watch_asked.emit(self))
+            asks.connect(self._watch)
         self.leave_out.clicked.connect(self._ask_leave_out)
         self.folder.clicked.connect(lambda: opener(facts.folder))
         self.close_button.clicked.connect(self.accept)
@@ -389,7 +389,7 @@ class SessionPage(Themed, QDialog):
         self.read()
 
     def read(self) -> None:
-        self._reader.run(partial(_result, read_record, self.facts.folder))
+        self._reader.run(partial(read_record, self.facts.folder))
 
     def _lay_out(self) -> None:
         kind = f"  ·  {self.facts.kind}" if self.facts.kind else ""
@@ -417,12 +417,11 @@ class SessionPage(Themed, QDialog):
         foot = hbox(STRETCH, self.close_button)
         vbox(head, self.about, self.limits, (body, 1), foot, spacing=8, margins=(24, 20, 24, 18), parent=self)
 
-    def _show(self, record: SessionRecord | StoreError) -> None:
-        if isinstance(record, StoreError):
-            sentence = str(record)
-            self.limits.setText(f"{sentence[:1].upper()}{sentence[1:]}.")
-            set_ink(self.limits, "bad")
-            return
+    def _show_unread(self, error: Exception) -> None:
+        self.limits.setText(f"{str(error)[:1].upper()}{str(error)[1:]}.")
+        set_ink(self.limits, "bad")
+
+    def _show(self, record: SessionRecord) -> None:
         row = self.trials.currentIndex().row()
         self.record = record
         set_ink(self.limits, "text")
@@ -470,6 +469,16 @@ class SessionPage(Themed, QDialog):
         self.trial.setText(trial_words(trial))
         set_ink(self.trial, "warn" if trial.broken else "text2")
 
+    def _watch(self) -> None:
+        from study_app.gui.watch.window import WatchWindow  # noqa: PLC0415 - pyqtgraph: only once it is needed
+
+        if (trial := self.chosen) is not None:
+            self.watched = made = WatchWindow(
+                self, self.theme, self.facts.folder, trial.number, attempt=trial.attempt, presented=trial.words
+            )
+            made.finished.connect(made.deleteLater)
+            made.open()
+
     def _ask_leave_out(self) -> None:
         assert self.record is not None  # noqa: S101 - the button is off until it was read
         who = (self.facts.participant, self.facts.session)
@@ -498,22 +507,12 @@ class SessionPage(Themed, QDialog):
     def _decide(self, decide: Callable[[], object]) -> None:
         """Carry out a decision in the thread that reads, read the session again, and tell of it."""
 
-        def decided(folder: Path) -> SessionRecord:
+        def decided() -> SessionRecord:
             decide()
-            return read_record(folder)
+            return read_record(self.facts.folder)
 
-        self._reader.run(partial(_result, decided, self.facts.folder))
-        self._reader.done.connect(self._tell_change, Qt.ConnectionType.SingleShotConnection)
-
-    def _tell_change(self) -> None:
-        self.changed.emit()
-
-
-def _result(read: Callable[[Path], Any], path: Path) -> Any:
-    try:
-        return read(path)
-    except StoreError as error:
-        return error
+        self._reader.run(decided)
+        self._reader.done.connect(lambda _record: self.changed.emit(), Qt.ConnectionType.SingleShotConnection)
 
 
 def _size(size: int) -> str:

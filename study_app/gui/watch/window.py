@@ -16,7 +16,6 @@ from study_app.gui.application import open_here
 from study_app.gui.kit.commands import Command, press
 from study_app.gui.kit.dialogs import Work
 from study_app.gui.kit.fields import Field
-from study_app.gui.sessions.session_page import SessionPage, TrialRecord
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme, remove_widget
 from study_app.gui.watch.stage import Stage
@@ -45,12 +44,20 @@ CAPS: Final = {"Left": "←", "Right": "→"}
 
 
 class WatchWindow(Themed, QDialog):
-    """Plays a trial, which is read in a thread; what cannot be read is one sentence in its place."""
+    """Plays a trial of a session's folder, read in a thread; what cannot be read is one sentence in its place.
 
-    def __init__(self, parent: QWidget, theme: Theme, folder: Path, trial: TrialRecord) -> None:
+    Parameters
+    ----------
+    trial, attempt : the trial's number, and which of its presentations
+    presented : what was presented, for the heading
+    """
+
+    def __init__(
+        self, parent: QWidget, theme: Theme, folder: Path, trial: int, *, attempt: int, presented: str
+    ) -> None:
         super().__init__(parent)
-        self.setWindowTitle(f"Trial {trial.number}, watched again")
-        self._folder, self._trial = folder, trial
+        self.setWindowTitle(f"Trial {trial}, watched again")
+        self._folder, self._trial, self._attempt = folder, trial, attempt
         self.stage: Stage | None = None
         self.export_dialog: Work | None = None
         self._reader = Background(self)
@@ -84,15 +91,15 @@ class WatchWindow(Themed, QDialog):
         for command, *_ in STEPS:
             self.steps[command.id].setAccessibleName(command.words)
         self.close_button = ActionButton("", "Close", height=40)
-        self._lay_out()
+        self._lay_out(f"Trial {trial}  ·  {presented}")
         self._connect()
         apply_theme(self, theme)
         available = self.screen().availableSize()
         self.resize(min(SIZE[0], available.width() - 40), min(SIZE[1], available.height() - 60))
         self._read(1)
 
-    def _lay_out(self) -> None:
-        title = label(f"Trial {self._trial.number}  ·  {self._trial.words}", "title_dense")
+    def _lay_out(self, heading: str) -> None:
+        title = label(heading, "title_dense")
         for part in (self.interval, self.speed):
             part.setFont(font("body"))
         self.seen.setFont(font("body"))
@@ -121,7 +128,7 @@ class WatchWindow(Themed, QDialog):
 
     def _read(self, interval: int) -> None:
         self.pause()
-        self._reader.run(partial(_result, self._folder, self._trial, interval))
+        self._reader.run(partial(watched, self._folder, self._trial, self._attempt, interval))
 
     def _show(self, shown: Watched | Exception) -> None:
         if self.stage is not None:
@@ -235,7 +242,7 @@ class WatchWindow(Themed, QDialog):
     def _name(self) -> str:
         interval = f"-interval-{self.interval.currentIndex() + 1}" if self.interval.count() > 1 else ""
         participant, session = self._folder.parent.name, self._folder.name
-        return f"{participant}_{session}_trial-{self._trial.number:03}{interval}.mp4"
+        return f"{participant}_{session}_trial-{self._trial:03}{interval}.mp4"
 
     def _begin_export(self) -> None:
         assert self.export_dialog is not None  # noqa: S101 - it has begun
@@ -285,13 +292,6 @@ class WatchWindow(Themed, QDialog):
         self._writing.stop()
 
 
-def _result(folder: Path, trial: TrialRecord, interval: int) -> Watched | StudyError:
-    try:
-        return watched(folder, trial.number, trial.attempt, interval)
-    except StudyError as error:
-        return error
-
-
 def _pixels(stage: Stage, size: QSize) -> np.ndarray:
     """Return what is seen now (height, width, 4): blue, green, red, unused."""
     image = stage.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
@@ -299,13 +299,3 @@ def _pixels(stage: Stage, size: QSize) -> np.ndarray:
         image = image.scaled(size)
     rows = np.frombuffer(image.constBits(), np.uint8).reshape(size.height(), image.bytesPerLine() // 4, 4)
     return rows[:, : size.width()].copy()
-
-
-def watch(page: SessionPage) -> WatchWindow | None:
-    """Open the trial that is chosen on a session's page."""
-    if page.chosen is None:
-        return None
-    made = WatchWindow(page, page.theme, page.facts.folder, page.chosen)
-    made.finished.connect(made.deleteLater)
-    made.open()
-    return made

@@ -11,6 +11,8 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from shiboken6 import isValid
 
+from study_app.errors import StudyError
+
 _threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
 _telling, _program_ends = threading.Lock(), threading.Event()
 
@@ -61,8 +63,8 @@ def delayed(owner: QObject, milliseconds: int, run: Callable[[], Any]) -> QTimer
 class Background(QObject):
     """Runs one job at a time in a thread; ``done`` carries what the last job that was asked for returned.
 
-    A job that was asked for while another runs begins after it, unless a newer one takes its place. The job returns
-    refusals (`StudyError`) as values; what else it raises goes to ``threading.excepthook`` and comes by ``failed``.
+    A job that was asked for while another runs begins after it, unless a newer one takes its place. What the job raises
+    comes by ``failed``; what is no refusal (`StudyError`) also goes to ``threading.excepthook``.
     """
 
     done = Signal(object)
@@ -96,6 +98,8 @@ class Background(QObject):
             found, whole = None, False
             try:
                 found, whole = job(), True
+            except StudyError as error:
+                found = error
             except BaseException as error:
                 found = error
                 raise

@@ -141,6 +141,7 @@ def test_a_screen_that_is_removed_meanwhile_ends_the_question(asked: Preflight, 
     def none_left() -> Any:
         raise DisplayError("screen 2 cannot be used: there is 1 screen")
 
+    monkeypatch.setattr(preflight_controller, "measured", lambda *_words, **_named: FACTS)
     monkeypatch.setattr(asked, "_screen", none_left)
     with qtbot.waitSignal(asked.failed, timeout=3000) as told:
         pass
@@ -202,6 +203,7 @@ def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_c
     assert not first.works
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
     asked: Preflight, monkeypatch: Any, qtbot: Any
 ) -> None:

@@ -79,7 +79,7 @@ WRITING: Actions = {
     "again": lambda dialog: dialog.go_on.click(),
     "stopping": lambda dialog: dialog.back.click(),
     "written": lambda dialog: dialog.show_written(
-        [Path("/there/a.csv"), Path("/there/b.csv")], Path("/there"), [f"P00{n} is damaged" for n in range(5)]
+        [Path("/there/a.csv"), Path("/there/b.csv")], [f"P00{n} is damaged" for n in range(5)]
     ),
     "opened": lambda dialog: dialog.go_on.click(),
 }

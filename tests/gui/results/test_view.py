@@ -1,8 +1,8 @@
 """The results window draws a view and says what is asked for; it knows no file and computes nothing."""
 
+import importlib.util
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QSize, Qt
@@ -12,8 +12,8 @@ from study_app import figure_style as style
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.page_layout import Look, study_marks
-from study_app.analysis.worker_messages import FigureDrawn
-from study_app.gui.results.view import ResultsPlace
+from study_app.analysis.worker_messages import FigureDrawn, LeaveOut, OpenKey, TakeBack
+from study_app.gui.results.view import NO_SAV
 from study_app.gui.widgets.controls import ActionButton
 from tests.analysis.conftest import SAMPLE
 from tests.gui.results.sample import LEFT_OUT, facts, view
@@ -31,8 +31,9 @@ def click(qtbot, button):
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
-def decided(qtbot, asked, dialog, by, reason):
-    """Press the button of a dialog without a name, then with a name and a reason; return what is asked for."""
+def decided(qtbot, place, by, reason):
+    """Press the button of a dialog without a name, then with a name and a reason; return what is ordered."""
+    dialog = place.dialog
     click(qtbot, dialog.go_on)
     assert dialog.isVisible()
     assert "name" in dialog.missing.text()
@@ -40,9 +41,8 @@ def decided(qtbot, asked, dialog, by, reason):
     qtbot.keyClick(dialog.editors["by"].control, Qt.Key.Key_Return)
     assert "reason" in dialog.missing.text()
     dialog.editors["reason"].show_value(reason)
-    with qtbot.waitSignal(asked) as heard:
-        click(qtbot, dialog.go_on)
-    return heard.args
+    click(qtbot, dialog.go_on)
+    return place.reader.orders[-1]
 
 
 def test_sessions_are_searched_and_filtered(place, qtbot):
@@ -91,8 +91,7 @@ def test_leaving_out_wants_a_name_and_a_reason(place, qtbot):
         "Whole session", "Trial 2: Part 1, L2", "Trial 3: Part 1, L1"
     ]  # fmt: skip
     dialog.editors["trial"].control.setCurrentIndex(2)
-    asked = decided(qtbot, place.leave_out_asked, dialog, "AK", "phone rang")
-    assert asked == [("P001", 1, 3, "AK", "phone rang")]
+    assert decided(qtbot, place, "AK", "phone rang") == LeaveOut(place.view.chosen, "P001", 1, 3, "AK", "phone rang")
 
 
 def test_a_figure_asks_for_the_width_at_which_it_is_read_and_the_height_of_its_proportion(place):
@@ -101,11 +100,10 @@ def test_a_figure_asks_for_the_width_at_which_it_is_read_and_the_height_of_its_p
 
 def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
     click(qtbot, place.unblind)
-    dialog = place.dialog
-    said = " ".join(one.text() for one in dialog.findChildren(QLabel))
+    said = " ".join(one.text() for one in place.dialog.findChildren(QLabel))
     assert "1 session is not complete" in said
     assert "cannot be undone" in said
-    assert decided(qtbot, place.unblind_asked, dialog, "AK", "closed") == ["AK", "closed"]
+    assert decided(qtbot, place, "AK", "closed") == OpenKey(place.view.chosen, "AK", "closed")
 
 
 def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
@@ -113,19 +111,18 @@ def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
     back = place.exclusions.lines[0].findChild(ActionButton)
     assert back.accessibleName() == "Include again: P003, trial 4"
     click(qtbot, back)
-    asked = decided(qtbot, place.take_back_asked, place.dialog, "CD", "wrong trial")
-    assert asked == [("P003", 1, 4, "CD", "wrong trial")]
+    assert decided(qtbot, place, "CD", "wrong trial") == TakeBack(place.view.chosen, "P003", 1, 4, "CD", "wrong trial")
     back.setFocus()
     place.show_view(view())
     assert place.window().focusWidget() is place.exclusions.leave_out
 
 
 @pytest.mark.parametrize("sealed", [True, False])
-def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_what_cannot_be_written(qtbot, sealed):
-    place = ResultsPlace(handed_to=Path(), no_sav="It needs pyreadstat.")
-    qtbot.addWidget(place)
+def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_what_cannot_be_written(
+    place, qtbot, monkeypatch, sealed
+):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
     place.show_view(view(sealed=sealed))
-    place.show()
     for button in (place.export, place.report):
         click(qtbot, button)
         said = [one.text() for one in place.writing.findChildren(QLabel)]
@@ -133,7 +130,7 @@ def test_outputs_say_that_settings_appear_as_codes_while_the_key_is_sealed_and_w
         assert explanation.endswith("Settings appear as codes because the key is sealed.") is sealed
         if button is place.export:
             assert not place.writing.editors["sav"].control.isEnabled()
-            assert "It needs pyreadstat." in said
+            assert NO_SAV in said
         place.writing.reject()
 
 

@@ -10,7 +10,6 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QLabel, QWidget
 
-from study_app.app import results_controller
 from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.theme import DARK
@@ -50,13 +49,13 @@ def opened(qtbot):
         below = QWidget()
         qtbot.addWidget(below)
         page = SessionPage(below, DARK, next(iter(sessions(study.parent, {}))), print)
-        page.watch_asked.connect(lambda asked: kept.append((below, results_controller.watch(asked))))
         qtbot.addWidget(page)
         page.show()
         qtbot.waitUntil(lambda: page.record is not None)
         page.trials.selectRow(row)
         qtbot.mouseClick(page.watch, Qt.MouseButton.LeftButton)
-        window = kept[-1][1]
+        window = page.watched
+        kept.append((below, window))
         qtbot.waitUntil(lambda: window.stage is not None or window.sentence.text() != "Reading …")
         return window
 

@@ -13,9 +13,9 @@ from pytestqt.qtbot import QtBot
 
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_messages import Answer, Order, start_analysis_worker
-from study_app.app.results_controller import ResultsController
 from study_app.errors import StudyError
 from study_app.gui.home.main_window import MainWindow
+from study_app.gui.results.view import ResultsPlace
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.main_view import Place
 from study_app.store.blinded.blinding import reveals
@@ -69,8 +69,7 @@ class Opened:
     def __init__(self, qtbot: QtBot, results: Path, start_worker: Callable[[], Any] = Here) -> None:
         self.qtbot = qtbot
         self.files: list[Path] = []
-        self.controller = ResultsController(results, opener=self.files.append, start_worker=start_worker)
-        self.place = self.controller.place
+        self.place = ResultsPlace(results, opener=self.files.append, start_worker=start_worker)
         self.window = MainWindow({"home": Place, "results": lambda: self.place})
         qtbot.addWidget(self.window)
         self.window.show()
@@ -78,7 +77,7 @@ class Opened:
         self.wait()
 
     def wait(self) -> None:
-        self.qtbot.waitUntil(lambda: not self.controller.busy, timeout=SOON_MS)
+        self.qtbot.waitUntil(lambda: not self.place.busy, timeout=SOON_MS)
         cards = self.place.figures.cards
         self.qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.settled for card in cards))
 
@@ -126,7 +125,7 @@ def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorde
     assert b">L1<" in drawn
     assert b">Thick<" not in drawn
     assert [one.participant for one in shown.place.sessions.rows.shown] == ["P001", "P002", "P003"]
-    assert shown.controller.view.testing is None
+    assert shown.place.view.testing is None
     shown.decide(shown.place.unblind, "AK", "collection closed")
     (record,) = reveals(results / "demo")
     assert (record["by"], record["reason"]) == ("AK", "collection closed")
@@ -148,7 +147,7 @@ def test_leaving_out_changes_foot_figures_and_list_until_it_is_taken_back(shown:
     assert shown.place.sessions.why.text() == "P002 is excluded."
     (line,) = shown.place.exclusions.lines
     assert "fell asleep" in line.accessibleName()
-    assert "1 session is excluded (fell asleep)" in shown.place.figures.cards[0].figure.caption
+    assert "1 session is excluded." in shown.place.figures.cards[0].figure.caption
     assert shown.place.figures.cards[0].figure != before
     shown.decide(line.findChild(ActionButton), "CD", "wrong participant")
     assert exclusions(results / "demo") == ()
@@ -228,9 +227,9 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
 @pytest.mark.nightly
 def test_a_process_that_is_killed_is_told_and_begun_again(qtbot: QtBot, results: Path) -> None:
     opened = Opened(qtbot, results, start_analysis_worker)
-    reader: Any = opened.controller.reader
+    reader: Any = opened.place.reader
     psutil.Process(reader.process.pid).suspend()  # or it may answer before it is killed
-    opened.controller.look()
+    opened.place.look()
     reader.process.kill()
     qtbot.waitUntil(lambda: "bug in the program" in opened.place.figures.trouble.title.text(), timeout=SOON_MS)
     opened.click(opened.place.figures.trouble.button)
