@@ -125,13 +125,14 @@ def edit(protocol: str) -> None:
 @click.command()
 @FILE
 @click.option("--participants", type=click.IntRange(1, 9999), required=True, help="Number of participants.")
+@click.option("--from", "first", metavar="ID", default="P001", show_default=True, help="The first one; others follow.")
 @click.option("--seed", type=SEED, default=1, show_default=True, help="Seed from which their orders are drawn.")
-def design(protocol: str, participants: int, seed: int) -> None:
+def design(protocol: str, participants: int, first: str, seed: int) -> None:
     """Count positions and carry-over in the orders of N participants, before the study starts."""
     from study_app.protocol.load import load
     from study_app.protocol.orders.balance import balances, describe_balance, numbered
 
-    judged = balances(load(protocol), numbered(participants), seed)
+    judged = balances(load(protocol), numbered(participants, first), seed)
     click.echo("\n\n".join(map(describe_balance, judged)))
 
 

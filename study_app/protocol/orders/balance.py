@@ -7,6 +7,7 @@ Codes are counted, not conditions: a study draws once which condition each code 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count, pairwise
@@ -82,9 +83,12 @@ class Balance:
     blocks: tuple[BlockBalance, ...]
 
 
-def numbered(count: int) -> tuple[str, ...]:
-    """Return the ids that a study suggests from its first participant on: P001, P002 and so on."""
-    return tuple(f"P{number:03d}" for number in range(1, count + 1))
+def numbered(count: int, first: str = "P001") -> tuple[str, ...]:
+    """Return so many ids from the first one on; StudyError if that does not end in a number."""
+    found = re.fullmatch(r"([A-Za-z0-9]*?)([0-9]+)", first)
+    if found is None:
+        raise StudyError(f"{first!r} is no first participant: give letters and digits that end in a number, as P061")
+    return tuple(f"{found[1]}{int(found[2]) + more:0{len(found[2])}d}" for more in range(count))
 
 
 def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:

@@ -49,6 +49,15 @@ def test_a_williams_design_balances_every_full_round_and_no_other_number(conditi
             assert set(counted.after_another) == {participants // conditions}
 
 
+def test_a_range_of_ids_is_judged_from_its_first_one():
+    assert numbered(3, "A099") == ("A099", "A100", "A101")
+    protocol = ordered(WILLIAMS, 3)
+    even = {first: balance(protocol, numbered(6, first), 1).blocks[0].evenness.balanced for first in ("P004", "P061")}
+    assert even == {"P004": False, "P061": True}
+    with pytest.raises(StudyError, match="end in a number"):
+        numbered(6, "anna")
+
+
 def test_blocks_with_one_code_are_left_out():
     judged = balance(REK, numbered(5), 3)
     assert [block.id for block in judged.blocks] == ["liquids", "delays"]
