@@ -32,7 +32,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.designer.document.additions import number_rows
 from study_app.designer.document.elements import (
     FIRST,
     LABEL,
@@ -46,8 +45,8 @@ from study_app.designer.document.elements import (
     title_of,
     words_sought,
 )
-from study_app.designer.document.fields import label_of, languages_of, named_at, node_at, row_at, rows, singular, tags
-from study_app.designer.document.steps import AddElement, AddInstrument, ChangeLanguage, Do
+from study_app.designer.document.fields import label_of, languages_of, node_at, row_at, rows, singular, tags
+from study_app.designer.document.steps import AddElement, AddInstrument, ChangeLanguage
 from study_app.designer.document.study import Study
 from study_app.designer.place.segments import dense
 from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
@@ -193,7 +192,6 @@ SECTIONS_OF_TABLES: Final = frozenset(ICONS) - {*OWN, "study", "device", "scene"
 
 HELP: Final = {"designs": "2IFC and other trial designs"}
 """What a section is for, where its name does not say it."""
-SERIES: Final = "Copies at several levels of one number: {}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +200,7 @@ class Addable:
 
     words: str
     icon: str
-    asks: AddElement | AddInstrument | ChangeLanguage | Do
+    asks: AddElement | AddInstrument | ChangeLanguage
     help: str = ""
 
 
@@ -227,7 +225,6 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
         for path in sections
     ]
     found += _questions(study, around) if not any(path[0] == QUESTIONNAIRES for path in lists) else ()
-    found += _series(study, selected)
     found += _instruments() if second else ()
     there = languages_of(study.document)
     found += [
@@ -250,20 +247,6 @@ def _questions(study: Study, around: Path) -> Iterator[Addable]:
         first = next(_of_list(study, (QUESTIONNAIRES, str(name), "items")))
         title = title_of(study.document, (QUESTIONNAIRES, str(name)))
         yield first if len(every) == 1 else replace(first, words=f"{first.words} of {title}")
-
-
-def _series(study: Study, selected: Path) -> Iterator[Addable]:
-    """Yield a series of the selected element, and of those that its lists name, where there can be one."""
-    lists = (row for row in rows(study.document, selected) if row.kind == "references" and len(selected) == 2)
-    listed = (
-        named_at(study.document, (*row.path, at))
-        for row in lists
-        for at in range(len(row.value if isinstance(row.value, tuple) else ()))
-    )
-    for path in dict.fromkeys((selected, *(one for one in listed if one is not None))):
-        if numbers := number_rows(study.document, path):
-            words, help_ = f"Series of {title_of(study.document, path)} …", ", ".join(row.label for row in numbers)
-            yield Addable(words, "bars", Do("series", (path,)), SERIES.format(help_))
 
 
 @cache
@@ -487,8 +470,8 @@ def dragged_by(index: Index) -> ElementPath:
 class Tree(Themed, QTreeView):
     """The rows.
 
-    Signals: ``entered_row`` (by Enter), ``dropped`` (entries of a list, or an element, and the place of the entry that
-    they come before). Its menu shows its actions.
+    Signals: ``entered_row`` (by Enter), ``dropped`` (an entry of a list, or an element, and the place of the entry that
+    it comes before). Its menu shows its actions.
     """
 
     entered_row = Signal()
@@ -504,22 +487,16 @@ class Tree(Themed, QTreeView):
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setMouseTracking(True)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.rows = RowPainter(self)
         self.setItemDelegate(self.rows)
         self.setStyleSheet("QTreeView { background: transparent; border: none; outline: none; }")
-        self.dragged: tuple[ElementPath, ...] = ()
+        self.dragged: ElementPath = ()
         self.target: tuple[ElementPath, float] | None = None
         self.arrow_pressed = False
-        self._pressed: tuple[QPoint, tuple[ElementPath, ...]] | None = None
-
-    def selected_rows(self) -> list[OutlineRow]:
-        """Return the selected elements, in the order of the outline, the current one's list first."""
-        found = [index.data(ROW_ROLE) for index in self.selectedIndexes()]
-        return [row for row in found if row.path]
+        self._pressed: tuple[QPoint, ElementPath] | None = None
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.dragged and event.key() == Qt.Key.Key_Escape:
@@ -539,12 +516,7 @@ class Tree(Themed, QTreeView):
         self.arrow_pressed = arrow
         plain = event.button() == Qt.MouseButton.LeftButton and not event.modifiers()
         if plain and row is not None and (drags := dragged_by(index)) and self.rows.movable:
-            selected = [one.step for one in self.selected_rows() if one.step[:-1] == row.step[:-1]]
-            together = tuple(dict.fromkeys(selected)) if row.step and row.step in selected else (drags,)
-            self._pressed = (event.position().toPoint(), together)
-            if len(together) > 1:
-                self.setFocus(Qt.FocusReason.MouseFocusReason)
-                return
+            self._pressed = (event.position().toPoint(), drags)
         super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
@@ -552,9 +524,9 @@ class Tree(Themed, QTreeView):
         if self._pressed is None or not event.buttons() & Qt.MouseButton.LeftButton:
             super().mouseMoveEvent(event)
             return
-        start, together = self._pressed
+        start, drags = self._pressed
         if not self.dragged and (at - start).manhattanLength() >= QApplication.startDragDistance():
-            self.dragged = together
+            self.dragged = drags
             self.viewport().setCursor(Qt.CursorShape.ClosedHandCursor)
         if self.dragged:
             bar, height = self.verticalScrollBar(), self.viewport().height()
@@ -564,15 +536,12 @@ class Tree(Themed, QTreeView):
             self.viewport().update()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        dragged, target, pressed = self.dragged, self.target, self._pressed
+        dragged, target = self.dragged, self.target
         self._let_go()
-        if dragged:
-            if target is not None:
-                self.dropped.emit(dragged, target[0])
-        elif pressed is not None and len(pressed[1]) > 1:
-            self.setCurrentIndex(self.indexAt(event.position().toPoint()))
-        else:
+        if not dragged:
             super().mouseReleaseEvent(event)
+        elif target is not None:
+            self.dropped.emit(dragged, target[0])
 
     def _let_go(self) -> None:
         self.dragged, self.target, self._pressed = (), None, None
@@ -584,7 +553,7 @@ class Tree(Themed, QTreeView):
 
         What is no step yet comes into the session alone, not where the pointer is far from it.
         """
-        place = self.dragged[0][:-1] if isinstance(self.dragged[0][-1], int) else None
+        place = self.dragged[:-1] if isinstance(self.dragged[-1], int) else None
         found: list[tuple[ElementPath, float]] = []
         ends: dict[ElementPath, tuple[ElementPath, float]] = {}
         last: ElementPath = ()
@@ -671,23 +640,6 @@ class OutlineCard(Coloured, Card):
     def apply_theme(self, theme: Theme) -> None:
         self._sign.setIcon(icon("search", theme.text2, 16))
 
-    @property
-    def selected(self) -> tuple[ElementPath, ...]:
-        order = {row.path: at for at, row in reversed([*enumerate(self.rows)])}
-        found = {row.path for row in self.tree.selected_rows()}
-        return tuple(sorted(found, key=lambda path: order.get(path, 0)))
-
-    def select_several(self, paths: tuple[ElementPath, ...], *, selects: bool = True) -> None:
-        flags = QItemSelectionModel.SelectionFlag
-        flag = flags.Select if selects else flags.Deselect
-        self._filling = True
-        for index in self.indexes():
-            if index.data(ROW_ROLE).path in paths and index.data(ROW_ROLE).path:
-                if index.parent().isValid():
-                    self.tree.expand(index.parent())
-                self.tree.selectionModel().select(index, flag)
-        self._filling = False
-
     def begin(self) -> None:
         """Begin with the next rows as if there had been none: at the top, everything closed, nothing to find."""
         self.rows, self._opened = (), set()
@@ -700,7 +652,7 @@ class OutlineCard(Coloured, Card):
         """Show rows; what was open stays open. Where nothing was found, a line says so."""
         self._say_whether_found(rows)
         if rows != self.rows:
-            several, current = self.selected, self.tree.currentIndex()
+            current = self.tree.currentIndex()
             before = current.data(ROW_ROLE).path if current.isValid() else None
             self.rows = rows
             self._filling = True
@@ -727,8 +679,6 @@ class OutlineCard(Coloured, Card):
             self.tree.verticalScrollBar().setValue(scrolled)
             self._filling = False
             self.mark(selected, reveals=selected != before)
-            if selected in several and len(several) > 1:
-                self.select_several(several)
         self.mark(selected)
 
     def _say_whether_found(self, rows: tuple[OutlineRow, ...]) -> None:

@@ -91,8 +91,7 @@ def on_disk(record: Record) -> None:
 
 def series(record: Record) -> None:
     record.note("list one", lambda: record.designer.editing.ask(SetValue(LISTED, ["thin"])))
-    record.play("@conditions.thin ctrl+shift+d '5000' Return Up '60' Return '120 240' Return [Make the copies]")
-    record.play("ctrl+z Insert 'series of thin' Return 'x' Return Escape Escape")
+    record.play("@conditions.thin ctrl+shift+d '5000' Return ctrl+a '60 120 240' Return ctrl+z")
     record.play(" ".join(f"@{path} ctrl+shift+d Escape" for path in ("study", "blocks.liquids", "blocks")))
 
 

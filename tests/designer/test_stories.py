@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt
 from PySide6.QtGui import QDropEvent, QEnterEvent, QGuiApplication, QKeyEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QTableWidgetItem
+from PySide6.QtWidgets import QApplication, QFileDialog
 
 from study_app.designer.document.steps import (
     AddElement,
@@ -322,10 +322,6 @@ def adaptive(record: Record) -> None:
     record.note("begin", lambda: record.designer.controller.begin("template:viscosity-jnd", "thicker"))
     record.play("@methods.easy :methods.easy.levels ctrl+a '0.5 x' Return Escape")
     record.select("stimuli", "damping")
-    record.note("lowest level", record.designer.field("stimuli", "damping", "levels").extra.ends[0].setFocus)
-    record.play("Right Right Right ctrl+z")
-    record.note("PageUp sixty times", lambda: record.designer.key("PageUp", 60))
-    record.play("ctrl+z")
     for phase in (0, 1, 3, 4, 5):
         record.select("blocks", "training")
         record.note(f"phase {phase}", record.designer.field("blocks", "training", "design").extra.phases[phase].click)
@@ -450,19 +446,16 @@ def entries(record: Record) -> None:
     designer = record.designer
     field = partial(designer.field, *LISTED)
 
-    def click(at: int, held: str = "") -> None:
-        record.note(f"click entry {at} {held}", lambda: designer.click_on(field().rows[at], held, QPoint(30, 12)))
+    def click(at: int) -> None:
+        record.note(f"click entry {at}", lambda: designer.click_on(field().rows[at], at=QPoint(30, 12)))
 
     extra = "".join(f'\n[conditions.{name}]\nliquid = "thin"\ndelay_ms = {at}\n' for at, name in enumerate("cd", 1))
     text = record.text.replace('conditions = ["thin", "thick"]', 'conditions = ["thin", "thick", "c", "d"]')
     record.ask(RetypeFile(text + extra))
     record.select(*LISTED[:2])
     click(1)
-    click(2, "shift")
-    record.play("alt+Up alt+Down alt+Down")
-    click(0, "ctrl")
-    record.play("Delete ctrl+z @blocks.liquids")
-    field().choose((0,))
+    record.play("alt+Up alt+Up alt+Down alt+Down alt+Down ctrl+d Delete ctrl+z @blocks.liquids")
+    field().list.setCurrentRow(0)
     at = QPointF(field().rows[1].geometry().bottomLeft())
     drop = QDropEvent(at, Qt.DropAction.MoveAction, QMimeData(), LEFT, NONE)
     record.note("drop the first below the second", lambda: field().list.dropEvent(drop))
@@ -472,24 +465,19 @@ def entries(record: Record) -> None:
     record.note("double click", lambda: QTest.mouseDClick(field().rows[1], LEFT))
 
 
-def several(record: Record) -> None:
-    """Several elements are moved, copied and deleted together; the menu does what keys do."""
-    outline = record.designer.place.outline
-    record.select(*ITEMS, 0)
+def menu(record: Record) -> None:
+    """The menu of the outline does what keys do; an element that is used is deleted with what names it."""
+    record.play("@conditions.late")
     record.note("outline", record.designer.controller.show_outline)
-    record.press_row(*ITEMS, 0)
-    record.press_row(*ITEMS, 1, held="shift")
-    record.play("alt+Up ctrl+d ctrl+z @conditions.prompt")
-    record.note("outline", record.designer.controller.show_outline)
-    record.press_row("conditions", "late", held="ctrl")
-    record.play("Delete")
+    record.press_row("conditions", "late")
+    record.play("ctrl+d ctrl+z Delete")
     record.note("all", record.designer.place.prompt.all.click)
     record.play("ctrl+z @pages.welcome")
-    menu = {action.text(): action for action in outline.tree.actions()}
-    record.note("menu: Move down", menu["Move down"].trigger)
+    actions = {action.text(): action for action in record.designer.place.outline.tree.actions()}
+    record.note("menu: Move down", actions["Move down"].trigger)
     record.select("liquids", "thick")
     for words in ("Delete", "Rename"):
-        record.note(f"menu: {words}", menu[words].trigger)
+        record.note(f"menu: {words}", actions[words].trigger)
 
 
 def asked_when(record: Record) -> None:
@@ -589,8 +577,8 @@ def two_conditions(record: Record) -> None:
     record.note("series", lambda: designer.click_on(head.series))
     card = designer.place.prompt
     record.choose(card.number, "Visual delay")
-    card.table.setCurrentCell(0, 0)
-    card.table.setItem(0, 0, QTableWidgetItem("60"))
+    for typed in ("5000", "x", "60"):
+        record.note(f"values {typed}", lambda typed=typed: card.values.setText(typed))
     record.note("make", card.make.click)
     record.play("@stimuli.damping")
     record.note("copy", head.copy.click)
@@ -630,7 +618,7 @@ STORIES: tuple[tuple[Callable[[Record], None], str, str], ...] = (
     (warnings, DEMO, "place.problems"),
     (tab_key, DEMO, "place.banner"),
     (entries, DEMO, "place.banner"),
-    (several, DEMO, "place.form.head"),
+    (menu, DEMO, "place.form.head"),
     (asked_when, FORMAT_2, "place.form"),
     (new_study, DEMO, "place.new_page"),
     (hypotheses, DEMO, "place.form"),

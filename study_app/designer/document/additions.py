@@ -16,7 +16,6 @@ from study_app.designer.document.fields import (
     languages_of,
     new_text,
     node_at,
-    references_to,
     refused_at,
     row_at,
     rows,
@@ -121,27 +120,16 @@ def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:
         yield from entries(study.document, pattern)
 
 
-def moved(study: Study, entries: Sequence[Path], to: int) -> tuple[tuple[Edit, ...], tuple[Path, ...]]:
-    """Return the edits that move entries of a list, in their order, before the entry ``to``, and their new paths.
+def moved(study: Study, entry: Path, to: int) -> tuple[tuple[Edit, ...], Path]:
+    """Return the edits that move an entry of a list before the entry ``to``, and its new path.
 
     ``to`` counts before the move; the length of the list stands for its end. Parts of the study are renumbered if they
     were numbered correctly before.
     """
-    places = sorted({entry[:-1] for entry in entries}, key=str)
-    if len(places) != 1:
-        raise Refused("these elements are in several lists: only neighbours of one list move together")
-    place = places[0]
-    indices = sorted({int(entry[-1]) for entry in entries})
-    before = [index for index in indices if index < to]
-    after = [index for index in indices if index >= to]
-    moves: list[Edit] = []
-    for done, index in enumerate(before):
-        if index - done != to - 1:
-            moves.append(Move((*place, index - done), to - 1))
-    moves += [Move((*place, index), to + done) for done, index in enumerate(after) if index != to + done]
-    first = to - len(before)
-    paths = tuple((*place, first + number) for number in range(len(indices)))
-    return (*moves, *_renumbered(study, place, moves)), paths
+    place, index = entry[:-1], int(entry[-1])
+    to -= index < to
+    moves = () if index == to else (Move(entry, to),)
+    return (*moves, *_renumbered(study, place, moves)), (*place, to)
 
 
 def _renumbered(study: Study, place: Path, moves: Sequence[Edit]) -> tuple[Edit, ...]:
@@ -503,13 +491,6 @@ def copy_with(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[E
     edits, copy = duplicated(study, path, free_id(names(study.document, str(path[0])), name))
     titles = (Set((*copy, *place), text) for place, text in titles_with(study.document, path, row, value))
     return (*edits, Set((*copy, *row.path[2:]), value), *titles), copy
-
-
-def listings(study: Study, path: Path, copy: Path) -> Iterator[Edit]:
-    """Yield the edits that list a copy after its original, in each block that lists the original."""
-    for place in references_to(study.document, path):
-        if place[0] == "blocks" and isinstance(place[-1], int):
-            yield Insert((*place[:-1], place[-1] + 1), copy[1])
 
 
 def titles_with(document: Mapping[str, Any], path: Path, row: Row, value: float) -> Iterator[tuple[Path, str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, Literal, TypeAlias
 
@@ -13,7 +13,6 @@ from study_app.designer.document.additions import (
     duplicated,
     filled_in,
     followed,
-    listings,
     moved,
     number_row,
     switched,
@@ -59,9 +58,8 @@ class Step:
     select: Path | None = None  # what is selected after it; None stands for the same
     continues: object = None  # what it may continue: typing in one field is one step
     text: str | None = None  # the file's text that the edits are made in, None for the text that there is
-    several: tuple[Path, ...] = ()  # elements that are selected together after it
     said: str = ""  # what a screen reader says of it
-    fresh: bool = False  # whether what is selected after it is new: its first text takes the keyboard
+    fresh: Literal["", "new", "copy"] = ""  # whether what is selected after it is new: a text takes the keyboard
 
 
 @dataclass(slots=True)
@@ -216,7 +214,7 @@ class AddElement(Request):
         inside = selected[: len(section)] == section and len(selected) > len(section)
         behind = selected[len(section)] if inside else None
         edits, path = added(at.study, section, dict([self.kind]) if self.kind else None, behind=behind)
-        return Step(f"Add {singular(section[-1])}", _beside(at.study, edits, selected, path), path, fresh=True)
+        return Step(f"Add {singular(section[-1])}", _beside(at.study, edits, selected, path), path, fresh="new")
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +234,7 @@ class AddNamed(Request):
                 edits = (*edits, Insert(end, path[1]) if listed else Set(self.path, [path[1]]))
         else:
             edits = (*edits, Set(self.path, path[1]))
-        return Step(f"Add {singular(self.section)}", edits, path, fresh=True)
+        return Step(f"Add {singular(self.section)}", edits, path, fresh="new")
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,35 +266,23 @@ class ChangeLanguage(Request):
 
 @dataclass(frozen=True, slots=True)
 class DuplicateElement(Request):
-    """Copy an element right after itself; ``also`` are others that are copied with it.
+    """Copy an element right after itself, and its step in the session right after that of the original.
 
-    The step of each in the session comes right after that of the original. ``stays`` says that the form stays at its
-    element, as where entries of a list in it are copied.
+    ``stays`` says that the form stays at its element, as where an entry of a list in it is copied.
     """
 
     path: Path
-    also: tuple[Path, ...] = ()
     stays: bool = False
 
     def step(self, at: Situation) -> Step:
-        edits: tuple[Edit, ...] = ()
-        copies: list[Path] = []
-        now = at.study
-        for path in sorted((self.path, *self.also), key=lambda path: -path[-1] if isinstance(path[-1], int) else 0):
-            value = value_at(now.document, path)
-            if isinstance(value, Mapping) or not isinstance(path[-1], int):
-                made, copy = duplicated(now, path)
-            else:
-                copy = (*path[:-1], path[-1] + 1)
-                made = (Insert(copy, list(value) if isinstance(value, tuple) else value),)
-            made = _beside(now, made, path, copy)
-            copies = [*(_after_insert(one, copy) for one in copies), copy]
-            edits = (*edits, *made)
-            now, _ = now.edited(*made)
-        words = f"Duplicate {titles_of(at.study, (self.path, *self.also))}"
-        if self.stays:
-            return Step(words, edits)
-        return Step(words, edits, copies[0], several=tuple(copies), fresh=len(copies) == 1)
+        path, value = self.path, value_at(at.study.document, self.path)
+        if isinstance(value, Mapping) or not isinstance(path[-1], int):
+            edits, copy = duplicated(at.study, path)
+        else:
+            copy = (*path[:-1], path[-1] + 1)
+            edits = (Insert(copy, list(value) if isinstance(value, tuple) else value),)
+        words, edits = f"Duplicate {title_of(at.study.document, path)}", _beside(at.study, edits, path, copy)
+        return Step(words, edits) if self.stays else Step(words, edits, copy, fresh="copy")
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,7 +306,10 @@ class MakeSeries(Request):
             made, copy = copy_with(now, paths[-1], row, value)
             made = _beside(now, made, paths[-1], copy)
             now, _ = now.edited(*made)
-            for listing in listings(now, paths[-1], copy):
+            for place in references_to(now.document, paths[-1]):
+                if place[0] != "blocks" or not isinstance(place[-1], int):
+                    continue
+                listing = Insert((*place[:-1], place[-1] + 1), copy[1])
                 listed, _ = now.edited(listing)
                 if len(listed.faults) <= len(now.faults):
                     now, made = listed, (*made, listing)
@@ -328,47 +317,42 @@ class MakeSeries(Request):
             paths.append(copy)
         words = f"Make {counted_elements(len(self.values), self.path[0])} of {title_of(study.document, self.path)}"
         said = ", ".join(title_of(now.document, one) for one in paths[1:])
-        return Step(words, edits, paths[1], several=tuple(paths[1:]), said=said)
+        return Step(words, edits, paths[1], said=said)
 
 
 @dataclass(frozen=True, slots=True)
 class MoveElement(Request):
-    """Move an element among its neighbours, by so many places; ``also`` are others that move with it."""
+    """Move an element among its neighbours, by so many places."""
 
     path: Path
     by: int
-    also: tuple[Path, ...] = ()
 
     def step(self, at: Situation) -> Step:
-        document = at.study.document
-        first = step_of(document, self.path)
-        if first is None:
-            raise Refused(f"{title_of(document, self.path)} is not in an order, so it cannot be moved")
-        steps = {path: step_of(document, path) for path in (self.path, *self.also)}
-        together = {path: step for path, step in steps.items() if step is not None and step[:-1] == first[:-1]}
-        title, indices = titles_of(at.study, tuple(together)), [index_of(step) for step in together.values()]
-        to = min(indices) + self.by if self.by < 0 else max(indices) + 1 + self.by
-        if not 0 <= to <= len(value_at(document, first[:-1])):
-            raise Refused(f"{title} is the {'first' if self.by < 0 else 'last'} already")
-        words = f"Move {title} {'up' if self.by < 0 else 'down'}"
-        return _moved(at.study, tuple(together), tuple(together.values()), to, words)
+        document, by = at.study.document, self.by
+        entry, title = step_of(document, self.path), title_of(document, self.path)
+        if entry is None:
+            raise Refused(f"{title} is not in an order, so it cannot be moved")
+        to = index_of(entry) + (by if by < 0 else 1 + by)
+        if not 0 <= to <= len(value_at(document, entry[:-1])):
+            raise Refused(f"{title} is the {'first' if by < 0 else 'last'} already")
+        return _moved(at.study, self.path, entry, to, f"Move {title} {'up' if by < 0 else 'down'}")
 
 
 @dataclass(frozen=True, slots=True)
 class MoveTo(Request):
-    """Move entries of a list together before the one at the index ``to``; its length stands for the end.
+    """Move an entry of a list before the one at the index ``to``; its length stands for the end.
 
     ``stays`` says that the form stays at its element.
     """
 
-    entries: tuple[Path, ...]
+    entry: Path
     to: int
     stays: bool = False
 
     def step(self, at: Situation) -> Step:
-        things = tuple((named_at(at.study.document, entry) or entry) for entry in self.entries)
-        step = _moved(at.study, things, self.entries, self.to, f"Move {titles_of(at.study, things)}")
-        return replace(step, select=None, several=()) if self.stays else step
+        thing = named_at(at.study.document, self.entry) or self.entry
+        step = _moved(at.study, thing, self.entry, self.to, f"Move {title_of(at.study.document, thing)}")
+        return replace(step, select=None) if self.stays else step
 
 
 @dataclass(frozen=True, slots=True)
@@ -388,30 +372,23 @@ class AddToSession(Request):
 
 @dataclass(frozen=True, slots=True)
 class DeleteElement(Request):
-    """Delete an element: with all that needs it, with another one in its place, or leaving gaps.
-
-    ``also`` are others that are deleted with it.
-    """
+    """Delete an element: with all that needs it, with another one in its place, or leaving gaps."""
 
     path: Path
     how: Literal["all", "other", "gaps"] = "gaps"
     other: str = ""
-    also: tuple[Path, ...] = ()
 
     def step(self, at: Situation) -> Step:
         path, document = self.path, at.study.document
-        paths = (path, *self.also)
-        words = f"Delete {titles_of(at.study, paths)}"
+        words = f"Delete {title_of(document, path)}"
         if self.how == "other":
             return Step(words, replaced(document, path, self.other), (*path[:-1], self.other))
         if isinstance(path[-1], int):
             select: Path = path[:2]
         else:
-            others = [name for name in names(document, str(path[0])) if (path[0], name) not in paths]
+            others = [name for name in names(document, str(path[0])) if name != path[1]]
             select = (path[0], others[0]) if others else path[:1]
-        if self.how == "gaps":
-            return Step(words, deletions(paths), select)
-        gone = tuple(one for each in paths for one in with_references(document, each, at.study.needs))
+        gone = (path,) if self.how == "gaps" else with_references(document, path, at.study.needs)
         if any(select[: len(one)] == one for one in gone):
             select = ("study",)
         return Step(words, deletions(gone), select)
@@ -503,27 +480,11 @@ def _beside(study: Study, edits: tuple[Edit, ...], original: Path, copy: Path) -
     return edits if index_of(step) == to else (*edits, Move(step, to))
 
 
-def _moved(study: Study, things: Sequence[Path], entries: Sequence[Path], to: int, words: str) -> Step:
-    edits, after = moved(study, entries, to)
-    by_entry = dict(zip(sorted(entries, key=index_of), after, strict=True))
-    paths = tuple(by_entry[entry] if thing == entry else thing for thing, entry in zip(things, entries, strict=True))
-    entry = by_entry[entries[0]]
+def _moved(study: Study, thing: Path, entry: Path, to: int, words: str) -> Step:
+    edits, after = moved(study, entry, to)
     count = len(value_at(study.document, entry[:-1]))
-    said = f"{title_of(study.document, things[0])}, now {index_of(entry) + 1} of {count}"
-    return Step(words, edits, paths[0], several=paths, said=said)
-
-
-def _after_insert(path: Path, new: Path) -> Path:
-    """Return where a path is after an entry came into its list."""
-    last, at = path[-1], new[-1]
-    if path[:-1] == new[:-1] and isinstance(last, int) and isinstance(at, int) and last >= at:
-        return (*path[:-1], last + 1)
-    return path
-
-
-def titles_of(study: Study, paths: Sequence[Path]) -> str:
-    """Return the title of an element, or how many there are."""
-    return title_of(study.document, paths[0]) if len(paths) == 1 else f"{len(paths)} elements"
+    said = f"{title_of(study.document, thing)}, now {index_of(after) + 1} of {count}"
+    return Step(words, edits, after if thing == entry else thing, said=said)
 
 
 def index_of(path: Path) -> int:

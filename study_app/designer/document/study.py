@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path as File
 from typing import Any, Final
 
-from study_app.designer.document.toml_edits import Edit, Unset, apply, check_encodable, meaning
+from study_app.designer.document.toml_edits import Edit, Unset, apply, check_encodable
 from study_app.designer.document.toml_text import Refused, Splice, Splices, applied, common_ends
 from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import examined, located, read_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.document import Path, Places, frozen, has
+from study_app.protocol.source.document import Path, Places
 from study_app.protocol.source.files import TABLE, with_liquid_files
 from study_app.protocol.source.problems import Fault
 
@@ -94,16 +94,6 @@ class Study:
         without = {fault for fault in after.faults if fault.path[: len(table)] == table}
         return not without <= set(self.faults)
 
-    @property
-    def trial(self) -> Trial:
-        """The same study for trial edits."""
-        if (document := self._read[0]) is None:
-            raise Refused(_NOT_TOML)
-        found = Trial("", self.folder, source=document)
-        if "_examined" in self.__dict__:
-            found.__dict__["_examined"] = self._examined
-        return found
-
     def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
         if not self.is_toml:
             raise Refused(_NOT_TOML)
@@ -130,31 +120,6 @@ class Study:
         return Study(text, self.folder, self.document)
 
 
-@dataclass(frozen=True)
-class Trial(Study):
-    """A study for trial edits: applies them to the document without the text, which takes far longer to write.
-
-    Files that only edits name are not read.
-    """
-
-    source: Mapping[str, Any] = field(default_factory=dict)
-
-    @cached_property
-    def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
-        return dict(self.source), Places(""), ()
-
-    @cached_property
-    def document(self) -> Mapping[str, Any]:
-        return {key: value for key, value in self.source.items() if key != TABLE}
-
-    def edited(self, *edits: Edit) -> tuple[Study, tuple[Splices, ...]]:
-        """Return the study after some edits, one after the other, with no splices."""
-        document = dict(self.source)
-        for edit in edits:
-            document = meaning(document, edit)
-        return (replace(self, source=frozen(document)) if edits else self), ()
-
-
 def read(source: bytes, folder: File = File()) -> Study:
     """Return the study from a file's bytes."""
     try:
@@ -162,29 +127,3 @@ def read(source: bytes, folder: File = File()) -> Study:
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
         raise Refused(f"line {line} is not UTF-8 text: save the file as UTF-8") from error
-
-
-def with_value(node: Any, path: Path, value: Any) -> Any:
-    """Return a document with a value at a path; unchanged if its parent is missing."""
-    if not path:
-        return value
-    step, rest = path[0], path[1:]
-    if isinstance(node, Mapping):
-        return {**node, step: with_value(node.get(step, {}), rest, value)}
-    if isinstance(step, int) and isinstance(node, tuple) and step < len(node):
-        return (*node[:step], with_value(node[step], rest, value), *node[step + 1 :])
-    return node
-
-
-def without_value(node: Any, path: Path) -> Any:
-    """Return a document without the value at a path; unchanged if there is none."""
-    step, rest = path[0], path[1:]
-    if not has(node, step):
-        return node
-    if isinstance(node, Mapping):
-        if not rest:
-            return {key: value for key, value in node.items() if key != step}
-        return {**node, step: without_value(node[step], rest)}
-    assert isinstance(step, int)  # noqa: S101 - of an array
-    inner = () if not rest else (without_value(node[step], rest),)
-    return (*node[:step], *inner, *node[step + 1 :])

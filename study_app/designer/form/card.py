@@ -388,8 +388,7 @@ class Tile(Themed, QWidget):
 class FormHead(QWidget):
     """Signals: ``asked`` (a request), ``feel_asked`` (path), ``id_typed`` (path, text so far).
 
-    ``unlock_asked`` is emitted where a locked id is to be changed. What ``up``, ``down``, ``copy`` and ``delete`` do is
-    done to every selected element.
+    ``unlock_asked`` is emitted where a locked id is to be changed.
     """
 
     asked = Signal(object)

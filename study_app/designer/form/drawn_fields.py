@@ -6,21 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal, TypeAlias
 
 from pydantic import ValidationError
-from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import (
-    QBrush,
-    QColor,
-    QFocusEvent,
-    QFontMetrics,
-    QKeyEvent,
-    QMouseEvent,
-    QPainter,
-    QPainterPath,
-    QPaintEvent,
-    QPen,
-    QResizeEvent,
-)
-from PySide6.QtWidgets import QAbstractButton, QSlider, QWidget
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPainterPath, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import QAbstractButton, QWidget
 
 from study_app.designer.document.fields import Row, label_of
 from study_app.designer.document.steps import GoTo
@@ -151,131 +139,27 @@ def _limits(study: Study, row: Row, words: LevelWords) -> tuple[str, dict[Limit,
     return standard, found
 
 
-HEIGHT, TRACK_Y, TRACK_PX = 104, 46.0, 12.0
-HANDLE_PX, MARGIN = 24, 14
-NAMES = ("Lowest level", "Highest level")
-KEYS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Down: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_Up: 1,
-        Qt.Key.Key_PageDown: -10, Qt.Key.Key_PageUp: 10}  # fmt: skip
-
-
-class End(Themed, QSlider):
-    """An end of the levels, a handle on the axis; ``moved`` carries a level, and whether the handle is held."""
-
-    moved = Signal(float, bool)
-
-    def __init__(self, name: str, axis: QWidget) -> None:
-        super().__init__(Qt.Orientation.Horizontal, axis)
-        self.axis = axis
-        self.setAccessibleName(name)
-        self.setFixedSize(HANDLE_PX, HANDLE_PX)
-        self.setCursor(Qt.CursorShape.SizeHorCursor)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.span, self.level, self.held = Range(0.0, 1.0), 0.0, False
-
-    def show_level(self, span: Range, level: float) -> None:
-        """Stand at a level, unless the handle is held."""
-        if self.held:
-            return
-        self.span, self.level = span, level
-        with QSignalBlocker(self):
-            self.setRange(0, span.steps)
-            self.setValue(round(span.share(level) * span.steps))
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        step = KEYS.get(Qt.Key(event.key()))
-        if step is None:
-            event.ignore()
-            return
-        self.moved.emit(self.span.value(self.span.share(self.level) + step / self.span.steps), False)
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        self.held = event.button() == Qt.MouseButton.LeftButton
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self.held:
-            self.moved.emit(self._at(event), True)
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        if self.held:
-            self.held = False
-            self.moved.emit(self.level, False)
-
-    def _at(self, event: QMouseEvent) -> float:
-        x = self.axis.mapFromGlobal(event.globalPosition()).x()
-        return self.span.value((x - MARGIN) / max(1.0, self.axis.width() - 2 * MARGIN))
-
-    def focusInEvent(self, event: QFocusEvent) -> None:
-        super().focusInEvent(event)
-        self.update()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter, middle = smooth_painter(self), QPointF(HANDLE_PX / 2, HANDLE_PX / 2)
-        painter.setPen(QPen(QColor(self.theme.accent if self.isEnabled() else self.theme.ctl), 2))
-        painter.setBrush(QColor(self.theme.surface))
-        painter.drawEllipse(middle, 7, 7)
-        if self.hasFocus():
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawEllipse(middle, 10.5, 10.5)
+HEIGHT, TRACK_Y, TRACK_PX, MARGIN = 104, 46.0, 12.0, 14
 
 
 class AxisView(Extra, Themed, QWidget):
-    """The axis; ``asked`` carries both ends, and whether more of the same move may follow; ``came`` the keyboard."""
-
-    asked = Signal(float, float, bool)
-    came = Signal()
+    """The axis: the levels with their ends, and the limits."""
 
     def __init__(self) -> None:
         super().__init__()
         self.axis: LevelAxis | None = None
         self.setFixedHeight(HEIGHT)
-        self.ends = tuple(End(name, self) for name in NAMES)
-        for at, end in enumerate(self.ends):
-            end.moved.connect(lambda level, held, at=at: self._move(at, level, held=held))
+        self.setAccessibleName("Axis of the levels")
 
     def show_facts(self, facts: Any) -> None:
-        axis: LevelAxis = facts
-        self.axis = axis
-        span = self._span
-        for end, level in zip(self.ends, (axis.low, axis.high), strict=True):
-            end.show_level(span, level)
-            end.setAccessibleDescription(f"{level * axis.factor:.4g} {axis.unit}. {axis.sentence}")
-        self.setAccessibleName("Axis of the levels")
-        self.setAccessibleDescription(axis.sentence)
-        self._place()
+        self.axis = facts
+        self.setAccessibleDescription(facts.sentence)
         self.update()
-
-    @property
-    def _span(self) -> Range:
-        axis = self.axis
-        return Range(0.0, 1.0) if axis is None else Range(axis.least, axis.most, logarithmic=axis.logarithmic)
-
-    def _move(self, at: int, level: float, *, held: bool) -> None:
-        axis = self.axis
-        if axis is None:
-            return
-        low, high = (end.level for end in self.ends)
-        if (at == 0 and level >= high) or (at == 1 and level <= low):
-            return
-        changed = level != self.ends[at].level
-        self.ends[at].level = level
-        self._place()
-        self.update()
-        shown = (axis.low, axis.high)
-        ends = (level, high) if at == 0 else (low, level)
-        if not held and (changed or ends != shown):
-            self.asked.emit(*ends, True)
-            self.came.emit()
 
     def _x(self, level: float) -> float:
-        return MARGIN + self._span.share(level) * (self.width() - 2 * MARGIN)
-
-    def _place(self) -> None:
-        for end in self.ends:
-            end.move(round(self._x(end.level) - HANDLE_PX / 2), round(TRACK_Y - HANDLE_PX / 2))
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._place()
+        assert self.axis is not None  # noqa: S101 - it is painted
+        span = Range(self.axis.least, self.axis.most, logarithmic=self.axis.logarithmic)
+        return MARGIN + span.share(level) * (self.width() - 2 * MARGIN)
 
     def sizeHint(self) -> QSize:
         return QSize(260, HEIGHT)
@@ -288,7 +172,7 @@ class AxisView(Extra, Themed, QWidget):
         track = QRectF(MARGIN, TRACK_Y - TRACK_PX / 2, self.width() - 2 * MARGIN, TRACK_PX)
         painter.setBrush(QColor(t.sunk))
         painter.drawRect(track)
-        low, high = (self._x(end.level) for end in self.ends)
+        low, high = self._x(axis.low), self._x(axis.high)
         painter.setBrush(QColor(t.selected))
         painter.drawRect(QRectF(low, track.top(), high - low, TRACK_PX))
         for name, limit in axis.limits.items():
@@ -296,10 +180,13 @@ class AxisView(Extra, Themed, QWidget):
             painter.setBrush(QBrush(QColor(limit_colour(t, name)), Qt.BrushStyle.BDiagPattern))
             painter.drawRect(QRectF(x, track.top(), track.right() - x, TRACK_PX))
         painter.setPen(QPen(QColor(t.accent), 1.4))
-        if (self.ends[0].level, self.ends[1].level) == (axis.low, axis.high):
-            for level in axis.levels:
-                x = self._x(level)
-                painter.drawLine(QPointF(x, track.top()), QPointF(x, track.bottom()))
+        for level in axis.levels:
+            x = self._x(level)
+            painter.drawLine(QPointF(x, track.top()), QPointF(x, track.bottom()))
+        painter.setPen(QPen(QColor(t.accent), 2))
+        painter.setBrush(QColor(t.surface))
+        for x in (low, high):
+            painter.drawEllipse(QPointF(x, TRACK_Y), 7, 7)
         painter.setFont(font("small", tabular=True))
         self._limits(painter, axis, track)
         painter.setPen(QColor(t.text3))
@@ -325,19 +212,7 @@ class AxisView(Extra, Themed, QWidget):
             painter.drawText(room, Qt.AlignmentFlag.AlignRight, limit.words)
 
 
-def _axis_below(field: Field) -> AxisView:
-    made = AxisView()
-    made.asked.connect(lambda low, high, typing: field.set_value([_plain(low), _plain(high)], typing=typing))
-    made.came.connect(field.came)
-    return made
-
-
-def _plain(value: float) -> float | int:
-    """Return a level as it is written: whole where it is."""
-    return int(value) if value.is_integer() else float(f"{value:.6g}")
-
-
-LEVELS: Final = SpecialEditor((("Stimulus", "levels"),), adds=_axis_below, wide=True, facts=level_axis)
+LEVELS: Final = SpecialEditor((("Stimulus", "levels"),), adds=lambda _field: AxisView(), wide=True, facts=level_axis)
 
 
 PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]
@@ -560,6 +435,3 @@ def _strip_below(field: Field) -> StripView:
 
 
 TRIAL: Final = SpecialEditor((("Block", "design"),), adds=_strip_below, wide=True, facts=trial_strip)
-
-
-Point: TypeAlias = tuple[float, float, float]

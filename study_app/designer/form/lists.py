@@ -1,11 +1,11 @@
-"""Lists in the form: entries that are selected, moved, copied and removed together, each time as one step."""
+"""Lists in the form, whose entries are moved, copied and removed, each time as one step."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
-from PySide6.QtCore import QEvent, QItemSelectionModel, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QDropEvent, QFocusEvent, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QBoxLayout, QFrame, QListWidget, QListWidgetItem, QWidget
 
@@ -21,7 +21,6 @@ from study_app.designer.document.steps import (
     RemoveKey,
     Request,
     SetValue,
-    Several,
 )
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import Field, SpecialEditor, TypedLine, add_button, kept, written
@@ -29,7 +28,7 @@ from study_app.designer.form.rows import FormRow, new_words
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.study_facts import valid_part
 from study_app.designer.place.segments import FIELD_PX, cut_text, dense
-from study_app.gui.kit.commands import tip, with_key
+from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.themed import name_bars
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
@@ -86,7 +85,6 @@ class Rows(QListWidget):
     def __init__(self) -> None:
         super().__init__()
         self.keys: dict[str, Callable[[], object]] = {}
-        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setResizeMode(QListWidget.ResizeMode.Adjust)
@@ -154,16 +152,17 @@ class EntryList(Field):
         self.box.setSpacing(6)
         self.ordered = row.kind != "tables"
         self.rows: list[EntryRow] = []
-        self._after: tuple[int, ...] | None = None
+        self._after: int | None = None
         self._filled: object = None
         self.list = Rows()
         self.list.setAccessibleName(row.label)
-        self.list.dropped.connect(self.move_entries)
+        self.list.dropped.connect(lambda to: self.move_entry(self.chosen, to))
         self.list.itemDoubleClicked.connect(lambda item: self.open(self.list.row(item)))
         self.list.keys = {"Return": self._open_current, "Enter": self._open_current}
         if self.ordered:
             self.list.setDragDropMode(QAbstractItemView.DragDropMode.InternalMove)
-            self.list.keys |= {"Alt+Up": partial(self._move_by, -1), "Alt+Down": partial(self._move_by, 1),
+            self.list.keys |= {"Alt+Up": lambda: self.move_entry(self.chosen, self.chosen - 1),
+                               "Alt+Down": lambda: self.move_entry(self.chosen, self.chosen + 2),
                                "Del": lambda: self.remove(self.chosen), "Ctrl+D": self._duplicate}  # fmt: skip
             self.list.setAccessibleDescription("Alt+Up and Alt+Down move entries, Delete removes them")
         else:
@@ -189,7 +188,8 @@ class EntryList(Field):
         self.list.clear()
         self.fill()
         self.list.setFixedHeight(len(self.rows) * (FIELD_PX + 6) + 4)
-        self.choose(at for at in chosen if at < len(self.rows))
+        if 0 <= chosen < len(self.rows):
+            self.list.setCurrentRow(chosen)
         name_bars(self.list)
         if inside:
             self.take_keyboard()
@@ -209,16 +209,12 @@ class EntryList(Field):
         self.list.keys = {keys: do for keys, do in self.list.keys.items() if keys in {"Return", "Enter"}}
 
     @property
-    def chosen(self) -> tuple[int, ...]:
-        return tuple(sorted(index.row() for index in self.list.selectedIndexes()))
-
-    def choose(self, indexes: Iterable[int]) -> None:
-        self.list.clearSelection()
-        for at in sorted(indexes, reverse=True):
-            self.list.setCurrentRow(at, QItemSelectionModel.SelectionFlag.Select)
+    def chosen(self) -> int:
+        """The index of the selected entry, -1 without one."""
+        return next((index.row() for index in self.list.selectedIndexes()), -1)
 
     def take_keyboard(self) -> None:
-        (self.list if self.chosen else self).setFocus(Qt.FocusReason.OtherFocusReason)
+        (self if self.chosen < 0 else self.list).setFocus(Qt.FocusReason.OtherFocusReason)
 
     def place(self, at: int) -> tuple[str | int, ...]:
         return self.row.entries[at].path if self.row.entries else (*self.row.path, at)
@@ -230,37 +226,25 @@ class EntryList(Field):
     def _open_current(self) -> None:
         self.open(self.list.currentRow())
 
-    def _change(self, asked: Request, after: Iterable[int]) -> None:
-        """Ask for a step, after which the entries at ``after`` are selected."""
-        self._after = tuple(after)
+    def _change(self, asked: Request, after: int) -> None:
+        """Ask for a step, after which the entry at ``after`` is selected."""
+        self._after = after
         self.asked.emit(asked)
         self._after = None
 
-    def _move_by(self, by: int) -> None:
-        if self.chosen:
-            self.move_entries(min(self.chosen) + by if by < 0 else max(self.chosen) + 1 + by)
+    def move_entry(self, at: int, to: int) -> None:
+        """Ask to move an entry before the one at ``to``."""
+        after = to - (at < to)
+        if at >= 0 and 0 <= to <= len(self.rows) and after != at:
+            self._change(MoveTo(self.place(at), to, stays=True), after)
 
-    def move_entries(self, to: int, indexes: tuple[int, ...] = ()) -> None:
-        """Ask to move entries, by default the selected ones, before the one at ``to``."""
-        indexes = indexes or self.chosen
-        first = to - sum(index < to for index in indexes)
-        after = tuple(range(first, first + len(indexes)))
-        if 0 <= to <= len(self.rows) and after != indexes:
-            self._change(MoveTo(tuple(map(self.place, indexes)), to, stays=True), after)
-
-    def remove(self, indexes: tuple[int, ...]) -> None:
-        if not indexes:
-            return
-        gone: tuple[Request, ...] = tuple(RemoveKey(self.place(index)) for index in reversed(indexes))
-        near = min(indexes[0], len(self.rows) - len(indexes) - 1)
-        words = f"Remove {len(gone)} entries of {self.row.label}"
-        self._change(gone[0] if len(gone) == 1 else Several(words, gone), () if near < 0 else (near,))
+    def remove(self, at: int) -> None:
+        if at >= 0:
+            self._change(RemoveKey(self.place(at)), min(at, len(self.rows) - 2))
 
     def _duplicate(self) -> None:
-        if self.row.kind != "references":  # a name that is listed twice is a fault
-            after = (index + rank for rank, index in enumerate(self.chosen, start=1))
-            first, *others = map(self.place, self.chosen)
-            self._change(DuplicateElement(first, tuple(others), stays=True), after)
+        if self.chosen >= 0 and self.row.kind != "references":  # a name that is listed twice is a fault
+            self._change(DuplicateElement(self.place(self.chosen), stays=True), self.chosen + 1)
 
 
 class NamesList(Choice):
@@ -299,8 +283,7 @@ class EntriesField(EntryList):
         else:
             self.add = add_button(name, "Add")
             self.add.clicked.connect(lambda: self.asked.emit(AddElement(self.row.path)))
-        self.foot = hbox(self.add, STRETCH)
-        add_layout(self.box, self.foot)
+        add_layout(self.box, hbox(self.add, STRETCH))
         self.setFocusProxy(self.add)
         self.show_value()
 
@@ -321,13 +304,13 @@ class EntriesField(EntryList):
             self.add_facts(shown, at)
             if self.ordered:
                 for by, icon, word in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
-                    move = partial(self.move_entries, at - 1 if by < 0 else at + 2, (at,))
+                    move = partial(self.move_entry, at, at - 1 if by < 0 else at + 2)
                     shown.add_button(icon, f"Move {entry.title} {word}", move, word).setEnabled(0 <= at + by < count)
             action = "open entry" if self.ordered else ""
             opens = shown.add_button("arrow_right", f"Open {entry.title}", partial(self.open, at), action)
             opens.setEnabled(bool(entry.target))
             if self.ordered:
-                shown.add_button("cross", f"Remove {entry.title} from {label}", partial(self.remove, (at,)), "delete")
+                shown.add_button("cross", f"Remove {entry.title} from {label}", partial(self.remove, at), "delete")
 
     def add_facts(self, shown: EntryRow, at: int) -> None:
         entry = self.row.entries[at]
@@ -341,21 +324,8 @@ class ConditionsField(EntriesField):
 
     caption = CAPTION
 
-    def __init__(self, row: FormRow) -> None:
-        super().__init__(row)
-        self.series = add_button(f"Series of {row.label.lower()}", "Series …")
-        self.series.setToolTip(tip("series"))
-        self.series.setEnabled(bool(row.entries))
-        self.series.clicked.connect(self._ask_for_series)
-        self.foot.insertWidget(1, self.series)
-
     def filled_with(self) -> object:
         return self.row.entries, self.row.facts
-
-    def _ask_for_series(self) -> None:
-        path = self.row.entries[self.chosen[0] if len(self.chosen) == 1 else -1].target
-        if path:
-            self.asked.emit(Do("series", (path,)))
 
     def add_facts(self, shown: EntryRow, at: int) -> None:
         line = self.row.facts[at]
@@ -391,7 +361,7 @@ class LinesField(EntryList):
             line.typed.connect(partial(self._take, at))
             line.came.connect(self.came)
             shown = self.add_row(f"{row.label} {at + 1} of {count}", (line, 1))
-            shown.add_button("cross", f"Remove {line.accessibleName()}", partial(self.remove, (at,)), "delete")
+            shown.add_button("cross", f"Remove {line.accessibleName()}", partial(self.remove, at), "delete")
             self.lines.append(line)
         self.setFocusProxy(self.lines[0] if self.lines else self.add)
 

@@ -1,6 +1,7 @@
 """What is known of a study, even of a faulty one: its texts by language, its valid part, and facts of that."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from typing import Any, Final
@@ -8,7 +9,8 @@ from typing import Any, Final
 from study_app.designer.document.additions import is_copied, texts_of
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import alternatives, initial, is_localised, label_of, languages_of, named_at
-from study_app.designer.document.study import Study, with_value, without_value
+from study_app.designer.document.study import Study
+from study_app.designer.document.toml_edits import Set, Unset, meaning
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.number_text import counted
@@ -17,7 +19,7 @@ from study_app.protocol.load import examined
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
-from study_app.protocol.source.document import Path, has, value_at
+from study_app.protocol.source.document import Path, frozen, has, value_at
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.wording.languages import language_name
@@ -183,7 +185,9 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
                 continue  # another fault of the same element left it out
             whole = whole and known
             forces = forces and (fault.kind == "unknown key" or fault.path[:1] not in _OF_FORCES)
-            document = without_value(document, place) if value is None else with_value(document, place, value)
+            edit = Unset(place) if value is None else Set(place, value)
+            with suppress(Refused):  # what it is in was left out
+                document = frozen(meaning(document, edit))
         protocol, faults = examined(document)
         if protocol is not None:
             return ValidPart(protocol, whole, forces)

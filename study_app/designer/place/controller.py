@@ -9,6 +9,7 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer
 
+from study_app.designer.document.additions import number_rows
 from study_app.designer.document.document import (
     NO_ANSWERS,
     Answers,
@@ -33,7 +34,7 @@ from study_app.designer.participant.preview import ParticipantPreview
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.file import file_text
 from study_app.designer.place.header import DesignerView, HeaderState, StudyChoice
-from study_app.designer.place.prompts import DeleteCard, SeriesCard, delete_prompt, series_prompt, series_titles
+from study_app.designer.place.prompts import DeleteCard, SeriesCard, naming
 from study_app.designer.place.saving import Saving
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
@@ -187,30 +188,28 @@ class DesignerController(QObject):
 
     # steps that ask first
 
-    def ask_to_delete(self, path: Place, also: tuple[Place, ...] = ()) -> None:
-        """Delete elements, or show what refers to them and ask what to do with that."""
+    def ask_to_delete(self, path: Place) -> None:
+        """Delete an element, or show what refers to it and ask what to do with that."""
         opened = self.editing.writable
         if opened is None or len(path) < 2:
             return
-        prompt = delete_prompt(opened.study, (path, *also))
-        if prompt.references:
-            card = DeleteCard(prompt)
+        if places := naming(opened.study, path):
+            card = DeleteCard(opened.study, path, places)
             card.answered.connect(self.editing.ask)
             self.place.show_prompt(card, card.first)
         else:
-            self.editing.ask(DeleteElement(path, also=also))
+            self.editing.ask(DeleteElement(path))
 
     def ask_for_series(self, path: Place) -> None:
         if (opened := self.editing.opened) is None:
             return
-        prompt = series_prompt(opened.study, path)
-        if prompt is None or opened.read_only:
+        numbers = number_rows(opened.study.document, path)
+        if not numbers or opened.read_only:
             why = opened.read_only or "This element has no numeric field."
             self.place.message.emit("There can be no series of this element", why)
             return
-        self.editing.select(prompt.path)
-        study = opened.study
-        card = SeriesCard(prompt, lambda asked: series_titles(study, asked))
+        self.editing.select(path)
+        card = SeriesCard(opened.study, path, numbers)
         card.answered.connect(self.editing.ask)
         self.place.show_prompt(card, card.first)
 
@@ -245,9 +244,9 @@ class DesignerController(QObject):
         self.place.form.head.refuse(why, free)
 
     def _show_step(self, step: Step) -> None:
-        if step.several or step.fresh or step.said:
+        if step.fresh or step.said:
             self.show_outline()
-        self.place.show_step(step.several, step.said, fresh=step.fresh)
+        self.place.show_step(step)
 
     # what is shown
 

@@ -20,6 +20,7 @@ from study_app.designer.document.steps import (
     RetypeFile,
     SetText,
     SetValue,
+    Step,
     Task,
     index_of,
     with_path,
@@ -564,37 +565,31 @@ class DesignerPlace(Place):
         for action in own.values():  # elsewhere these keys are those of a list or a text
             action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
 
-    # the elements of the form and of the outline that are selected
-
-    def _several(self) -> tuple[ElementPath, tuple[ElementPath, ...]]:
-        path = () if self.view.form is None else self.view.form.path
-        return path, tuple(one for one in self.outline.selected if one != path)
-
     def duplicate(self) -> None:
-        path, also = self._several()
         if self.form.head.copy.isEnabled():
             self.flush()
-            self.asked.emit(DuplicateElement(path, also))
+            self.asked.emit(DuplicateElement(self.form_path))
 
     def make_series(self) -> None:
         if self.view.form is not None:
             self.finish("series", self.view.form.path)
 
     def delete(self) -> None:
-        path, also = self._several()
         if self.form.head.delete.isEnabled():
-            self.flush()
-            self.ask("delete", path, also)
+            self.finish("delete", self.form_path)
 
-    def _drop(self, dragged: tuple[ElementPath, ...], to: ElementPath) -> None:
-        steps = isinstance(dragged[0][-1], int)
-        self.asked.emit(MoveTo(dragged, index_of(to)) if steps else AddToSession(dragged[0], (to,)))
+    def _drop(self, dragged: ElementPath, to: ElementPath) -> None:
+        step = isinstance(dragged[-1], int)
+        self.asked.emit(MoveTo(dragged, index_of(to)) if step else AddToSession(dragged, (to,)))
 
     def move_by(self, by: int) -> None:
-        path, also = self._several()
-        if path and not self.view.header.read_only:
+        if self.form_path and not self.view.header.read_only:
             self.flush()
-            self.asked.emit(MoveElement(path, by, also))
+            self.asked.emit(MoveElement(self.form_path, by))
+
+    @property
+    def form_path(self) -> ElementPath:
+        return () if self.view.form is None else self.view.form.path
 
     # what is shown
 
@@ -712,16 +707,14 @@ class DesignerPlace(Place):
             case _:
                 self.asked.emit(asked)
 
-    def show_step(self, several: tuple[ElementPath, ...], said: str, *, fresh: bool) -> None:
-        """Select the elements of a step together, say what it did, and lead to the first text of a new one."""
-        if len(several) > 1:
-            self.outline.select_several(several)
-        if said:
-            say(self, said)
+    def show_step(self, step: Step) -> None:
+        """Say what a step did, and lead to the first text of a new element."""
+        if step.said:
+            say(self, step.said)
         beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
-        if fresh and not (several and beside):  # after a copy in an open outline, the keyboard stays there
+        if step.fresh and not (step.fresh == "copy" and beside):  # after a copy in an open outline, the keyboard stays
             self.parts.show_side("form")
-            self.form.focus_first_text(filled=bool(several))  # a copy has its texts
+            self.form.focus_first_text(filled=step.fresh == "copy")  # a copy has its texts
 
     def open_next_problem(self) -> None:
         if self.view.form is not None:

@@ -72,7 +72,6 @@ COMMANDS: Final = (
     Command("delete", "Delete", ("Delete",), LISTS, run=lambda place: place.delete()),
     Command("up", "Move up", ("Alt+Up",), run=lambda place: place.move_by(-1)),
     Command("down", "Move down", ("Alt+Down",), run=lambda place: place.move_by(1)),
-    Command("several", "Select several", ("Shift+Up", "Shift+Down"), LISTS),
     Command("new", "New study …", ("Ctrl+N",), run=lambda place: place.begin_new()),
     Command("open", "Open file …", ("Ctrl+O",), run=lambda place: place.header.open_file()),
     Command("save", "Save", ("Ctrl+S",), run=lambda place: place.finish("save")),

@@ -90,7 +90,6 @@ class Tasks:
         user.select("Water", "Conditions")
         user.shortcut("ctrl+shift+d", "Series of Water")
         user.type("60 120 240")
-        user.key("Return")
         user.press("Make the copies")
         user.select("Liquids", "Session, in order")
         user.choose("Order", "Williams")

@@ -14,7 +14,7 @@ import pytest
 from study_app.designer.document.document import Document, check_version, next_version, standing
 from study_app.designer.document.fields import rows
 from study_app.designer.document.study import read
-from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move, Rename, Set, Unset
+from study_app.designer.document.toml_edits import Set
 from study_app.designer.document.toml_text import Refused
 from study_app.errors import ProtocolError, StoreError
 from study_app.protocol.load import load, parse
@@ -76,31 +76,6 @@ def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> 
 def test_typed_refuses_half_a_character() -> None:
     with pytest.raises(Refused, match="half a character"):
         DEMO.typed(DEMO.text + "# \ud800")
-
-
-BLOCK = ("blocks", "delays", "conditions")
-EDITS: tuple[Edit, ...] = (
-    Set(("conditions", "water", "delay_ms"), 5000),
-    Duplicate(("conditions", "water"), "sea"),
-    Insert((*BLOCK, 1), "sea"),
-    Move((*BLOCK, 1), 3),
-    Rename(("conditions", "delay_50"), "late", ((*BLOCK, 1),)),
-    Unset((*BLOCK, 4)),
-    Set(("liquids", "brine"), {"density_kg_m3": 1200, "effects": ["drag"], "wake": {"length": 40}}),
-    Unset(("study", "title")),
-)
-
-
-@pytest.mark.slow
-def test_a_trial_has_the_document_and_the_faults_of_the_text() -> None:
-    study = read((PROTOCOLS / "rek2024.toml").read_bytes(), PROTOCOLS)
-    tried = study.trial
-    for edit in EDITS:
-        written, (tried, _) = study.edited(edit)[0], tried.edited(edit)
-        assert tried.document == written.document
-        assert tried.faults == written.faults
-        study = written
-    assert study.faults
 
 
 def test_files_with_a_draft_are_listed(tmp_path: Path) -> None:

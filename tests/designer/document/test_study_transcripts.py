@@ -106,9 +106,6 @@ def of_element(study: Study, path: Path) -> Iterator[Request]:
     if others and len(path) == 2:
         other = str(others[0][1])
         yield DeleteElement(path, "other", other)
-        yield DeleteElement(path, "gaps", also=(others[0],))
-        yield DuplicateElement(path, also=(others[0],))
-        yield MoveElement(path, 1, also=(others[0],))
         yield RenameElement(path, other)
 
 
@@ -152,7 +149,7 @@ def kind_of(study: Study, request: Request, place: Path, *, coarse: bool) -> Any
     row = row_at(study.document, path) if coarse and path else None
     where = ((len(place) > 2, row.kind, row.value is None) if row else place[-1:]) if coarse else place
     names = ("kind", "how", "by", "section", "language", "to") if not coarse else ("how", "by", "language")
-    return type(request), where, [getattr(request, name, None) for name in names], bool(getattr(request, "also", ()))
+    return type(request), where, [getattr(request, name, None) for name in names]
 
 
 def said(study: Study, selected: Path, request: Request) -> Iterator[str]:
@@ -164,8 +161,7 @@ def said(study: Study, selected: Path, request: Request) -> Iterator[str]:
     except Refused as refusal:
         yield f"refused: {refusal}"
         return
-    several, new = ", ".join(map(one_line, step.several)), ", fresh" if step.fresh else ""
-    yield f"{step.words}; select {one_line(step.select)}{new}; {several}; {step.said}"
+    yield f"{step.words}; select {one_line(step.select)}{step.fresh and f', {step.fresh}'}; {step.said}"
     yield from changed(study.text.split("\n"), after.text.split("\n"), numbered=True)
     known = {(fault.path, fault.message) for fault in study.faults}
     yield from (f"! {one_line(one.path)} {one.message}" for one in after.faults if (one.path, one.message) not in known)

@@ -9,7 +9,6 @@ import pytest
 from study_app.designer.document.additions import additions_for, repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.elements import brief, found_fields, outline, position_of, used_by
-from study_app.designer.document.steps import MakeSeries
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.form.form import form
@@ -30,7 +29,6 @@ from study_app.designer.measures.simulation import (
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import addable, outline_rows
 from study_app.designer.place.file import file_text
-from study_app.designer.place.prompts import series_prompt, series_titles
 from study_app.designer.problems import problem_rows
 from study_app.protocol.source.document import Path
 from tests.designer.document.test_study_transcripts import elements, generic, studies
@@ -90,10 +88,6 @@ class Shown:
         view = measures_view(study, facts(study), path, Controls(12), Simulated(), {})
         yield from self.note("measures", measures(view))
         yield from self.note("to add", tuple(addable(study, path)))
-        if (prompt := series_prompt(study, path)) is not None:
-            yield from value_lines(prompt)
-            for field, _ in prompt.fields:
-                yield from value_lines(series_titles(study, MakeSeries(path, field, (2, 5, 9.5))))
 
 
 def transcript(before: Iterable[str], names: Iterable[str]) -> Iterator[str]:
