@@ -16,9 +16,8 @@ import sys
 import click
 
 from study_app import __version__
-from study_app.cli import data, model, power, study
+from study_app.cli import data, evidence, model, power, study
 from study_app.cli.devices import devices, outlets, plugins
-from study_app.cli.evidence import accuracy, stability, timing, validation
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands, example_of
 from study_app.discovery import explained
 from study_app.errors import StudyError, naming_the_extra
@@ -47,7 +46,7 @@ def commands(context: click.Context) -> None:
         context.exit(app.home())
 
 
-for module in (study, data, power, model, accuracy, stability, timing, validation):
+for module in (study, data, power, model, evidence):
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)

@@ -155,7 +155,6 @@ SETTINGS: Actions = {
         typed("editors.camera.control", " tcp://127.0.0.1:5000 "),
         typed("editors.triggers.control", " "),
     ),
-    "numbers": lambda place: place.screens.identify.click(),
     "stacked, light": lambda place: (place.resize(928, 640), apply_theme(place, LIGHT)),
 }
 
@@ -181,9 +180,6 @@ DISPLAY_TEST: Actions = {
     "interval refused": typed("interval.control", "9"),
     "interval taken": typed("interval.control", "200"),
     "toggled": lambda made: (setattr(made.clock, "now", 10**9), made.frame()),
-    "offset refused": in_turn(typed("offset.editors.mean.control", "900"), clicked("offset.keep")),
-    "offset": lambda made: made.show_offset(DisplayOffset(mean_ms=23.5, spread_ms=2.0, screen="Screen 1"), "Screen 1"),
-    "forgotten": lambda made: made.offset.forget.click(),
     "small": lambda made: made.resize(1024, 640),
 }
 

@@ -184,7 +184,6 @@ def help_pages(qtbot: Any) -> HelpPlace:
 
 def display_test(qtbot: Any, **clock: Any) -> DisplayTest:
     made: DisplayTest = shown(qtbot, DisplayTest("Screen 1", 60.0, least_s=0.05, **clock), (1366, 768))
-    made.show_offset(None, "Screen 1")
     return made
 
 

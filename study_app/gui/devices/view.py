@@ -50,11 +50,7 @@ class DeviceRow(QWidget):
     def show_device(self, shown: DeviceShown) -> None:
         self.chip.show_state(shown.tone, shown.sign, shown.word)
         ways = shown.ways if len(shown.ways) > 1 else ()
-        for line, words in (
-            (self.can, shown.can),
-            (self.why, shown.why),
-            (self.by, "   ·   ".join(f"{way.by}: {way.state}" for way in ways)),
-        ):
+        for line, words in ((self.can, shown.can), (self.why, shown.why), (self.by, "   ·   ".join(ways))):
             line.setText(words)
             line.setVisible(bool(words))
         set_ink(self.why, "warn" if shown.tone == "warn" else "text2")

@@ -23,19 +23,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
-    """One library that a device is reached by: ``state`` is what it found, ``why`` why it cannot be used now."""
-
-    by: str
-    state: str
-    why: str
-
-
-@dataclass(frozen=True, slots=True)
 class DeviceShown:
     """A device: ``name`` is for ``--device``, ``can`` says what it can and cannot do.
 
-    ``tone``, ``sign`` and ``word`` are its state; ``why`` says why it cannot be used now, "" where it can.
+    ``tone``, ``sign`` and ``word`` are its state; ``why`` says why it cannot be used now, "" where it can;
+    ``ways`` are the libraries that it is reached by, with what each found.
     ``choosable`` is whether its name can be taken as it is, ``diagnosable`` whether it can be examined as it is.
     """
 
@@ -47,7 +39,7 @@ class DeviceShown:
     word: str
     can: str
     why: str
-    ways: tuple[Way, ...] = ()
+    ways: tuple[str, ...] = ()
     simulated: bool = False
     choosable: bool = False
     diagnosable: bool = False
@@ -127,7 +119,7 @@ def _shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
         word=word,
         can=_sentence(ways[0].can),
         why="" if tone == "ok" and not best.why else _sentence(best.why),
-        ways=tuple(Way(way.by, way.state, way.why) for way in ways),
+        ways=tuple(f"{way.by}: {way.state}" for way in ways),
         simulated=device is not None and device.simulated,
         choosable=choosable,
         diagnosable=choosable and device is not None and device.doctor is not None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from threading import Thread
+from typing import Any, Final
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
@@ -24,24 +25,28 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.display.screens import place
-from study_app.gui.participant.intervals.answer_page import SettingControls
-from study_app.gui.participant.page_widgets import page_widget
+from study_app.gui.participant.forms.questions_page import FormWidget
+from study_app.gui.participant.intervals.answer_page import ChoiceWidget, FeedbackWidget, NumberWidget, SettingControls
 from study_app.gui.participant.pages.page_widget import PageContext, PageWidget
-from study_app.gui.participant.pages.text_page import ReadingPage
+from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
+from study_app.gui.participant.pages.text_page import NoticeWidget, PauseWidget, ReadingPage, TextWidget
 from study_app.gui.participant.tank_widget import TankWidget, paint_ahead
 from study_app.gui.theme.theme import PARTICIPANT, font, load_fonts, stylesheet
 from study_app.gui.widgets.accessible import give_role
 from study_app.gui.widgets.main_view import EscapeKey
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import (
+    ChoicePage,
     DesignPage,
     EndPage,
     FeedbackPage,
+    NumberPage,
     Page,
     PausePage,
     QuestionnairePage,
     TaskPage,
     TextPage,
+    TroublePage,
 )
 from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Continue, ForceStopped, PauseRequested
@@ -170,6 +175,14 @@ def _apart(one: QPoint, other: QPoint) -> int:
     return (one - other).manhattanLength()
 
 
+WIDGETS: Final[dict[type[Page], Callable[[Any, PageContext], PageWidget]]] = {
+    ChoicePage: ChoiceWidget,
+    NumberPage: NumberWidget,
+    FeedbackPage: FeedbackWidget,
+    TextPage: TextWidget,
+    TroublePage: NoticeWidget,
+    EndPage: NoticeWidget,
+}
 LEAST_SIZE = QSize(1024, 640)
 WINDOWED_SIZE = QSize(1366, 768)
 PILOT_FRAME = 10
@@ -440,7 +453,14 @@ class ParticipantWindow(QWidget):
     def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
         if isinstance(page, TaskPage):
             return self._make_tank(page)
-        made = page_widget(page, self._context, old)
+        context = self._context
+        if isinstance(page, PausePage):  # on a picture of the page before; a pause on a pause shows the first one's
+            grabbed = old.grab() if old.width() > 0 else None
+            made: PageWidget = PauseWidget(page, context, old.under if isinstance(old, PauseWidget) else grabbed)
+        elif isinstance(page, QuestionnairePage):
+            made = (QuestionnaireWidget if page.labels else FormWidget)(page, context)
+        else:
+            made = WIDGETS[type(page)](page, context)
         made.event_made.connect(self.event)
         return made
 

@@ -6,13 +6,12 @@ Frames are asked for as a session asks for them, and the time of each painting i
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
 from PySide6.QtCore import QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QScreen
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from study_app.gui.display.screens import Frames
 from study_app.gui.kit.fields import LEAST_WORDS, Editor, choice, number
@@ -28,17 +27,6 @@ from study_app.store.workstation import OFFSET_MS, SPREAD_MS, DisplayOffset
 LEAST_S: Final = 2.0
 KEPT_S: Final = 10.0
 LATE: Final = 1.5  # so many refreshes of the screen apart, at least one was missed
-
-
-@dataclass(frozen=True, slots=True)
-class FrameFigures:
-    """Frames of the last ten seconds: ``rate_hz`` and ``p99_ms`` of the gaps between them, and how many were missed."""
-
-    rate_hz: float
-    median_ms: float
-    p99_ms: float
-    missed: int
-    painted: int
 
 
 class FrameTimes:
@@ -61,31 +49,29 @@ class FrameTimes:
         while time_ns - self._times[0] > 1e9 * KEPT_S:
             self._times.popleft()
 
-    def figures(self) -> FrameFigures | None:
-        """Return what the frames come to; None until there are enough."""
+    def words(self) -> tuple[str, ...]:
+        """Return rate, median gap, 99th percentile of the gaps and refreshes missed; dashes until there are enough."""
         times = list(self._times)
         if len(times) < 3 or times[-1] - times[0] < self._least_ns:
-            return None
+            return ("–",) * len(NAMES)
         gaps_ms = sorted((late - early) / 1e6 for early, late in pairwise(times))
         refresh_ms = 1000 / self.refresh_hz
-        median_ms = gaps_ms[len(gaps_ms) // 2]
-        return FrameFigures(
-            rate_hz=1e9 * (len(times) - 1) / (times[-1] - times[0]),
-            median_ms=median_ms,
-            p99_ms=gaps_ms[min(len(gaps_ms) - 1, int(0.99 * len(gaps_ms)))],
-            missed=sum(round(gap / refresh_ms) - 1 for gap in gaps_ms if gap > LATE * refresh_ms),
-            painted=len(times),
+        return (
+            f"{1e9 * (len(times) - 1) / (times[-1] - times[0]):.1f} of {self.refresh_hz:.1f} Hz",
+            f"{gaps_ms[len(gaps_ms) // 2]:.2f} ms",
+            f"{gaps_ms[min(len(gaps_ms) - 1, int(0.99 * len(gaps_ms)))]:.2f} ms",
+            str(sum(round(gap / refresh_ms) - 1 for gap in gaps_ms if gap > LATE * refresh_ms)),
         )
 
 
 REPORT_MS = 500
 INTERVAL_MS = (50.0, 5000.0)
 FIRST_MS = 500.0
+FORM_PX = 320
 NAMES = ("Frames painted", "Median gap", "99 % of gaps within", "Missed in 10 s")
 LEAST = QSize(960, 600)
 HOWS = ("photodiode", "high-speed camera", "data sheet")
 DECIMALS = 2
-WIDEST_FORM = 460
 
 
 class OffsetForm(QWidget):
@@ -146,10 +132,7 @@ def offset_words(offset: DisplayOffset | None, screen: str) -> str:
 
 
 class DisplayTest(QWidget):
-    """One screen under test; Esc leaves.
-
-    ``kept(mean [ms], spread [ms], how)`` where an offset is to be kept, ``forgotten`` where it is not to be; ``left``
-    when the window has gone.
+    """One screen under test; Esc leaves, and ``left`` comes when the window has gone.
 
     Parameters
     ----------
@@ -158,8 +141,6 @@ class DisplayTest(QWidget):
     least_s : so long frames are counted before anything is said of them
     """
 
-    kept = Signal(float, float, str)
-    forgotten = Signal()
     left = Signal()
 
     def __init__(
@@ -181,13 +162,13 @@ class DisplayTest(QWidget):
         self.interval_ms = FIRST_MS
         self._unpainted = False
         self.interval = Editor(number("interval", "Interval", "ms", INTERVAL_MS))
+        self.interval.setFixedWidth(FORM_PX)
         self.interval.show_value(FIRST_MS)
         self.values: list[QLabel] = [figures("–", "number") for _ in NAMES]
-        self.offset = OffsetForm()
-        self.offset.setMaximumWidth(WIDEST_FORM)
         self.leave = ActionButton("", "Leave (Esc)", height=40)
         self._lay_out(screen_words)
-        self._connect()
+        self.leave.clicked.connect(self.close)
+        self.interval.changed.connect(lambda _name, value: self._set_interval(value))
         apply_theme(self, PARTICIPANT)
         self.frames = Frames(self.times.refresh_hz, now_ns=now_ns, parent=self)
         self.frames.due.connect(self.frame)
@@ -197,27 +178,15 @@ class DisplayTest(QWidget):
     def _lay_out(self, screen_words: str) -> None:
         titles = vbox(label("Display test", "title"), label(screen_words, "body", "text2"), spacing=2)
         head = hbox(titles, STRETCH, (self.leave, 0, Qt.AlignmentFlag.AlignTop))
-        vbox(head, self._figures(), self._foot(), STRETCH, spacing=14, margins=(40, 20, 40, 20), parent=self)
-
-    def _figures(self) -> QGridLayout:
         cells = grid(40, 2)
         for place, (name, value) in enumerate(zip(NAMES, self.values, strict=True)):
             value.setAccessibleName(name)
             cells.addWidget(label(name, "label", "text2"), 0, place)
             cells.addWidget(value, 1, place)
         cells.setColumnStretch(len(NAMES), 1)
-        return cells
-
-    def _foot(self) -> QBoxLayout:
-        toggling = vbox(label("Photodiode's patch", "card"), self.interval, STRETCH, spacing=6)
-        measured = vbox(label("Display offset", "card"), self.offset, STRETCH, spacing=6)
-        return hbox(toggling, (measured, 1), spacing=48, margins=(0, 0, 120, 0))  # the patch's corner is free
-
-    def _connect(self) -> None:
-        self.leave.clicked.connect(self.close)
-        self.interval.changed.connect(lambda _name, value: self._set_interval(value))
-        self.offset.kept.connect(self.kept)
-        self.offset.forgotten.connect(self.forgotten)
+        toggling = vbox(label("Photodiode's patch", "card"), self.interval, spacing=6)
+        foot = hbox(toggling, STRETCH)
+        vbox(head, cells, foot, STRETCH, spacing=14, margins=(40, 20, 40, 20), parent=self)
 
     def open_on(self, screen: QScreen) -> None:
         self.setScreen(screen)
@@ -242,11 +211,8 @@ class DisplayTest(QWidget):
         self.update(self.patch_area())
 
     def show_figures(self) -> None:
-        for value, words in zip(self.values, figures_words(self.times.figures(), self.times.refresh_hz), strict=True):
+        for value, words in zip(self.values, self.times.words(), strict=True):
             value.setText(words)
-
-    def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
-        self.offset.show_offset(offset, screen)
 
     def patch_area(self) -> QRect:
         return patch_place(self.width(), self.height()).toAlignedRect()
@@ -275,15 +241,3 @@ class DisplayTest(QWidget):
         self.report_timer.stop()
         super().closeEvent(event)
         self.left.emit()
-
-
-def figures_words(found: FrameFigures | None, refresh_hz: float) -> tuple[str, str, str, str]:
-    """Return the figures as they are shown; dashes until there are enough frames."""
-    if found is None:
-        return "–", "–", "–", "–"
-    return (
-        f"{found.rate_hz:.1f} of {refresh_hz:.1f} Hz",
-        f"{found.median_ms:.2f} ms",
-        f"{found.p99_ms:.2f} ms",
-        str(found.missed),
-    )

@@ -9,19 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import get_args
 
-from PySide6.QtCore import QRectF, Qt, QTimer, Signal
-from PySide6.QtGui import (
-    QColor,
-    QGuiApplication,
-    QKeyEvent,
-    QKeySequence,
-    QMouseEvent,
-    QPainter,
-    QPaintEvent,
-    QResizeEvent,
-    QScreen,
-    QShortcut,
-)  # fmt: skip
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QGuiApplication, QKeySequence, QResizeEvent, QShortcut  # fmt: skip
 from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QWidget
 
 from study_app.devices.registry import list_devices, title_of
@@ -49,8 +38,6 @@ from study_app.video.sources import USUAL
 STACKED_BELOW = 1000
 SAMPLE = "I think this feels like interacting with a liquid."
 MOST_SAMPLE = 2.4
-SHOWN_MS = 4000
-NUMBER_SHARE = 0.42  # of the screen's height
 STAMPS = "Such as https://freetsa.org/tsr. Leave empty for none."
 PORTS = "One byte per event: serial:/dev/ttyUSB0, serial:COM3 or parallel:/dev/parport0. Leave empty for none."
 
@@ -120,12 +107,11 @@ class ScreensCard(Card):
         self.radios: list[Radio] = []
         self.note = label("", "label", "warn", wraps=True)
         self.note.setMinimumWidth(LEAST_WORDS)
-        self.identify = ActionButton("eye", "Identify", height=38)
         self.test = ActionButton("screen", "Display test …", height=38)
         self._rows = QWidget()
         self._shown: tuple[ScreenShown, ...] = ()
         self._host = vbox(self._rows)
-        add_parts(self.column, self._host, self.note, hbox(self.identify, self.test, STRETCH, spacing=12))
+        add_parts(self.column, self._host, self.note, hbox(self.test, STRETCH))
 
     def show_screens(self, screens: tuple[ScreenShown, ...], chosen: int, missing: str) -> None:
         """Show screens; ``chosen`` is the participant's number, ``missing`` the name of one that is not there."""
@@ -156,35 +142,6 @@ class ScreensCard(Card):
         self.note.setVisible(bool(missing))
 
 
-class ScreenNumber(QWidget):
-    """The number of one screen, all over it; any key or click takes it away."""
-
-    def __init__(self, number: int, screen: QScreen) -> None:
-        super().__init__(None, Qt.WindowType.FramelessWindowHint | Qt.WindowType.WindowStaysOnTopHint)
-        self.number = number
-        self.setWindowTitle(f"Screen {number}")
-        self.setScreen(screen)
-        self.setGeometry(screen.geometry())
-        QTimer.singleShot(SHOWN_MS, self, self.close)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(PARTICIPANT.window))
-        painter.setPen(QColor(PARTICIPANT.accent))
-        painter.setFont(font("display", scale=self.height() * NUMBER_SHARE / 34))
-        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, str(self.number))
-        painter.setPen(QColor(PARTICIPANT.text2))
-        painter.setFont(font("title"))
-        below = QRectF(0, self.height() * 0.8, self.width(), 48)
-        painter.drawText(below, Qt.AlignmentFlag.AlignCenter, self.screen().name())
-
-    def keyPressEvent(self, _event: QKeyEvent) -> None:
-        self.close()
-
-    def mousePressEvent(self, _event: QMouseEvent) -> None:
-        self.close()
-
-
 class MachinePlace(Place):
     """What is set, under headings.
 
@@ -202,7 +159,6 @@ class MachinePlace(Place):
         super().__init__()
         self.settings = DEFAULTS
         self._screens: tuple[ScreenShown, ...] = ()
-        self.numbers: list[ScreenNumber] = []
         self.test: DisplayTest | None = None
         self.devices = ActionButton("", "Devices", height=40)
         self.change = ActionButton("", "Change …", height=40)
@@ -228,11 +184,11 @@ class MachinePlace(Place):
         self.check = ActionButton("check", "Check this computer …")
         self._lay_out()
         self.screens.chosen.connect(lambda it: self.changed.emit({"screen": it.name, "screen_number": it.number}))
-        self.screens.identify.clicked.connect(self._identify)
         self.screens.test.clicked.connect(self.open_test)
         self.devices.clicked.connect(lambda: self.go_asked.emit("devices"))
         self.change.clicked.connect(self._choose_folder)
-        self._save_offset_of(self.offset)
+        self.offset.kept.connect(lambda *measured: self.offset_measured.emit(*measured, self.participants.name))
+        self.offset.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
         self.undo.clicked.connect(self.undo_asked)
         self.check.clicked.connect(self.check_asked)
         QShortcut(QKeySequence.StandardKey.Undo, self, self.undo.click, context=Qt.ShortcutContext.WindowShortcut)
@@ -276,10 +232,6 @@ class MachinePlace(Place):
         self._show()
 
     def leave(self) -> None:
-        for one in self.numbers:
-            one.close()
-            one.deleteLater()
-        self.numbers = []
         if self.test is not None:
             self.test.close()
 
@@ -308,23 +260,10 @@ class MachinePlace(Place):
         self.sample.setFont(font("statement", scale=min(scale, MOST_SAMPLE)))
         self.said.setText(size_words(settings, there, scale))
         self.offset.show_offset(settings.display_offset, there.name)
-        if self.test is not None:
-            self.test.show_offset(settings.display_offset, there.name)
 
     def _choose_folder(self) -> None:
         if chosen := QFileDialog.getExistingDirectory(self, "Workspace", self.folder.whole):
             self.changed.emit({"workspace": chosen})
-
-    def _save_offset_of(self, form: OffsetForm | DisplayTest) -> None:
-        form.kept.connect(lambda *measured: self.offset_measured.emit(*measured, self.participants.name))
-        form.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
-
-    def _identify(self) -> None:
-        self.leave()
-        screens = QGuiApplication.screens()
-        self.numbers = [ScreenNumber(at, screen) for at, screen in enumerate(screens, start=1)]
-        for one in self.numbers:
-            one.showFullScreen()
 
     def open_test(self) -> None:
         if self.test is not None:
@@ -335,9 +274,7 @@ class MachinePlace(Place):
             return
         words = "  ·  ".join(filter(None, (f"Screen {there.number}", there.name, there.words)))
         self.test = DisplayTest(words, there.refresh_hz)
-        self._save_offset_of(self.test)
         self.test.left.connect(self._test_left)
-        self.test.show_offset(self.settings.display_offset, there.name)
         self.test.open_on(screens[there.number - 1])
 
     def _test_left(self) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study_app.cli.evidence.accuracy import motion_along
+from study_app.cli.evidence import motion_along
 from study_app.errors import StudyError
 from study_app.evidence.accuracy.comparison import accuracy
 from study_app.evidence.accuracy.survey import PUBLISHED, survey

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from scipy.integrate import quad
 
-from study_app.cli.evidence.accuracy import cfd
+from study_app.cli.evidence import cfd
 from study_app.cli.options import executor_for
 from study_app.errors import StudyError
 from study_app.evidence.cfd import fits as fitted

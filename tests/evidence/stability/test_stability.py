@@ -132,7 +132,7 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     monkeypatch.setattr(stability, "judge_driven", lambda case: dataclasses.replace(judged, case=case, safe=True))
     few = stability.fidelities(["honey"], STUDY_LOOPS)
     monkeypatch.setattr("study_app.evidence.stability.stability_report.fidelities", lambda **_: few)
-    monkeypatch.setattr("study_app.cli.evidence.stability.executor_for", lambda _: ThreadPoolExecutor(1))
+    monkeypatch.setattr("study_app.cli.evidence.executor_for", lambda _: ThreadPoolExecutor(1))
     ran = command("--cases", "2")
     assert ran.return_value == EXIT_FOUND
     lines = [line for line in ran.stderr.splitlines() if line.startswith("liquid=")]

@@ -127,7 +127,7 @@ def frame_times() -> Iterator[str]:
         frames = FrameTimes(60.0)
         for time_ns in times_ns:
             frames.add(int(time_ns))
-        yield from (f"== {name}", *value_lines(frames.figures()))
+        yield from (f"== {name}", *value_lines(frames.words()))
 
 
 @pytest.mark.parametrize("of", [healths, forces, frame_times], ids=lambda of: of.__name__)

@@ -1,4 +1,4 @@
-"""The machine's place: numbers on the screens, and the display test."""
+"""The machine's place: the display test, and what is typed."""
 
 import pytest
 from PySide6.QtCore import Qt
@@ -14,29 +14,12 @@ def real_place(qtbot):
     made.leave()
 
 
-def test_numbers_come_on_every_screen_and_go_with_the_place(real_place, qtbot):
-    qtbot.mouseClick(real_place.screens.identify, Qt.MouseButton.LeftButton)
-    (number,) = real_place.numbers
-    assert number.isVisible()
-    qtbot.keyClick(number, Qt.Key.Key_Space)
-    assert not number.isVisible()
-    number.show()
-    qtbot.mouseClick(number, Qt.MouseButton.LeftButton)
-    assert not number.isVisible()
-    with qtbot.waitSignal(number.destroyed):
-        real_place.leave()
-    assert real_place.numbers == []
-
-
 def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
     qtbot.mouseClick(real_place.screens.test, Qt.MouseButton.LeftButton)
     test = real_place.test
     assert test.isVisible()
     real_place.open_test()
     assert real_place.test is test
-    qtbot.keyClicks(test.offset.editors["mean"].control, "20")
-    with qtbot.waitSignal(real_place.offset_measured):
-        qtbot.mouseClick(test.offset.keep, Qt.MouseButton.LeftButton)
     with qtbot.waitSignal(test.left):
         qtbot.keyClick(test, Qt.Key.Key_Escape)
     assert real_place.test is None

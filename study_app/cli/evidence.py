@@ -1,0 +1,627 @@
+"""The commands that print evidence: accuracy of the force model, stability, timing, and rates of the analysis."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+import click
+
+from study_app.cli.options import (
+    ShowProgress,
+    Target,
+    echo_files,
+    end_if,
+    exclude_each_other,
+    executor_for,
+    prepare,
+    progress,
+    takes_workers,
+)
+from study_app.errors import DisplayError, StudyError
+from study_app.workers.executors import Workers
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from study_app.app.delay_session import WindowsThread
+    from study_app.evidence.computer import LoadName
+    from study_app.evidence.table import Evidence
+    from study_app.haptics.model.motion import Motion
+    from study_app.haptics.model.scene import Scene
+
+EXIT_UNDECIDED = 4
+
+
+def present(found: Evidence, to: Path | None, *, with_text: bool = True) -> None:
+    """Print evidence and write it into a folder, if one was given.
+
+    The exit code is 3 if a limit is missed, and 4 if one is undecided. ``with_text``: print the text in any case, not
+    only where there is no folder.
+    """
+    if with_text or to is None:
+        click.echo(found.text, nl=False)
+    if to is not None:
+        echo_files(found.write(to))
+    if found.closing:
+        click.echo(found.closing)
+    end_if(found.missed)
+    if found.undecided:
+        click.get_current_context().exit(EXIT_UNDECIDED)
+
+
+DEFAULT_PATH = "stir"
+REAL = "physical2"
+
+
+@click.command()
+@click.argument("scene", metavar="[FILE]", required=False)
+@click.option("--liquid", metavar="NAME", help="Name of the liquid; default: water of rek2024, and honey of physical2.")
+@click.option(
+    "--path",
+    default=DEFAULT_PATH,
+    show_default=True,
+    metavar="PATH",
+    help="Motion CSV, or a programmed path: stir, circle, reverse, reach …",
+)
+@click.option(
+    "--liquids",
+    "every",
+    is_flag=True,
+    help="Compare the liquids of FILE (default: physical2) instead, each with its own model: error of the force, up to "
+    "which speed, and computation time of a tick.",
+)
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for table and figure; default: print.")
+def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, *, every: bool) -> None:
+    """Compare accuracy and computation time of the models of a liquid.
+
+    FILE is a protocol or scene file; default: rek2024 and physical2.
+    Wakes are compared with their definition, models of a real liquid with experiments, exact solutions and a solver.
+    """
+    if every:
+        exclude_each_other(liquids=every, liquid=liquid)
+        exclude_each_other(liquids=every, path=None if path == DEFAULT_PATH else path)
+        _survey(scene, to)
+        return
+    from study_app.evidence.accuracy.accuracy_report import evidence
+    from study_app.evidence.accuracy.comparison import accuracy as measure
+
+    numerical, physical, notes = _subjects(scene, liquid)
+    one = numerical or physical
+    motion = motion_along(path, one) if one is not None else None
+    if motion is None:
+        raise click.UsageError(f"nothing can be measured: {'; '.join(notes)}")
+    prepare(to)
+    named = "stirring" if path == DEFAULT_PATH else path
+    with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
+        found = measure(numerical, physical, motion, named=named, notes=notes, progress=show)
+    present(evidence(found), to, with_text=False)
+
+
+def _survey(file: str | None, to: Path | None) -> None:
+    """Print or write the error of the force of every liquid of a file."""
+    from study_app.evidence.accuracy.survey import evidence, survey
+    from study_app.protocol.load import load_scenes
+
+    prepare(to)
+    with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
+        found = survey(load_scenes(file or REAL), show)
+    if not found:
+        raise click.UsageError(f"{file}: no liquid has a viscosity, so there is no physical reference to compare with")
+    present(evidence(found), to, with_text=False)
+
+
+def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
+    """Return the scene whose definition is followed, the one whose liquid is real, and what is missing."""
+    from study_app.protocol.load import load_scene, load_scenes
+
+    if scene is None and liquid is None:
+        return load_scene("rek2024", "water"), load_scene(REAL, "honey"), ()
+    if scene is None:
+        thesis, real = load_scenes("rek2024"), load_scenes(REAL)
+        if liquid in thesis or liquid in real:
+            return thesis.get(liquid or ""), real.get(liquid or ""), ()
+        known = ", ".join(dict.fromkeys([*thesis, *real]))
+        raise click.UsageError(f"--liquid {liquid}: there are {known}; or give FILE, which has it")
+    if liquid is None:
+        there = load_scenes(scene)
+        if len(there) > 1:
+            raise click.UsageError(f"{scene}: say which --liquid of {', '.join(there)}")
+        liquid = next(iter(there))
+    chosen = load_scene(scene, liquid)
+    if chosen.liquids[0].viscosity_pa_s is None:
+        return chosen, None, (f"{liquid} has no viscosity, so there is no physical reference to compare with",)
+    if chosen.liquids[0].drag.law == "linear":
+        return chosen, None, (f"{liquid} is a linear damper, so there is no physical reference to compare with",)
+    return chosen, chosen, ()
+
+
+def motion_along(path: str, scene: Scene) -> Motion:
+    """Return the motion of a path's name or a motion file, at the scene's rate."""
+    from study_app.evidence.reference_solutions import stir
+    from study_app.haptics.model import motion
+    from study_app.lab.identify.measured_force import at_rate
+
+    if path == DEFAULT_PATH:
+        return stir(scene.scale, scene.rate_hz)
+    programmed = path in motion.NAMES or not (Path(path).suffix or Path(path).exists())
+    return motion.path(path, rate_hz=scene.rate_hz) if programmed else at_rate(motion.read(Path(path)), scene.rate_hz)
+
+
+@click.command()
+@click.option(
+    "--solve",
+    is_flag=True,
+    help="Solve the flow again instead of using the stored tables: 20 minutes on one core, an hour on a busy one; "
+    "needs the extra cfd (NGSolve, 350 MB).",
+)
+@click.option(
+    "--refit",
+    is_flag=True,
+    help="Fit the constants of unsteady drag to the stored motions, and print the error for each motion, with and "
+    "without this motion in the fit; takes about two minutes.",
+)
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; default: print.")
+@click.option(
+    "--materials",
+    is_flag=True,
+    help="Only compare the drag in Herschel–Bulkley liquids; with --solve this takes half an hour.",
+)
+@click.option(
+    "--score",
+    is_flag=True,
+    help="Score the models by the benchmark that other engines can enter: error, time, energy given, delay borne; "
+    "takes about five minutes.",
+)
+@takes_workers
+def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, materials: bool, score: bool) -> None:
+    """Fit models of honey and glycerin to the force of a fluid solver; report the remaining error.
+
+    A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
+    minute. Further motions, such as oscillations and a reversal, are used by --refit.
+    """
+    from study_app.evidence.cfd import fits, law_fit
+    from study_app.evidence.cfd.solver import solve as solve_all
+    from study_app.evidence.cfd.stored_flows import held_out, steady, stored, training
+
+    exclude_each_other(refit=refit, materials=materials, score=score)
+    exclude_each_other(solve=solve, score=score)
+    if solve and to is None:
+        raise click.UsageError("--solve needs --to: the folder for the solver's tables")
+    prepare(to)
+    if score:
+        with progress(lambda text: click.echo(text, err=True)) as show:
+            scored = fits.score_all(show)
+        present(scored, to)
+        return
+    if materials:
+        _materials(to, workers, solve=solve)
+        return
+    with progress(lambda text: click.echo(text, err=True)) as show:
+        solved: tuple[Path, ...] = ()
+        if solve and to is not None:
+            with executor_for(workers) as executor:
+                solved = solve_all(to, executor, show)
+        source = to if solve else None
+        tables, drag = stored(source), steady(source)
+        if refit:
+            found = law_fit.evidence(law_fit.refit((*tables, *training(source)), held_out(source), show))
+        else:
+            found = fits.evidence(tables, drag, fits.fit_all(tables, show))
+    echo_files(solved)
+    present(found, to, with_text=False)
+
+
+def _materials(to: Path | None, workers: Workers, *, solve: bool) -> None:
+    """Print or write the law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
+    from study_app.evidence.cfd.yield_flow import evidence, solve_materials, stored_materials
+
+    if solve and to is not None:
+        with progress(lambda text: click.echo(text, err=True)) as show, executor_for(workers) as executor:
+            click.echo(solve_materials(to, executor, show))
+    present(evidence(stored_materials(to if solve else None)), to, with_text=False)
+
+
+@click.command()
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for table, map, unstable cases and summary.")
+@click.option("--case", "line", metavar="LINE", help='Evaluate one case, such as "liquid=honey rate_hz=250 delay=4".')
+@click.option(
+    "--table", type=click.Path(path_type=Path), metavar="FILE", help="Only measure the table of slope limits."
+)
+@click.option("--withheld", is_flag=True, help="Only print the share of each liquid's force that safety withholds.")
+@click.option("--delivered", is_flag=True, help="Only print the error of each liquid's force in the hand.")
+@click.option(
+    "--velocity",
+    is_flag=True,
+    help="Only print errors, noise, stable damping and computation time of the velocity estimators.",
+)
+@click.option(
+    "--delayed",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Only measure how much of a delayed force is sent.",
+)
+@click.option("--seed", default="stability", show_default=True, help="Seed of the cases.")
+@click.option("--cases", type=click.IntRange(1), metavar="N", help="Only simulate N cases of each group.")
+@click.option(
+    "--only", metavar="TEXT", help='Only simulate groups with this text in their name, such as "non-Newtonian".'
+)
+@takes_workers
+def stability(
+    to: Path | None,
+    line: str | None,
+    table: Path | None,
+    withheld: bool,
+    delivered: bool,
+    velocity: bool,
+    delayed: Path | None,
+    seed: str,
+    cases: int | None,
+    only: str | None,
+    workers: Workers,
+) -> None:
+    """Simulate thousands of closed loops with the safety layer off and on, and print the unstable ones.
+
+    Each case has a liquid, a scale, a rate, a delay, an estimator, a device and a hand; further groups have a second
+    model of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the driver of the Falcon
+    with its emulator. Ends with exit code 3 if a case is unstable with the safety layer on.
+    """
+    from study_app.evidence.stability import stability_report as found
+    from study_app.evidence.stability.case_groups import groups, some, sweep
+    from study_app.evidence.stability.stability_cases import parse
+
+    parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity}
+    exclude_each_other(to=to, case=line, table=table, delayed=delayed, only=only, **parts)
+    prepare(to)
+    if line is not None:
+        case = parse(line)
+        click.echo(str(case))
+        verdicts = found.verdicts_on(case)
+        click.echo("\n".join(found.in_words(verdict) for verdict in verdicts))
+        end_if(not verdicts[-1].stable)
+        return
+    if table is not None:
+        with progress() as show, executor_for(workers) as executor:
+            limits = found.limits(executor, lambda done, of: show(f"{done} of {of} limits", done / of), table.name)
+        present(limits, table.parent)
+        return
+    if delayed is not None:
+        from study_app.evidence.stability import force_delay
+
+        with progress() as show:
+            entries = force_delay.measure(progress=lambda done: show(f"{done} delays"))
+        present(force_delay.evidence(entries, delayed.name), delayed.parent)
+        return
+    if any(parts.values()):
+        part = next(name for name, chosen in parts.items() if chosen)
+        with progress() as show, executor_for(workers) as executor:
+            measured = _measure(part, executor, show)
+        present(measured, None)
+        return
+    chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
+    if not chosen:
+        names = ", ".join(group.name for group in groups(seed, cases))
+        raise StudyError(f"no group has {only!r} in its name: there are {names}")
+    with progress() as show, executor_for(workers) as executor:
+        swept = found.run_sweep(
+            some(sweep(seed), cases) if only is None else (),
+            chosen,
+            executor,
+            lambda done, of: show(f"{done} of {of} verdicts", done / of),
+        )
+        show("comparing forces")
+        compared = found.fidelities(executor=executor) if only is None else ()
+    shown = found.evidence(swept, compared)
+    click.echo(shown.text, nl=False)
+    if to is not None:
+        click.echo()
+        echo_files(shown.write(to))
+    if swept.unstable:
+        click.echo("\nunstable with safety on; repeat one with --case:", err=True)
+        click.echo("\n".join(str(verdict.case) for verdict in swept.unstable), err=True)
+    end_if(swept.unstable)
+
+
+def _measure(part: str, executor: Executor, show: ShowProgress) -> Evidence:
+    """Return the evidence of one measurement of its own."""
+    from study_app.evidence.stability import delivered_force, velocity, withheld_force
+
+    if part == "velocity":
+        return velocity.evidence(velocity.measure(lambda what: show(f"measuring {what}")))
+    show(f"measuring the force {part}")
+    if part == "withheld":
+        return withheld_force.evidence(withheld_force.measure(executor=executor))
+    return delivered_force.evidence(delivered_force.measure(executor=executor))
+
+
+MOST_COMPARED_S = 300.0
+LOAD = click.Choice(("none", "gui", "gui+cpu"))
+
+
+@click.command()
+@click.option(
+    "--seconds", type=float, default=10.0, show_default=True, metavar="S", help="Time for each loop, or for each delay."
+)
+@click.option(
+    "--load", type=LOAD, default="none", show_default=True, help="Also paint both windows; also keep all cores busy."
+)
+@click.option(
+    "--spin", "spin_us", type=float, metavar="US", help="Poll the clock for this time before a deadline [µs]."
+)
+@click.option("--delays", "of_delays", is_flag=True, help="Measure the delay of the participant's picture instead.")
+@click.option(
+    "--devices", "of_devices", is_flag=True, help="Compare each emulated device with the scripted hand instead."
+)
+@click.option("--lsl", is_flag=True, help="Measure the streams of the Lab Streaming Layer instead.")
+@click.option(
+    "--triggers",
+    metavar="PORT",
+    help="Measure triggers on a port instead, such as serial:/dev/ttyUSB0; virtual: on a pair of virtual ports.",
+)
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure.")
+def timing(
+    seconds: float,
+    load: LoadName,
+    spin_us: float | None,
+    of_delays: bool,
+    of_devices: bool,
+    lsl: bool,
+    triggers: str | None,
+    to: Path | None,
+) -> None:
+    """Measure the lateness of the servo, a bare compiled loop, a Python thread and a Qt timer.
+
+    They alternate every quarter second, in each priority class that the system grants. Ctrl+C ends the command.
+
+    With --delays a session presents the delays of rek2024 on screens of 60 and 144 Hz, with and without load, and
+    the error of every frame's delay is computed from its recordings. No display is needed.
+
+    With --devices the servo runs alternately on each emulated device and on the scripted hand. Ends with exit code 3
+    if the 99th percentile of the lateness on one of them is above 1.5 times that on the scripted hand, with its whole
+    95 % interval.
+
+    With --lsl another process receives samples at 1 kHz and markers for the given time; then the servo runs with and
+    without both streams, alternately, for up to 300 s each. Ends with exit code 3 if something is lost, a marker's
+    time differs from the servo's clock by more than 1 ms, or the median lateness grows by more than 10 %.
+
+    With --triggers a byte is sent to a port for each event, and its delay is measured.
+    """
+    from study_app.evidence.computer import under_load
+    from study_app.evidence.table import check_seconds
+
+    others = {"delays": of_delays, "devices": of_devices, "lsl": lsl, "triggers": triggers}
+    exclude_each_other(**others)
+    other = next((name for name, given in others.items() if given), "")
+    if other and spin_us is not None:
+        raise StudyError(f"--spin applies to the servo's loops: omit it with --{other}")
+    if other in {"lsl", "triggers"}:
+        check_seconds(seconds, "outlets are measured")
+    if other == "delays":
+        _choose_display()
+    prepare(to)
+
+    def measured(ending: threading.Event, show: ShowProgress) -> Evidence:
+        if other == "devices":
+            from study_app.evidence.timing import device_lateness as devices
+
+            names = devices.emulated_devices()
+            return devices.evidence(devices.time_devices(seconds, names, ending=ending, progress=show))
+        if other == "lsl":
+            from study_app.evidence.outlets import streams
+            from study_app.evidence.outlets.localhost import localhost_only
+
+            localhost_only()
+            found = streams.stream(seconds, ending=ending, progress=show)
+            compared = streams.compare(min(seconds, MOST_COMPARED_S), ending=ending, progress=show)
+            return streams.evidence(found, compared)
+        from study_app.evidence.outlets import triggers as ports
+
+        return ports.evidence(ports.measure(triggers or "", seconds, ending=ending, progress=show))
+
+    if other == "delays":
+        from study_app.app.delay_session import delays
+        from study_app.evidence.timing.delays import evidence
+
+        with progress(partial(click.echo, err=True)) as show:
+            found = evidence(delays(seconds, load, progress=show))
+    else:
+        windows = windows_thread(load) if load != "none" or not other else None
+        with ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
+            if other:
+                found = under_load(load, windows, partial(measured, ending, show))
+            else:
+                from study_app.evidence.timing import measurement, report
+
+                timed = measurement.timing(seconds, load, windows, spin_us=spin_us, ending=ending, progress=show)
+                found = report.evidence(timed)
+    present(found, to)
+
+
+def _choose_display() -> None:
+    """Without a display, show on none."""
+    if sys.platform == "linux" and not any(map(os.environ.get, ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"))):
+        os.environ["QT_QPA_PLATFORM"] = "offscreen"
+
+
+def windows_thread(load: LoadName) -> WindowsThread | None:
+    """Return the windows' thread; None where there is no Qt and nothing is to be painted."""
+    try:
+        from study_app.app.delay_session import lend
+    except DisplayError:
+        if load != "none":
+            raise
+        return None
+    return lend(load)
+
+
+@contextmanager
+def ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
+    """Set an event on Ctrl+C and when asked to terminate, instead of breaking off; give it and the signals received."""
+    ending = threading.Event()
+    received: list[int] = []
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        received.append(number)
+        ending.set()
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield ending, received
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@click.command()
+@click.argument("protocol", metavar="[FILE]", default="rek2024")
+@click.option("--hours", type=float, required=True, metavar="H", help="Duration in hours; 0.01 is 36 seconds.")
+@click.option("--virtual", is_flag=True, help="In virtual time: a day takes minutes.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the faults.")
+@click.option(
+    "--load", type=LOAD, default="none", help="Also paint both windows of a session; also keep all cores busy."
+)
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for the report.")
+@click.pass_context
+def soak(
+    context: click.Context, hours: float, protocol: str, seed: int, load: LoadName, to: Path | None, *, virtual: bool
+) -> None:
+    """Run the servo for hours with a moving hand and every fault; report drift, leaks and failures.
+
+    FILE defines the liquids; default: rek2024. Ctrl+C ends it with the report so far.
+    """
+    from study_app.evidence.computer import under_load
+    from study_app.evidence.soak.soak import soak as soak_servo
+    from study_app.protocol.load import load_scenes
+
+    scenes = load_scenes(protocol)
+    prepare(to)
+    with ending_by_signal() as (ending, received):
+        found = under_load(
+            load,
+            windows_thread(load) if load != "none" else None,
+            lambda: soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, progress=click.echo),
+        )
+    if found.ticks > 0:
+        click.echo()
+    present(found.evidence(), to)
+    if received:
+        context.exit(128 + received[0])
+
+
+@click.command("validate-report")
+@click.option(
+    "--studies",
+    type=click.IntRange(1, 1_000_000),
+    default=1000,
+    show_default=True,
+    help="Initial number of studies per cell.",
+)
+@takes_workers
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
+def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
+    """Measure how often the report's verdicts are wrong, on studies simulated with no, some or all effects.
+
+    Studies of rek2024 with 5, 12 and 24 participants, by the rehearsals' answer model and by an ordinal probit model
+    with random effects, are analysed by the report's own tests. Every rate is printed with its Wilson interval, and
+    whether it meets its limit: "at most 5 %" is met if the interval reaches down to 5 % and ends below 7.5 %. A cell
+    with an undecided rate is continued with further studies, up to four times as many. Ctrl+C ends the command with
+    the results so far. Ends with exit code 3 if a rate exceeds its limit by its 99.9 % interval, otherwise with 4 if
+    there are too few studies to decide about a rate.
+    """
+    from study_app.analysis.planning.simulated_studies import plan
+    from study_app.evidence.report_rates.simulation import Rate, evidence, validate
+    from study_app.protocol.load import load
+    from study_app.session.simulated.rehearsal import condition_features
+
+    prepare(to)
+    rates: tuple[Rate, ...] = ()
+    begun, done = time.monotonic(), 0
+
+    def say(text: str) -> None:
+        click.echo(f"{time.monotonic() - begun:.0f} s: {text}", err=True)
+
+    try:
+        with progress() as show, executor_for(workers) as executor:
+            show("rehearsing every condition")
+            protocol = load("rek2024")
+            studied = plan(protocol, condition_features(protocol, seed=seed))
+            begun = time.monotonic()
+            for done, so_far in validate(studied, studies, executor, seed=seed, progress=say):
+                rates = so_far
+                show(f"{done} studies")
+    except KeyboardInterrupt:
+        click.echo("ended early", err=True)
+    present(evidence(rates, f"{done} studies in {time.monotonic() - begun:.0f} s"), to)
+
+
+@click.command()
+@click.argument("files", metavar="[FILE]...", nargs=-1)
+@click.option(
+    "--studies",
+    type=click.IntRange(10, 1_000_000),
+    default=200,
+    show_default=True,
+    help="Studies of 20 participants, of each protocol and seed.",
+)
+@click.option(
+    "--seed",
+    "seeds",
+    type=click.IntRange(0, 2**31 - 1),
+    multiple=True,
+    default=(1,),
+    show_default=True,
+    help="Seed of the simulation; may be given several times: studies of all seeds are judged together.",
+)
+@takes_workers
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
+def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], workers: Workers, to: Path | None) -> None:
+    """Recover the known thresholds of simulated observers, with methods and analysis alone and with the whole program.
+
+    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) many studies of 20
+    observers, who differ by a factor of 1.2, are simulated and analysed; in magnitude estimation the exponent is known.
+    Then three participants are rehearsed with servo, files, unblinding and analysis. Every value is printed with its
+    limit. Ends with exit code 3 if a value exceeds its limit.
+    """
+    from study_app.evidence.thresholds.known_values import NAMES, evidence, known_value
+    from study_app.evidence.thresholds.known_values import validate as validate_values
+    from study_app.protocol.load import load, source_bytes
+
+    try:
+        chosen = [(source_bytes(name), known_value(Path(name).stem, load(name))) for name in files or NAMES]
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    prepare(to)
+    begun = time.monotonic()
+    with progress() as show, executor_for(workers) as executor:
+        verdicts = validate_values(chosen, studies, seeds, executor, show)
+    used_s = sum(os.times()[:4])  # with the workers', which have ended
+    took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
+    heading = f"{studies} studies of each protocol and seed ({', '.join(map(str, seeds))}), in {took}"
+    present(evidence(verdicts, heading), to)
+
+
+@click.command("delay-thresholds")
+@click.option("--people", type=click.IntRange(5, 1000), default=40, show_default=True, help="Simulated people.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for the table and the figure.")
+def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
+    """Compare the delay that simulated people rate as different (rek2024) with the one they detect (delaydetect).
+
+    The forced choice does not depend on a person's criterion; the rating does.
+    """
+    from study_app.evidence.thresholds.noticed_delays import compare, evidence
+
+    with progress() as show:
+        show("simulating people")
+        found = compare(people, seed)
+    present(evidence(found), to)
