@@ -9,14 +9,21 @@ from study_app.protocol.orders.durations import variants
 from study_app.protocol.trials.tracks import design_of
 from tests.protocol.groups.grouped import grouped
 
-TRIALS, ADJUSTMENT, QUESTIONS, GROUPS = (
+TRIALS, ADJUSTMENT, DELAYS, QUESTIONS, GROUPS = (
     (Path(__file__).parents[2] / "docs" / f"{name}.md").read_text(encoding="utf-8")
-    for name in ("trials", "adjustment", "questions", "groups")
+    for name in ("trials", "adjustment", "delays", "questions", "groups")
 )
 
 
 def examples(page: str) -> list[str]:
     return re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+
+
+def test_the_example_of_delays_has_two_blocks_in_balanced_order() -> None:
+    (example,) = examples(DELAYS)
+    study = parse(example.encode(), "example")
+    assert [design_of(study, study.blocks[name]).kind for name in study.sequence] == ["2ifc", "yesno"]
+    assert orders_of(study).block_order == "balanced"
 
 
 def test_examples_of_trials_are_studies_and_replace_parts_of_the_first() -> None:
