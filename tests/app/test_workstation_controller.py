@@ -5,13 +5,11 @@ from types import SimpleNamespace
 
 import pytest
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QMainWindow
 
 from study_app.app.main_controller import MainController, WorkstationController
-from study_app.app.session.live_session import LiveSession
+from study_app.app.session.live_session import NOT_EXAMINED, LiveSession
 from study_app.devices.descriptor import READY, Backend
 from study_app.gui.kit.devices import described, settings_here, text_scale_on
-from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.session.start import NewSession
 from study_app.store import workstation
@@ -84,8 +82,8 @@ def test_a_damaged_file_is_told_when_the_window_opens(qtbot, tmp_path, monkeypat
 
 
 @pytest.mark.parametrize(("device", "held"), [("mouse", None), ("falcon:FT1", True), ("falcon-emulated", False)])
-def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qtbot, monkeypatch, device, held):
-    asked = []
+def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qapp, monkeypatch, device, held):
+    asked, told = [], []
 
     def diagnosis(_parent, _theme, name, _settings, *, held):
         asked.append((name, held))
@@ -93,13 +91,7 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qt
 
     monkeypatch.setattr("study_app.gui.devices.diagnosis_dialog.diagnosis", diagnosis)
     live = LiveSession(NewSession("demo", "P001", 1, 7, "", "en", device, True, None, Path("nowhere")), LIGHT)
-    operator = QMainWindow()
-    operator.theme = DARK
-    qtbot.addWidget(operator)
-    operator.show()
-    live.bridge = SimpleNamespace(operator=operator)
+    live.bridge = SimpleNamespace(operator=SimpleNamespace(theme=DARK, show_message=lambda *said: told.append(said)))
     live.diagnose()
     assert asked == ([] if held is None else [(device, held)])
-    assert [notice.windowTitle() for notice in operator.findChildren(Question)] == (
-        ["There is nothing to diagnose"] if held is None else []
-    )
+    assert told == ([NOT_EXAMINED] if held is None else [])

@@ -4,8 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from study_app.app.session.bridge import SessionBridge
-from study_app.app.session.operator import Parts, WatchedJournal
+from study_app.app.session.bridge import Parts, SessionBridge, WatchedJournal
 from study_app.errors import StoreError
 from study_app.gui.operator.operator_view import Session, stages
 from study_app.gui.operator.window import OperatorWindow

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import logging
 import traceback
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from inspect import unwrap
 from typing import TYPE_CHECKING, Any
 
@@ -19,17 +19,18 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
 from study_app.app.failures import PAINTING, ThreadExceptions, UncaughtExceptions, guarded_session_slot
-from study_app.app.session.operator import OperatorMonitor, Parts, Reconnection, WatchedJournal
 from study_app.app.session.timing import FrameBudget, ThreadPriority, freeze_garbage, unfreeze_garbage
 from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
 from study_app.discovery import explained
 from study_app.errors import DeviceError, DisplayError, ServoFault, StudyError, VideoError
 from study_app.gui.display.screens import Frames, has_card, place
-from study_app.gui.operator.operator_view import OperatorView, Session, stages
+from study_app.gui.operator.operator_view import OperatorView, Session, operator_view, stages
+from study_app.gui.operator.servo_health import Forces, ServoHealth
 from study_app.gui.operator.session_panels import Strip
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
+from study_app.gui.widgets.background import Background
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s
@@ -37,7 +38,7 @@ from study_app.protocol.orders.schedule import PageStep, Schedule, stream
 from study_app.protocol.wording.languages import words
 from study_app.protocol.wording.without_force import without_force
 from study_app.session.pages import Page, TaskPage
-from study_app.session.ports import Ports
+from study_app.session.ports import JournalPort, Ports
 from study_app.session.resume import FIRST, Start, resume_at
 from study_app.session.runner import Runner
 from study_app.session.simulated.observers import Hand, hand_for, rest
@@ -57,8 +58,9 @@ from study_app.session.transitions.events import (
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.blinded.blinding import opened
 from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal_events
 from study_app.store.program_log import DEVICE_FAILED
-from study_app.store.progress import progress_of
+from study_app.store.progress import Progress, progress_of
 
 if TYPE_CHECKING:
     from PySide6.QtGui import QScreen
@@ -67,7 +69,9 @@ if TYPE_CHECKING:
     from study_app.devices.rig import Rig
     from study_app.gui.theme.theme import Theme
     from study_app.haptics.runtime.servo import Servo
+    from study_app.outlets.session_outlets import Outlets
     from study_app.session.start import NewSession
+    from study_app.store.recorder import Recorder
     from study_app.store.sessions.open_session import SessionStore
     from study_app.video.sources import Videos
 
@@ -83,11 +87,78 @@ SCREEN_REMOVED = (
 log = logging.getLogger(__name__)
 
 
+class WatchedJournal:
+    """Passes everything on to the store, and folds what it has kept into ``progress``."""
+
+    def __init__(self, store: JournalPort, progress: Progress, clock: Callable[[], float]) -> None:
+        self.progress = progress
+        self._store = store
+        self._clock = clock
+
+    def append(self, event: journal_events.Event, *, t_s: float | None = None, waits: bool = True) -> None:
+        """Put an event into the journal (StoreError: nothing has changed)."""
+        self._store.append(event, t_s=t_s, waits=waits)
+        self.progress.take(replace(event, t_s=self._clock() if t_s is None else t_s))
+
+    @property
+    def fingerprint(self) -> str:
+        return self._store.fingerprint
+
+    def check_flushed(self) -> None:
+        """Raise StoreError if lines that were not waited for could not be flushed."""
+        self._store.check_flushed()
+
+    def write_tables(self) -> None:
+        self._store.write_tables()
+
+    def finish(self, status: str, reason: str = "") -> None:
+        """Close the session (StoreError: the last table or line could not be written; it counts as ended here)."""
+        try:
+            self._store.finish(status, reason)
+        finally:
+            proof = {"fingerprint": self._store.fingerprint}
+            self.progress.take(
+                journal_events.SessionEnded(status=status, reason=reason, t_s=self._clock(), others=proof)
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """The parts of a session, except its windows.
+
+    ``session`` is what the operator sees of it throughout; ``key`` is block → code → condition or track and ``secret``
+    the sealed key's nonce, never shown; ``start`` is where a resumed session goes on. ``aim_m`` gives where hand or
+    pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse on, None where the device is not the
+    mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
+    ``outlets`` send its events to other programs; ``videos`` are those of the study, None where it shows none.
+    ``reconnect`` opens a device or video that failed again, with the servo at zero force; it may take minutes.
+    """
+
+    session: Session
+    key: Mapping[str, Mapping[str, str]] = field(repr=False)
+    language: str
+    servo: Servo
+    journal: WatchedJournal
+    clock: Callable[[], float]
+    aim_m: Callable[[], tuple[float, float, float]]
+    recorder: Recorder | None = None
+    outlets: Outlets | None = None
+    start: Start = FIRST
+    secret: bytes = field(default=b"", repr=False)
+    point_to: Callable[[float, float, float], None] | None = None
+    press: Callable[[int], None] | None = None
+    hand_for: Callable[[Page], Hand | None] | None = None
+    reconnect: Callable[[], dict[str, Any]] | None = None
+    videos: Videos | None = None
+
+
 class SessionBridge(QObject):
     """Runs one session in two windows.
 
     ``done`` comes once, when the session is over and its windows may go; ``diagnose_asked`` when the operator wants to
     know what is wrong with the device: the force is off and the session paused by then.
+
+    ``forces`` is None, and no force is looked at, in a double-blind study.
 
     Parameters
     ----------
@@ -106,7 +177,11 @@ class SessionBridge(QObject):
         self.operator = operator
         self.strip = participant.strip if isinstance(participant.strip, Strip) else None
         self._called = False
-        self.monitor = OperatorMonitor(parts, refresh_hz)
+        study = parts.session.protocol
+        self.health = ServoHealth(parts.servo.rate_hz, refresh_hz)
+        self.forces = Forces(study.device.force_limit_n) if study.study.blinding == "single" else None
+        self._samples = parts.servo.telemetry.reader()
+        self._faulty, self._faults = False, 0
         self.trouble = ""
         self.failure: BaseException | None = None
         ports = Ports(parts.servo, parts.journal, self.present, parts.clock, parts.recorder)
@@ -118,7 +193,8 @@ class SessionBridge(QObject):
         self.runner = Runner(
             parts.session.protocol, parts.session.schedule, parts.key, ports, parts.language, parts.start, parts.secret
         )
-        self.reconnection = None if parts.reconnect is None else Reconnection(parts.reconnect)
+        self.reconnecting = Background(self)
+        self._reconnection = ""  # what is being done to connect the device again, or why it failed
         self._hand: Hand | None = None
         self._gone = False
         self._stalled: str | None = None
@@ -138,9 +214,8 @@ class SessionBridge(QObject):
     def _connect(self) -> None:
         operator, participant = self.operator, self.participant
         operator.asked.connect(self._asked)
-        if self.reconnection is not None:
-            self.reconnection.connected.connect(self._reconnected)
-            self.reconnection.failed.connect(self._not_reconnected)
+        self.reconnecting.done.connect(self._reconnected)
+        self.reconnecting.failed.connect(self._not_reconnected)
         operator.escape.leave_to(participant)
         participant.event.connect(self._event)
         participant.left.connect(operator.come_forward)
@@ -166,7 +241,7 @@ class SessionBridge(QObject):
         if tank is not None and videos is not None:
             videos.fit(*tank.video.size(tank.devicePixelRatioF()))
         if not isinstance(page, TaskPage):
-            self.monitor.health.frames_rest()
+            self.health.frames_rest()
 
     def start(self) -> None:
         self.uncaught.install()
@@ -264,32 +339,45 @@ class SessionBridge(QObject):
         view = self.runner.view(self.parts.servo.now_ns())
         if view is not None:
             self.participant.show_view(view)
-        self.monitor.look()
+        self._look()
         now_s = self._now()
         if view is not None and self._hand is not None and self._hand.act(now_s, view):
             self._post(Continue(now_s))
+
+    def _look(self) -> None:
+        self._count_faults()
+        samples = self._samples.read()
+        self.health.take(samples)
+        if self.forces is not None:
+            self.forces.take(samples)
+        self.health.hand(self._now(), self.parts.aim_m())
+
+    def _count_faults(self) -> None:
+        faulty = self.parts.servo.fault is not None
+        self._faults += faulty and not self._faulty
+        self._faulty = faulty
 
     @guarded_session_slot
     def _painted(self, sample_ns: int) -> None:
         """Keep when a frame was painted; on the servo's clock, which is not every system's monotonic one."""
         painted_ns = self.parts.servo.now_ns()
         self.runner.frame_shown(painted_ns, sample_ns)
-        self.monitor.health.frame(painted_ns)
+        self.health.frame(painted_ns)
 
     @guarded_session_slot
     def show_traces(self) -> None:
-        self.operator.show_traces(self.monitor.health, self._now())
+        self.operator.show_traces(self.health, self._now())
 
     @guarded_session_slot
     def show_forces(self) -> None:
         """Draw the newest forces, where the operator may see them."""
-        if self.monitor.forces is not None:
-            self.operator.show_forces(self.monitor.forces, self.parts.servo.now_ns())
+        if self.forces is not None:
+            self.operator.show_forces(self.forces, self.parts.servo.now_ns())
 
     @guarded_session_slot
     def show_tiles(self) -> None:
-        self.monitor.health.overruns = self.parts.servo.overruns
-        self.operator.show_lateness(self.monitor.health)
+        self.health.overruns = self.parts.servo.overruns
+        self.operator.show_lateness(self.health)
         self._show()
 
     def _changed(self) -> None:
@@ -319,11 +407,28 @@ class SessionBridge(QObject):
             self._called = view.state == "trouble"
 
     def view(self) -> OperatorView:
-        trouble = (self.parts.journal.progress.broke and self.runner.cause) or self.trouble
-        view, again = self.monitor.view(trouble, self.runner.stalled), self.reconnection
-        if again is None or not self.runner.state.lost_device:
+        parts, stalled = self.parts, self.runner.stalled
+        self._count_faults()
+        trouble = (parts.journal.progress.broke and self.runner.cause) or self.trouble
+        view = operator_view(
+            parts.session,
+            parts.journal.progress,
+            self.health.vitals(),
+            now_s=self._now(),
+            force_on=parts.servo.force_is_on,
+            trouble=trouble or parts.servo.fault or stalled or "",
+            waits=stalled is not None and not trouble,
+            device_ready=not self._faulty,
+            faults=self._faults,
+            rate_hz=parts.servo.rate_hz,
+            forces=None if self.forces is None else self.forces.figures(),
+            lost={one.trial: one.reason for one in parts.recorder.lost} if parts.recorder is not None else {},
+            dropped=parts.recorder.dropped if parts.recorder is not None else 0,
+            outlets_lost=None if parts.outlets is None else parts.outlets.lost,
+        )
+        if parts.reconnect is None or not self.runner.state.lost_device:
             return view
-        return replace(view, may_reconnect=True, reconnects=again.under_way, reconnection=again.line)
+        return replace(view, may_reconnect=True, reconnects=self.reconnecting.busy, reconnection=self._reconnection)
 
     @guarded_session_slot
     def _event(self, event: Event) -> None:
@@ -379,8 +484,10 @@ class SessionBridge(QObject):
 
     def _reconnect(self) -> None:
         """Connect the device again, in the background; the force stays off until the operator resumes."""
-        if self.reconnection is not None and self.runner.state.lost_device:
-            self.reconnection.begin()
+        if self.parts.reconnect is not None and self.runner.state.lost_device:
+            if not self.reconnecting.busy:
+                self._reconnection = "Connecting the device …"
+                self.reconnecting.run(self.parts.reconnect)
             self._show()
 
     def record_note(self, text: str) -> None:
@@ -389,12 +496,13 @@ class SessionBridge(QObject):
             self._post(Note(self._now(), "note", text))
 
     def tell_of_device(self, line: str) -> None:
-        if self.reconnection is not None and self.reconnection.under_way:
-            self.reconnection.line = line
+        if self.reconnecting.busy:
+            self._reconnection = line
             self._show()
 
     @guarded_session_slot
     def _reconnected(self, described: dict[str, Any]) -> None:
+        self._reconnection = ""
         if isinstance(self.failure, DeviceError | ServoFault | VideoError):
             self.trouble, self.failure = "", None
         log.info("the device was reconnected")
@@ -402,6 +510,8 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def _not_reconnected(self, error: Exception) -> None:
+        why = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
+        self._reconnection = f"Not connected: {why}."
         log.warning("the device was not reconnected: %s", error, exc_info=_trace_of(error))
         self._show()
 

@@ -29,7 +29,6 @@ from study_app.errors import SessionError, StoreError, StudyError
 from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.kit.devices import described, screen_number, settings_here, text_scale_on
-from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.theme import Theme
 from study_app.gui.widgets.background import Background
 from study_app.protocol.load import parse
@@ -285,9 +284,7 @@ class LiveSession(QObject):
         name = self.chosen.device
         device = descriptor_of(name)
         if device.doctor is None:
-            notice = Question(self.bridge.operator, self.bridge.operator.theme, *NOT_EXAMINED)
-            notice.finished.connect(notice.deleteLater)
-            notice.show()
+            self.bridge.operator.show_message(*NOT_EXAMINED)
             return
         held = not device.simulated
         diagnosis(self.bridge.operator, self.bridge.operator.theme, name, self.settings, held=held).show()
@@ -378,8 +375,8 @@ class LiveSession(QObject):
 
     def _let_go(self) -> None:
         rig, self.rig = self.rig, None
-        reconnection = self.bridge.reconnection if self.bridge is not None else None
-        if reconnection is not None and not reconnection.wait(self.patience_s):  # it gives up now that this is closed
+        bridge = self.bridge
+        if bridge is not None and not bridge.reconnecting.wait(self.patience_s):  # it gives up now that this is closed
             rig = None  # its thread has it, at zero force, until the program ends
         store, self._store = self._store, None
         outlets, self._outlets = self._outlets, None

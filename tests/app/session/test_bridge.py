@@ -176,7 +176,7 @@ def test_the_operator_sees_forces_in_a_single_blind_study_alone_and_the_particip
             assert len(bridge.operator.position.plot.curves[0].getData()[0]) > 0
         else:
             assert not hasattr(card, "plot")
-            assert bridge.monitor.forces is None
+            assert bridge.forces is None
         assert bridge.participant.widget.geometry().top() == 0, "without a strip"
         assert bridge.operator.header.page.isHidden()
         seen.append((repr(bridge.participant.page), bridge.participant.grab().toImage()))

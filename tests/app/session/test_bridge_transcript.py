@@ -85,7 +85,7 @@ def fail(error: Exception) -> Any:
 
 def reconnected(bridge: Any, world: World) -> None:
     world.fault = None
-    assert bridge.reconnection.wait()
+    assert bridge.reconnecting.wait(20)
     QApplication.sendPostedEvents(None, QEvent.Type.MetaCall)
 
 
@@ -120,7 +120,7 @@ STEPS: dict[str, Any] = {
     "reconnect": ask("reconnect"),
     "line": lambda bridge, _: bridge.tell_of_device("press the button"),
     "reconnected": reconnected,
-    "not reconnected": lambda bridge, _: bridge.reconnection.failed.emit(DeviceNotFound("still none")),
+    "not reconnected": lambda bridge, _: bridge.reconnecting.failed.emit(DeviceNotFound("still none")),
     "late": let(overruns=3, rate_hz=900.0, worst_gap_s=0.004),
     "withdraw": ask("end", "withdrawn", "felt unwell"),
     "abort": ask("end", "aborted", "broken"),

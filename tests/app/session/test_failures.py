@@ -264,7 +264,7 @@ def lost(make, world, device):
 
 
 def settled(bridge, qtbot):
-    qtbot.waitUntil(lambda: not bridge.reconnection.under_way)
+    qtbot.waitUntil(lambda: not bridge.reconnecting.busy)
 
 
 def test_a_session_that_ends_meanwhile_stays_ended(lost, device, world, qtbot):
