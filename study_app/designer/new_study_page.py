@@ -406,12 +406,10 @@ class Picture(QWidget):
 class TemplateButton(Themed, QAbstractButton):
     """One thing to begin from: its picture or icon, title, description and figures.
 
-    ``came`` is emitted when it gets the keyboard; it says whether by a click. ``passed`` asks for the card after it or,
-    by -1, before it.
+    ``came`` is emitted when it gets the keyboard; it says whether by a click.
     """
 
     came = Signal(bool)
-    passed = Signal(int)
 
     def __init__(self, choice: TemplateChoice) -> None:
         super().__init__()
@@ -456,12 +454,6 @@ class TemplateButton(Themed, QAbstractButton):
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self.came.emit(event.reason() == Qt.FocusReason.MouseFocusReason)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
-            self.passed.emit(1 if event.key() == Qt.Key.Key_Right else -1)
-        else:
-            super().keyPressEvent(event)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t, painter = self.theme, smooth_painter(self)
@@ -783,7 +775,6 @@ class NewStudyPage(Themed, QWidget):
             for at, choice in enumerate(one for one in choices if one.copy == copies):
                 made = TemplateButton(choice)
                 made.came.connect(partial(self._come, made))
-                made.passed.connect(partial(self._pass, made))
                 self._group.addButton(made)
                 grid.addWidget(made, at // columns, at % columns)
                 self.buttons.append(made)
@@ -806,12 +797,6 @@ class NewStudyPage(Themed, QWidget):
             (last_focused(self.card) or self.card.questions.title).setFocus()
         else:
             self.area.ensureWidgetVisible(button)
-
-    def _pass(self, button: TemplateButton, by: int) -> None:
-        to = self.buttons.index(button) + by
-        if 0 <= to < len(self.buttons):
-            self.buttons[to].setChecked(True)
-            self.buttons[to].setFocus(Qt.FocusReason.OtherFocusReason)
 
     def refuse(self, sentence: str, free: str = "") -> None:
         self.card.refusal.show_refusal(sentence, free)

@@ -415,7 +415,7 @@ class RowPainter(QStyledItemDelegate):
                 painter.setBrush(Qt.BrushStyle.NoBrush)
                 painter.drawRoundedRect(place.adjusted(1, 2, -1, -2), RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
         x = sign_right(row) - INDENT
-        if dragged_by(index) and self.movable and (chosen or pointed):
+        if row.step and self.movable and (chosen or pointed):
             paint_grip(painter, QRectF(x - 8, place.top(), 8, place.height()), t.text2)
         if self.tree.model().hasChildren(index):
             chevron = "chevron_down" if self.tree.isExpanded(index) else "chevron"
@@ -461,17 +461,11 @@ LINE_PX = 2.0
 EDGE_PX = 24
 
 
-def dragged_by(index: Index) -> ElementPath:
-    """Return what is dragged by a row: its entry in a list, or a questionnaire among the parts, into the session."""
-    row, above = index.data(ROW_ROLE), index.parent().data(ROW_ROLE)
-    return row.step or (row.path if above is not None and above.path == (QUESTIONNAIRES,) else ())
-
-
 class Tree(Themed, QTreeView):
     """The rows.
 
-    Signals: ``entered_row`` (by Enter), ``dropped`` (an entry of a list, or an element, and the place of the entry that
-    it comes before). Its menu shows its actions.
+    Signals: ``entered_row`` (by Enter), ``dropped`` (an entry of a list, and the place of the entry that it comes
+    before). Its menu shows its actions.
     """
 
     entered_row = Signal()
@@ -515,8 +509,8 @@ class Tree(Themed, QTreeView):
         arrow = row is not None and self.model().hasChildren(index) and event.position().x() < sign_right(row)
         self.arrow_pressed = arrow
         plain = event.button() == Qt.MouseButton.LeftButton and not event.modifiers()
-        if plain and row is not None and (drags := dragged_by(index)) and self.rows.movable:
-            self._pressed = (event.position().toPoint(), drags)
+        if plain and row is not None and row.step and self.rows.movable:
+            self._pressed = (event.position().toPoint(), row.step)
         super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
@@ -549,26 +543,20 @@ class Tree(Themed, QTreeView):
         self.viewport().update()
 
     def _target(self, at: QPoint) -> tuple[ElementPath, float] | None:
-        """Return the place of the entry that comes next where the line is, and how far down the line is.
-
-        What is no step yet comes into the session alone, not where the pointer is far from it.
-        """
-        place = self.dragged[:-1] if isinstance(self.dragged[-1], int) else None
+        """Return the place of the entry that comes next where the line is, and how far down the line is."""
+        place = self.dragged[:-1]
         found: list[tuple[ElementPath, float]] = []
-        ends: dict[ElementPath, tuple[ElementPath, float]] = {}
-        last: ElementPath = ()
+        end: tuple[ElementPath, float] | None = None
         index = self.model().index(0, 0)
         while index.isValid():
             row, box = index.data(ROW_ROLE), QRectF(self.visualRect(index))
-            if row.step and (row.step[:-1] == place or (place is None and "items" not in row.step)):
-                last = row.step[:-1]
+            if row.step and row.step[:-1] == place:
                 found.append((row.step, box.top()))
-                ends[last] = (*last, int(row.step[-1]) + 1), box.bottom()
-            elif last and row.path and self._below(index, last):
-                ends[last] = ends[last][0], box.bottom()
+                end = (*place, int(row.step[-1]) + 1), box.bottom()
+            elif end is not None and row.path and self._below(index, place):
+                end = end[0], box.bottom()
             index = self.indexBelow(index)
-        best = min((*found, *ends.values()), key=lambda one: abs(one[1] - at.y()), default=None)
-        return None if best is None or (place is None and abs(best[1] - at.y()) > ROW_PX) else best
+        return min((*found, *([end] if end else ())), key=lambda one: abs(one[1] - at.y()), default=None)
 
     def _below(self, index: QModelIndex, place: ElementPath) -> bool:
         """Return whether a row is shown below an entry of a list."""

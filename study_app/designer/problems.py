@@ -1,7 +1,7 @@
 """The problems of a study, as ``check`` prints them, with their repairs: found, listed, and pressed."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
@@ -22,14 +22,13 @@ from study_app.gui.theme.themed import Coloured, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
-from study_app.gui.widgets.labels import Clamped, Elided, Ink, label
+from study_app.gui.widgets.labels import Clamped, Elided, label
 from study_app.number_text import capitalised
 from study_app.protocol.source.document import Path, names, places_of
 from study_app.protocol.source.problems import Fault
 
 _PLACE: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
 """The place in the file that a warning begins with."""
-_NUMBERS: Final = re.compile(r"[-\u2212]?\d+(?:[.,\u2009]\d+)*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,23 +50,6 @@ class ProblemRow:
     def place(self) -> str:
         """Its place in the file, such as ``blocks.liquids.order · line 385``."""
         return place_words(self.fault.path, self.line)
-
-    @property
-    def kind(self) -> tuple[bool, Path, str]:
-        """What stays the same while the numbers in its sentence change, and what helps."""
-        return self.warning, self.fault.path, _NUMBERS.sub("", self.message.split(": ")[0])
-
-
-def followed(before: Sequence[ProblemRow], now: Iterable[ProblemRow]) -> list[ProblemRow | None]:
-    """Return what each problem is now: of the same words, else the same but for its numbers; None: it is solved."""
-    rest, found = list(now), dict[int, ProblemRow]()
-    for exact in (True, False):
-        for at, row in enumerate(before):
-            same = (one for one in rest if one.kind == row.kind and (one.message == row.message or not exact))
-            if at not in found and (match := next(same, None)) is not None:
-                found[at] = match
-                rest.remove(match)
-    return [found.get(at) for at in range(len(before))]
 
 
 @lru_cache(maxsize=2)
@@ -181,12 +163,12 @@ class RepairButton(ActionButton):
         self.setProperty("dense", "true")
         self.setFont(font("label"))
         self.by_keys = False
-        self.offer(problem, words)
-
-    def offer(self, problem: ProblemRow, words: str) -> None:
         self.problem = problem
+        self.offer(words)
+
+    def offer(self, words: str) -> None:
         self.show_action("", words)
-        self.setAccessibleName(f"{words}: {problem.name}")
+        self.setAccessibleName(f"{words}: {self.problem.name}")
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
@@ -253,39 +235,26 @@ class ProblemLine(Coloured, QWidget):
         self._place = Elided("small", "text2")
         self._place.setFixedWidth(self.go.width())
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.mark = Icon("warning", "warn" if row.warning else "bad", 18)
-        signs = self.mark, Icon(row.icon, "text2", 18)
-        self.said, self._hint = Clamped(row.message, 2, "label", steady=False), Elided("small", "text2")
+        signs = Icon("warning", "warn" if row.warning else "bad", 18), Icon(row.icon, "text2", 18)
+        said, hint = Clamped(row.message, 2, "label", steady=False), Elided("small", "text2")
         buttons = QWidget()
         buttons.setMinimumWidth(NARROW_REPAIR_PX if narrow else REPAIR_PX)
         self._repairs = hbox(STRETCH, spacing=6, margins=0, parent=buttons)
-        parts = (*signs, _column(self.go, self._place), (_column(self.said, self._hint), 1), buttons)
+        parts = (*signs, _column(self.go, self._place), (_column(said, hint), 1), buttons)
         hbox(*parts, spacing=10, margins=(10, 2, 6, 2), parent=self)
         self.repairs: list[RepairButton] = []
         self.show_repairs(repairs)
-        self.follow(row)
-
-    def follow(self, row: ProblemRow | None) -> None:
-        """Stand for the same problem of the study as it is now; None: it is solved."""
-        if row is not None:
-            self.row = row
-            self.go.setAccessibleName(f"{row.name}: {row.message}")
-            elided = self.go.fontMetrics().elidedText(row.name, Qt.TextElideMode.ElideRight, self.go.width() - 4)
-            self.go.setText(elided)
-            self._place.show_text(row.place)
-            self.said.show_text(row.message)
-            self._hint.show_text(row.hint)
-            self._hint.setVisible(bool(row.hint))
-            self.setToolTip("\n".join(filter(None, (row.name, row.message, row.hint))))
-            for button in self.repairs:
-                button.offer(row, button.text())
-        self.setEnabled(row is not None)
-        ink: Ink = "ok" if row is None else "warn" if row.warning else "bad"
-        self.mark.show_icon("check" if row is None else "warning", ink)
+        self.go.setAccessibleName(f"{row.name}: {row.message}")
+        elided = self.go.fontMetrics().elidedText(row.name, Qt.TextElideMode.ElideRight, self.go.width() - 4)
+        self.go.setText(elided)
+        self._place.show_text(row.place)
+        hint.show_text(row.hint)
+        hint.setVisible(bool(row.hint))
+        self.setToolTip("\n".join(filter(None, (row.name, row.message, row.hint))))
 
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
         for button, words in zip(self.repairs, repairs, strict=False):
-            button.offer(self.row, words)
+            button.offer(words)
         for words in repairs[len(self.repairs) : 2]:
             made = RepairButton(self.row, words)
             made.clicked.connect(lambda _checked=False, made=made: self.repair_asked.emit(made.text()))
@@ -373,8 +342,6 @@ class ProblemsCard(Card):
         rows = self.rows
         if closes and not rows and not self.under_pointer:
             self.hide()
-        if self.at is not None:
-            self.at = followed([self.at], rows)[0] or self.at
         counts = ((len(self.problems), "problem"), (len(self._warnings), "warning"))
         counted = [f"{count} {word}{'s' * (count != 1)}" for count, word in counts if count]
         self.heading.setText(", ".join(counted) or "No problems")
@@ -385,9 +352,9 @@ class ProblemsCard(Card):
         self.setFixedHeight(max(wanted, self.height()) if self.under_pointer else wanted)
         if listed == self._listed:
             return
-        if self.under_pointer and self.lines:  # no line moves: solved ones are marked, others come when it leaves
-            for line, now in zip(self.lines, followed([line.row for line in self.lines], listed), strict=True):
-                line.follow(now)
+        if self.under_pointer and self.lines:  # no line moves: others are disabled or come when it leaves
+            for line in self.lines:
+                line.setEnabled(line.row in listed)
             return
         self._listed = listed
         inside = QWidget()

@@ -123,7 +123,7 @@ def test_measures_and_the_page_of_a_new_study_fit(
         designer.go_to(*path)
         designer.controller.measures.show()
         assert measures.shown is not None
-        assert fits(measures.area), path
+        assert fits(measures), path
         assert not nameless(measures), path
     assert (designer.window.width(), designer.window.height()) == size
     assert not windows

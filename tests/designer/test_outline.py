@@ -1,4 +1,4 @@
-"""The outline and the lists in their window: dragged, clicked, several at once, by keys and by the menu."""
+"""The outline and the lists in their window: dragged and clicked."""
 
 from typing import Any
 
@@ -9,7 +9,6 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 from shiboken6 import isValid
 
-from study_app.designer.document.steps import AddInstrument
 from study_app.designer.outline import ROW_ROLE
 from study_app.protocol.source.files import shipped
 from study_app.store.study_settings import begin_settings
@@ -69,43 +68,6 @@ def test_a_row_is_dragged_to_where_the_line_is_and_esc_cancels(qtbot: Any, desig
     assert sequence(designer) == (*before[1:3], before[0], *before[3:])
     designer.editing.undo()
     assert designer.text == text
-
-
-TLX = ("questionnaires", "nasa_tlx")
-
-
-@pytest.fixture
-def with_form(designer: Any) -> Any:
-    """The study with a standard questionnaire that no step asks."""
-    designer.change(("format = 1", "format = 2"))
-    designer.open()
-    designer.editing.ask(AddInstrument("nasa-tlx"))
-    designer.controller.show_outline()
-    return designer
-
-
-def test_a_questionnaire_is_dragged_into_the_session(qtbot: Any, with_form: Any) -> None:
-    tree, before = with_form.place.outline.tree, with_form.text
-    start = place_of(with_form, *TLX)
-    drag(qtbot, with_form, start, start + QPoint(0, 30))
-    assert with_form.text == before  # far from the session
-    qtbot.mousePress(tree.viewport(), LEFT, pos=start)
-    event_move(tree.viewport(), start - QPoint(0, 20))
-    tree.verticalScrollBar().setValue(0)
-    thanks = tree.visualRect(with_form.index("pages", "thanks")).center()
-    event_move(tree.viewport(), thanks - QPoint(0, 12))
-    qtbot.mouseRelease(tree.viewport(), LEFT, pos=thanks)
-    assert list(sequence(with_form)) == ["welcome", "liquids", "reaching", "delays", "nasa_tlx", "thanks"]
-    with_form.editing.undo()
-    assert with_form.text == before
-
-
-def test_a_small_drag_of_a_questionnaire_in_its_block_adds_no_step(qtbot: Any, designer: Any) -> None:
-    designer.open()
-    before = sequence(designer)
-    at = place_of(designer, "questionnaires", "liquid")
-    drag(qtbot, designer, at, at + QPoint(6, 5))
-    assert sequence(designer) == before
 
 
 def _thing(designer: Any, at: int) -> tuple[str, str]:

@@ -403,11 +403,10 @@ def repairs(record: Record) -> None:
     record.ask(RetypeFile(text.replace("delay_ms = 0", 'delay_ms = "a"', 1).replace("min_s = 5 ", 'min_s = "a" ')))
     record.play("ctrl+1 ctrl+4")
     record.note("pointer over it", lambda: pointer(QEnterEvent(QPointF(5, 5), QPointF(5, 5), QPointF(5, 5))))
-    record.ask(SetValue(("device", "force_limit_n"), 70))
     record.note("repair", lambda: designer.click_on(next(line for line in problems.lines if line.repairs).repairs[0]))
     record.ask(SetValue(VERSION, 3))
     record.note("pointer away", lambda: pointer(QEvent(QEvent.Type.Leave)))
-    record.play("ctrl+z ctrl+z ctrl+z ctrl+1 F8 Return Return F8")
+    record.play("ctrl+z ctrl+z ctrl+1 F8 Return Return F8")
     text = DEMO.replace('languages = ["en"]', 'languages = ["en", "nl"]').replace(
         'title = "Liquids"', 'title.en = "Liquids"'
     )

@@ -23,8 +23,6 @@ from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
 
 Document = Mapping[str, Any]
 ITEMS = "items"
-_BESIDE = {"sequence", "groups", "analysis"}
-"""Tables that name elements without presenting them."""
 _MAY_LEAVE_OUT = (("blocks", "task"), ("stimuli", "condition"))
 """Sections whose tables may leave a key out, which then stands for the only table that it may name."""
 
@@ -47,19 +45,6 @@ def named_at(document: Document, place: Path) -> Path | None:
 def references_to(document: Document, thing: Path) -> tuple[Path, ...]:
     """Return the places of the texts that name a table, as ``("liquids", "water")``, or an item."""
     return tuple(place for place, named in named_places(document) if named == thing)
-
-
-def blocks_using(document: Document, element: Path) -> tuple[str, ...]:
-    """Return the blocks that use an element: themselves, or by a condition, stimulus, questionnaire that names it."""
-    naming: dict[Path, list[Path]] = {}
-    for place, named in uses(document):
-        naming.setdefault(named[:2], []).append(place[:2])
-    around = [element[:2]]
-    for inner in around:  # grows while it is read
-        if inner[0] != "blocks":
-            around += [one for one in naming.get(inner, ()) if one not in around and one[0] not in _BESIDE]
-    users = {name for section, *rest in around if section == "blocks" for name in rest}
-    return tuple(name for name in names(document, "blocks") if name in users)
 
 
 def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:

@@ -8,13 +8,12 @@ from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
-from study_app.designer.place.segments import cut_text, small_button
+from study_app.designer.place.segments import cut_text
 from study_app.gui.theme.theme import Tone, font
 from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, insert_layout, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule, fill_rounded, smooth_painter
-from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
 from study_app.protocol.source.document import Path
 
@@ -94,16 +93,7 @@ class Table:
     counts: tuple[tuple[int, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Link:
-    """A state with a button that opens an element."""
-
-    verdict: Verdict
-    action: str
-    path: Path
-
-
-Part: TypeAlias = Verdict | Figures | Segments | Lines | tuple[Table, ...] | Link | str | None
+Part: TypeAlias = Verdict | Figures | Segments | Lines | tuple[Table, ...] | str | None
 """What is on a card, one below the other; None is a rule."""
 
 
@@ -225,13 +215,12 @@ class Strip(Themed, QWidget):
 
 
 class CardWidget(Card):
-    """Shows a card; ``opens`` is called with the path of an element whose button or step is clicked."""
+    """Shows a card; ``opens`` is called with the path of an element whose step is clicked."""
 
     def __init__(self, shown: MeasureCard, opens: Callable[[Path], None]) -> None:
         self.aside = cut_text(shown.aside, "small", "text2", right=True)
         super().__init__(shown.title, self.aside, padding=16, gap=8)
         self.shown, self.opens = shown, opens
-        self.buttons: list[ActionButton] = []
         self.setAccessibleName(shown.title)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)  # columns are equally wide
         add_parts(self.column, *map(self._part, shown.parts), STRETCH)
@@ -274,12 +263,6 @@ class CardWidget(Card):
                     note.setAlignment(Qt.AlignmentFlag.AlignRight)
                 notes.addWidget(note)
             vbox(Strip(part.segments, self.opens), notes, spacing=8, margins=0, parent=made)
-        elif isinstance(part, Link):
-            button = small_button("", part.action, height=32)
-            button.setAccessibleName(f"{part.action}: {part.verdict[2]}")
-            button.clicked.connect(lambda: self.opens(part.path))
-            self.buttons.append(button)
-            hbox((verdict_line(part.verdict), 1, Qt.AlignmentFlag.AlignVCenter), button, margins=0, parent=made)
         elif isinstance(part[0], Table):
             tables = ((_table(one), 0, Qt.AlignmentFlag.AlignTop) for one in part if isinstance(one, Table))
             hbox(*tables, STRETCH, spacing=18, margins=0, parent=made)

@@ -186,62 +186,76 @@ def clipped_sentence(of: LevelBlock) -> str:
     return said or clipped_unpaced(of.protocol, [of.block]) or ""
 
 
-class MeasuresPage(Themed, QWidget):
-    """Draws a `MeasuresView`; plots are made when a block with a method is first shown."""
+class MeasureCards(QScrollArea):
+    """Draws numbers and cards of a `MeasuresView`; ``open_asked`` carries an element's path.
+
+    While they are hidden, the last ones are kept; ``appeared`` comes when they are shown.
+    """
+
+    open_asked = Signal(object)
+    appeared = Signal()
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.setAccessibleName(name)
+        self.setWidgetResizable(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.shown: MeasuresView | None = None
+        self.numbers, self.grid = NumbersRow(), CardGrid(self.open_asked.emit)
+        self.numbers.hide()
+        self.earlier = label(EARLIER, "small", "warn", wraps=True)
+        self.earlier.hide()
+        inside = QWidget()
+        inside.setObjectName("earlier")
+        self.column = vbox(self.earlier, self.numbers, (self.grid, 1), spacing=8, margins=0, parent=inside)
+        self.setWidget(inside)
+
+    def show_measures(self, shown: MeasuresView) -> None:
+        self.shown = shown
+        if self.isVisible():
+            self.show_parts(shown)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if self.shown is not None:
+            self.show_parts(self.shown)
+        self.appeared.emit()
+
+    def show_parts(self, shown: MeasuresView) -> None:
+        self.earlier.setVisible(shown.earlier)
+        for part in self.widget().findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
+            part.setEnabled(part is self.earlier or not shown.earlier)
+        self.numbers.show_numbers(shown.numbers, shown.simulated.waiting)
+
+
+class MeasuresPage(MeasureCards):
+    """The tab; plots are made when a block with a method is first shown."""
 
     repair_asked = Signal(object, str)
-    open_asked = Signal(object)
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setAccessibleName("Measures")
-        self.shown: MeasuresView | None = None
+        super().__init__("Measures")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.controls = MeasureControls()
-        self.numbers = NumbersRow()
-        self.numbers.hide()
         self.function: PlotCard | None = None
         self.track: PlotCard | None = None
         self.forces: ForcesCard | None = None
-        self.blocks, self.grid = CardGrid(self.open_asked.emit), CardGrid(self.open_asked.emit)
-        self._inside = QWidget()
+        self.hypotheses = CardGrid(self.open_asked.emit)
         self.curves = QWidget()
         self.plots = hbox(spacing=8, margins=0, parent=self.curves)
         self.curves.setMaximumHeight(HIGHEST_PX)
-        parts = (self.blocks, self.numbers, (self.curves, 3), (self.grid, 1), STRETCH)
-        self.column = vbox(*parts, spacing=8, margins=0, parent=self._inside)
-        self.area = QScrollArea()
-        self.area.setWidgetResizable(True)
-        self.area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.area.setAccessibleName("Measures")
-        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.area.setWidget(self._inside)
-        self._inside.setObjectName("earlier")
-        self.earlier = label(EARLIER, "label", "warn", wraps=True)
-        self.earlier.hide()
-        vbox(self.earlier, self.area, margins=0, parent=self)
-        self.setFocusProxy(self.area)
+        self.column.insertWidget(1, self.hypotheses)
+        self.column.insertWidget(3, self.curves, 3)
+        self.column.addStretch()
 
     def show_measures(self, shown: MeasuresView) -> None:
-        """Show other measures; while the page is hidden they are kept for later."""
-        self.shown = shown
         self.controls.show_values(shown.controls, shown.words)
-        if self.isVisible():
-            self._show()
+        super().show_measures(shown)
 
-    def showEvent(self, event: object) -> None:
-        super().showEvent(event)  # type: ignore[arg-type]
-        self._show()
-
-    def _show(self) -> None:
-        shown = self.shown
-        if shown is None:
-            return
-        self.earlier.setVisible(shown.earlier)
-        self._inside.setEnabled(not shown.earlier)
-        above = tuple(one for one in (shown.hypotheses, shown.blocks) if one is not None)
-        self.blocks.setVisible(bool(above))
-        self.blocks.show_cards(above)
-        self.numbers.show_numbers(shown.numbers, shown.simulated.waiting)
+    def show_parts(self, shown: MeasuresView) -> None:
+        super().show_parts(shown)
+        self.hypotheses.setVisible(shown.hypotheses is not None)
+        self.hypotheses.show_cards(() if shown.hypotheses is None else (shown.hypotheses,))
         self.curves.setVisible(bool(shown.numbers))
         of = shown.levels
         if of is not None and self.forces is None:
@@ -268,31 +282,15 @@ class MeasuresPage(Themed, QWidget):
             self.plots.addWidget(card, 1)
         self.forces.setMinimumHeight(FORCES_PX)
         self.forces.setMaximumHeight(HIGHEST_PX)
-        self.column.insertWidget(3, self.forces, 2)
+        self.column.insertWidget(4, self.forces, 2)
 
 
-class FactsRow(QScrollArea):
-    """Draws the cards of a `MeasuresView` that stay below other tabs; ``open_asked`` carries an element's path."""
-
-    open_asked = Signal(object)
-    appeared = Signal()
+class FactsRow(MeasureCards):
+    """The cards that stay below other tabs."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setAccessibleName("Facts")
+        super().__init__("Facts")
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.setWidgetResizable(True)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.shown: MeasuresView | None = None
-        self.numbers = NumbersRow()
-        self.numbers.hide()
-        self.grid = CardGrid(self.open_asked.emit)
-        self.earlier = label(EARLIER, "small", "warn", wraps=True)
-        self.earlier.hide()
-        inside = QWidget()
-        inside.setObjectName("earlier")
-        self._inside = vbox(self.earlier, self.numbers, (self.grid, 1), spacing=8, margins=0, parent=inside)
-        self.setWidget(inside)
         self._window_px = self._left_px = 0
         self.make_room(0, 0)
 
@@ -301,21 +299,9 @@ class FactsRow(QScrollArea):
         self._window_px, self._left_px = window_px, left_px
         most = FACTS_MOST if window_px >= HIGH_FROM else max(FACTS_LEAST, round(FACTS_SHARE * window_px))
         most = left_px if left_px > 0 else most
-        needed = max(
-            self._inside.totalHeightForWidth(self.viewport().width()), self._inside.totalMinimumSize().height()
-        )
+        column = self.column
+        needed = max(column.totalHeightForWidth(self.viewport().width()), column.totalMinimumSize().height())
         self.setFixedHeight(min(most, needed + 2 * self.frameWidth()) if self.grid.cards else most)
-
-    def show_measures(self, shown: MeasuresView) -> None:
-        """Show other numbers; while the cards are hidden they are kept for later."""
-        self.shown = shown
-        if self.isVisible():
-            self._show()
-
-    def showEvent(self, event: QShowEvent) -> None:
-        super().showEvent(event)
-        self._show()
-        self.appeared.emit()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         handled = super().eventFilter(watched, event)
@@ -323,11 +309,7 @@ class FactsRow(QScrollArea):
             self.make_room(self._window_px, self._left_px)
         return handled
 
-    def _show(self) -> None:
-        if self.shown is not None:
-            self.earlier.setVisible(self.shown.earlier)
-            for part in (self.numbers, self.grid):
-                part.setEnabled(not self.shown.earlier)
-            self.numbers.show_numbers(self.shown.numbers, self.shown.simulated.waiting)
-            self.grid.show_cards(self.shown.below)
-            self.make_room(self._window_px, self._left_px)
+    def show_parts(self, shown: MeasuresView) -> None:
+        super().show_parts(shown)
+        self.grid.show_cards(shown.below)
+        self.make_room(self._window_px, self._left_px)

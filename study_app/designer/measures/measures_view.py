@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from study_app.designer.document.elements import SEQUENCE, title_of
-from study_app.designer.document.fields import blocks_using, languages_of
+from study_app.designer.document.fields import languages_of
 from study_app.designer.document.study import Study
 from study_app.designer.measures.cards import (  # fmt: skip
     NARROW_CODES,
@@ -13,7 +13,6 @@ from study_app.designer.measures.cards import (  # fmt: skip
     Figures,
     Line,
     Lines,
-    Link,
     MeasureCard,
     NumberCard,
     Part,
@@ -62,8 +61,7 @@ class MeasuresView:
 
     ``words`` are those of the levels where observers are simulated, ``levels`` those whose forces are drawn, and
     ``problems`` theirs, each with the words of its repairs. ``hypotheses`` are those of the block, or of the
-    study; ``blocks`` says which use the element, where it is not one itself; ``earlier``: all is of the last study
-    without faults.
+    study; ``earlier``: all is of the last study without faults.
     """
 
     controls: Controls
@@ -74,7 +72,6 @@ class MeasuresView:
     problems: tuple[tuple[ProblemRow, tuple[str, ...]], ...] = ()
     cards: tuple[MeasureCard, ...] = ()
     hypotheses: MeasureCard | None = None
-    blocks: MeasureCard | None = None
     earlier: bool = False
 
     @property
@@ -104,7 +101,6 @@ def measures_view(
         cards = _cards(study, facts, path, focus, controls, simulated)
         return MeasuresView(controls, simulated=simulated, cards=tuple(cards), earlier=earlier)
     block, plan = focus.block, focus.plan
-    blocks = blocks_card(study, protocol, facts, path, "" if block is None else block.id)
     asked = hypotheses_card(protocol, path, controls, simulated)
     levels = None if block is None else level_block(protocol, block, forces=valid.forces)
     words = None if plan is None else LevelWords(plan.stimulus, plan.design)
@@ -116,7 +112,7 @@ def measures_view(
         cards = [session_card(study, facts, path)]
     else:
         numbers, cards = (), _cards(study, facts, path, focus, controls, simulated)
-    return MeasuresView(controls, words, numbers, levels, simulated, own, tuple(cards), asked, blocks, earlier)
+    return MeasuresView(controls, words, numbers, levels, simulated, own, tuple(cards), asked, earlier)
 
 
 def _cards(
@@ -273,27 +269,6 @@ def hypotheses_card(protocol: Protocol, path: Path, controls: Controls, simulate
     ]
     who = people(controls.participants, controls.planned)
     return MeasureCard("Hypotheses", who, tuple(("neutral", "flag", one) for one in said), wide=True) if said else None
-
-
-def blocks_card(study: Study, protocol: Protocol, facts: Facts, path: Path, shown: str) -> MeasureCard | None:
-    """Return the blocks that use an element that is not one of them; None where none does.
-
-    The study and its settings concern every block; ``shown`` is the block whose numbers are shown, "" for none.
-    """
-    if path[:1] == ("blocks",) and len(path) > 1:
-        return None
-    used = list(protocol.blocks) if len(path) < 2 else blocks_using(study.document, path)
-    links = []
-    for block in dict.fromkeys(one.id for one in protocol.blocks_in_order if one.id in used):
-        focus, lasts = focus_of(protocol, ("blocks", block)), facts.steps_s.get(block)
-        measured = "smallest differences" if focus.compares else ""
-        if focus.plan is not None:
-            measured = f"{LevelWords(focus.plan.stimulus, focus.plan.design).name}s"
-        known = (measured, "" if lasts is None else duration(lasts), "shown here" if block == shown else "")
-        words = f"Block {_title(study, block)}: {', '.join(filter(None, known))}"
-        links.append(Link(("neutral", "layers", words), "Open", ("blocks", block)))
-    title = "Blocks of the study" if len(path) < 2 else f"Blocks that use {title_of(study.document, path[:2])}"
-    return MeasureCard(title, "", tuple(links), wide=True) if links else None
 
 
 def _word(count: int | None, word: str) -> str:

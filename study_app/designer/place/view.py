@@ -10,7 +10,6 @@ from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QApplication, QSizePolicy, QStackedWidget, QWidget
 
 from study_app.designer.document.steps import (
-    AddToSession,
     Do,
     DuplicateElement,
     GoTo,
@@ -387,7 +386,7 @@ class FocusAreas:
         self._parts.show_side("pane")
         pane = self._parts.pane
         page = next(one for one in pane.pages if one.name == pane.tab)
-        (page.body.focusProxy() or pane.tabs).setFocus(SHORTCUT)
+        (page.body.focusProxy() or page.body).setFocus(SHORTCUT)
 
     def show_tab(self, name: str) -> None:
         self._parts.pane.show_tab(name)
@@ -537,7 +536,7 @@ class DesignerPlace(Place):
         outline.field_asked.connect(self.areas.focus_field)
         outline.form_asked.connect(self.areas.focus_form)
         outline.element_clicked.connect(lambda: self.areas.focus_form() if self.parts.drawer else None)
-        outline.tree.dropped.connect(self._drop)
+        outline.tree.dropped.connect(lambda entry, to: self.asked.emit(MoveTo(entry, index_of(to))))
         self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
         self.parts.path.open_asked.connect(partial(self.finish, "select"))
         form.asked.connect(self._take_asked)
@@ -577,10 +576,6 @@ class DesignerPlace(Place):
     def delete(self) -> None:
         if self.form.head.delete.isEnabled():
             self.finish("delete", self.form_path)
-
-    def _drop(self, dragged: ElementPath, to: ElementPath) -> None:
-        step = isinstance(dragged[-1], int)
-        self.asked.emit(MoveTo(dragged, index_of(to)) if step else AddToSession(dragged, (to,)))
 
     def move_by(self, by: int) -> None:
         if self.form_path and not self.view.header.read_only:
@@ -630,7 +625,7 @@ class DesignerPlace(Place):
         self.view, self.form.form = DesignerView(), None
         self.outline.begin()
         self.problems.begin()
-        self.measures.area.verticalScrollBar().setValue(0)
+        self.measures.verticalScrollBar().setValue(0)
 
     def show_new(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
         self.new_page.card.questions.clear()

@@ -48,7 +48,6 @@ def measures(view: MeasuresView) -> dict[str, Any]:
         "simulated": None if view.words is None else view.words.words(view.controls.threshold),
         "numbers": view.numbers,
         "cards": view.cards,
-        "blocks": view.blocks,
         "function": function_sentence(of.words, observed) if of is not None and observed is not None else "",
         "track": track_sentence(of.words, observed) if of is not None and observed is not None else "",
         "forces": "" if of is None else forces_sentence(of),

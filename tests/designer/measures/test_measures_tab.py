@@ -43,7 +43,7 @@ def test_the_hypothesis_comes_first_with_what_the_planned_participants_show(
     designer.go_to("sequence")
     designer.click_on(designer.field("analysis", "contrasts").add)
     designer.go_to(*path)
-    above = designer.place.measures.blocks
+    above = designer.place.measures.hypotheses
 
     def texts() -> list[str]:
         return [part.text() for part in above.findChildren(QLabel) if part.text()]
