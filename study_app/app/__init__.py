@@ -1,8 +1,8 @@
 """The composition root, where device, servo, store, session, analysis and windows meet.
 
 ``main_controller`` owns the main window and makes its places, two of which take long to load;
-``session.live_session`` runs one session from its request to the closed journal; ``session.entry`` begins or resumes
-one by command; read these first.
+``session.live_session`` begins or resumes a session and runs it to the closed journal, ``session.bridge`` between its
+two windows; read these first.
 """
 
 import gc
@@ -27,8 +27,7 @@ def _uncollected() -> Iterator[None]:
 
 
 with qt_imported(), _uncollected():
-    from study_app.app.session.entry import resume, run
-    from study_app.app.session.live_session import BUG, CANCELLED, LiveSession
+    from study_app.app.session.live_session import BUG, CANCELLED, LiveSession, resume, run
 
 
 def __getattr__(name: str) -> Any:

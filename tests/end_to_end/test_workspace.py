@@ -7,7 +7,7 @@ import pytest
 
 from study_app import workspace as workspaces
 from study_app.app.main_controller import MainController
-from study_app.app.session.entry import run
+from study_app.app.session.live_session import run
 from study_app.cli.options import keep_offered_workspace
 from study_app.errors import StoreError
 from study_app.gui.home.study_facts import sources, study_facts
@@ -169,7 +169,8 @@ def test_a_protocol_file_of_a_command_is_among_the_recent_ones_and_its_results_i
     start_folder(tmp_path / "start", monkeypatch)
     keep_workspace(Workspace(tmp_path / "kept"))
     held = []
-    monkeypatch.setattr("study_app.app.session.entry.run_session", lambda chosen, _progress: held.append(chosen) or 0)
+    run_session = "study_app.app.session.live_session.run_session"
+    monkeypatch.setattr(run_session, lambda chosen, _progress: held.append(chosen) or 0)
     Path("mine.toml").write_bytes(source_bytes("demo"))
     assert run("mine.toml", participant="P001") == 0
     assert held[0].results == tmp_path / "kept" / "results" / "demo"

@@ -25,8 +25,7 @@ from study_app.gui.preflight.window import PreflightView, PreflightWindow, plann
 from study_app.gui.results.figures import unblinded_words
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.settings import view as settings_view
-from study_app.gui.settings.display_test import DisplayTest
-from study_app.gui.settings.view import MachinePlace
+from study_app.gui.settings.view import DisplayTest, MachinePlace
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import Themed, apply_theme
 from study_app.gui.widgets.main_view import Place

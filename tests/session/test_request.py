@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from study_app import app
-from study_app.app.session import entry
+from study_app.app.session import live_session
 from study_app.errors import StoreError
 from study_app.protocol.source.files import source_bytes
 from study_app.session.start import NewSession, resumed
@@ -23,7 +23,7 @@ def begun(tmp_path: Path) -> SessionStore:
 def windows(monkeypatch: pytest.MonkeyPatch) -> list[NewSession]:
     """Open no window; return the sessions for which they would have been."""
     asked: list[NewSession] = []
-    monkeypatch.setattr(entry, "run_session", lambda chosen, _progress: asked.append(chosen) or 0)
+    monkeypatch.setattr(live_session, "run_session", lambda chosen, _progress: asked.append(chosen) or 0)
     return asked
 
 

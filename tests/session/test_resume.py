@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from study_app.app.session import entry
+from study_app.app.session import live_session
 from study_app.cli import commands
 from study_app.errors import SessionError
 from study_app.protocol.load import parse
@@ -234,7 +234,7 @@ def test_row_that_decides_nothing_is_refused(square: Path, source: str, row_of: 
 
 def test_run_takes_the_row_of_a_participant(square: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[NewSession] = []
-    monkeypatch.setattr(entry, "run_session", lambda chosen, _progress: asked.append(chosen) or 0)
+    monkeypatch.setattr(live_session, "run_session", lambda chosen, _progress: asked.append(chosen) or 0)
     words = ["run", str(square), "--participant", "P025", "--row-of", "P002", "--results", str(square.parent / "r")]
     assert CliRunner().invoke(commands, words).exit_code == 0
     assert [one.row_of for one in asked] == ["P002"]

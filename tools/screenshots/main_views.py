@@ -11,7 +11,7 @@ from study_app.gui.application import open_here
 from study_app.gui.home.study_facts import StudyFacts, study_facts
 from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.sessions.session_page import SessionPage
-from study_app.gui.settings.display_test import DisplayTest
+from study_app.gui.settings.view import DisplayTest
 from study_app.gui.theme.theme import Theme
 from tools.screenshots.capture import Camera, shown
 from tools.screenshots.example_study import STUDY, WATCHED

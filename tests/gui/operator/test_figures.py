@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from study_app.gui.operator.servo_health import Forces, ServoHealth
-from study_app.gui.settings.display_test import FrameTimes
+from study_app.gui.settings.view import FrameTimes
 from study_app.gui.widgets.live_plots import lateness_histogram
 from study_app.haptics.model.layout import (
     LIMITER_FADE,
