@@ -9,9 +9,6 @@ import pytest
 
 from study_app import figure_style
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.figures.question_figures import question_pictures
-from study_app.analysis.figures.study_figures import pictures
 from study_app.analysis.report import write_report
 from tests.golden_figures import figure_of, stub_png
 from tests.golden_values import file_lines, table_lines
@@ -26,8 +23,8 @@ def figures_as_lines() -> Iterator[None]:
     """Let files of figures hold what these show."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(figure_style, "file_bytes", stub_png)
-        for draw in (pictures, level_pictures, question_pictures):
-            patched.setattr(write_report, draw.__name__, partial(draw, forms=("png",)))
+        for name in ("pictures", "level_pictures", "question_pictures"):
+            patched.setattr(write_report, name, partial(vars(write_report)[name], forms=("png",)))
         yield
 
 

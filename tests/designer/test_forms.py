@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
 from study_app.designer.document.steps import AddKey, RenameElement
-from study_app.designer.form.fields import HAND_ON_MS, TypedSentence, TypedText
+from study_app.designer.document.toml_edits import Set
 from study_app.gui.widgets.controls import IconButton
 
 pytestmark = pytest.mark.slow
@@ -25,21 +25,21 @@ def test_forms_leave_no_wrapper_of_an_item_of_their_layouts(qtbot: Any, designer
 
 
 @pytest.mark.variants(3)
-@pytest.mark.parametrize("kind", [TypedText, TypedSentence])
+@pytest.mark.parametrize("path", [("pages", "welcome", "body"), ("questionnaires", "liquid", "items", 0, "text")])
 @pytest.mark.parametrize("text", ["a\rb", "a\u2029b", "a\r\nb"])
-def test_a_shown_text_that_qt_normalises_is_no_edit(qtbot: Any, kind: type[TypedText], text: str) -> None:
-    field = kind("Text")
-    qtbot.addWidget(field)
-    typed: list[str] = []
-    field.typed.connect(typed.append)
-    field.show_text(text)
-    assert not field.pending
-    qtbot.wait(2 * HAND_ON_MS)
-    assert typed == []
-    field.insertPlainText("c")
-    assert field.pending
-    field.flush()
-    assert typed == ["ca\nb"]
+def test_a_shown_text_that_qt_normalises_is_no_edit(
+    qtbot: Any, designer: Any, path: tuple[str | int, ...], text: str
+) -> None:
+    designer.open("kitchen")
+    designer.editing.make("Change", Set(path, {"en": text}))
+    designer.go_to(*path[:-1])
+    (line,) = designer.field(*path).findChildren(QPlainTextEdit)
+    assert not line.pending
+    qtbot.wait(300)
+    assert designer.value(*path) == {"en": text}
+    line.insertPlainText("c")
+    line.flush()
+    assert designer.value(*path) == {"en": "ca\nb"}
 
 
 QUESTIONNAIRE = ("questionnaires", "liquid")

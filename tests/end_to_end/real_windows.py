@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -10,9 +11,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PySide6.QtCore import QPoint, QSize
+from PySide6.QtWidgets import QAbstractButton, QWidget
 
 COMPILED_S = 180.0  # by then the force model is compiled on any machine
 NEEDED = ("Xvfb", "xdotool")
@@ -47,6 +50,12 @@ def wait_for(found: Callable[[], object], what: str, seconds: float = 60.0) -> N
     while not found():
         assert time.monotonic() < deadline, f"waited {seconds:g} s in vain for {what}"
         pause.wait(0.05)
+
+
+def new_session(window: QWidget) -> Any:
+    """Return the button of the study of the thesis in home's window; None while it is not shown."""
+    buttons = {button.accessibleName(): button for button in window.findChildren(QAbstractButton)}
+    return next((buttons[name] for name in buttons if re.fullmatch(r"New session of .*, rek2024\.toml", name)), None)
 
 
 class Program:

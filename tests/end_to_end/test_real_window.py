@@ -12,13 +12,10 @@ import pytest
 
 pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missing", exc_type=ImportError)
 
-from PySide6.QtCore import QPoint
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication
 
 from study_app.app.main_controller import MainController
-from study_app.gui.home.cards import StudyCard
 from study_app.gui.operator.session_panels import Strip
-from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
 from study_app.protocol.load import parse
@@ -26,7 +23,8 @@ from study_app.protocol.source.files import source_bytes
 from study_app.protocol.wording.languages import words
 from study_app.store.sessions.recovery import check_can_go_on
 from tests.compiled import needs_servo
-from tests.end_to_end.real_windows import Program, needs_display, virtual_display, wait_for
+from tests.end_to_end.real_windows import Program, needs_display, new_session, virtual_display, wait_for
+from tests.end_to_end.walking import place_in
 from tests.gui.small import ManualClock, questionnaire
 
 GIVEN = [7, 1, 4, 6, 2, 3, 5, 7, 1]
@@ -40,10 +38,6 @@ def display() -> Iterator[str]:
     """A virtual X display that nobody else uses."""
     with virtual_display() as number:
         yield number
-
-
-def place_in(window: QWidget, widget: QWidget) -> QPoint:
-    return widget.mapTo(window, widget.rect().center())
 
 
 def test_a_session_by_keys_and_clicks_from_the_home_window_into_the_csv(display, tmp_path, monkeypatch, qtbot) -> None:
@@ -80,10 +74,9 @@ def begin_session(program: Program, qtbot) -> None:
     qtbot.addWidget(plan)
     plan.resize(*program.size(home))
     plan.show()
-    qtbot.waitUntil(lambda: bool(plan.findChildren(StudyCard)))
+    qtbot.waitUntil(lambda: new_session(plan) is not None)
     QApplication.processEvents()
-    card = next(card for card in plan.findChildren(StudyCard) if card.facts.protocol.study.name == "rek2024")
-    dialog = program.click_until(home, place_in(plan, card.new), "^New session$")
+    dialog = program.click_until(home, place_in(plan, new_session(plan)), "^New session$")
     program.key(dialog, "ctrl+a")
     program.xdotool("type", "P042")
     program.key(dialog, "Return")
@@ -121,7 +114,6 @@ def answer_nine_items(program: Program, felt: str, qtbot) -> None:
     qtbot.waitExposed(plan)
     QApplication.processEvents()
     page = plan.widget
-    assert isinstance(page, QuestionnaireWidget)
     for number, value in enumerate(GIVEN):
         if number in BY_CLICK:
             program.click(felt, place_in(plan, page.fields[number].options[value - 1]))

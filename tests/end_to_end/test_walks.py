@@ -11,7 +11,6 @@ import pytest
 pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missing", exc_type=ImportError)
 
 from study_app.app.main_controller import MainController
-from study_app.gui.home.cards import StudyCard
 from study_app.gui.home.dialogs import NewSessionDialog
 from study_app.gui.home.main_window import FULL as HOME
 from study_app.gui.home.view import HomePlace
@@ -19,7 +18,7 @@ from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
 from study_app.user_folder import settings_file
 from tests.compiled import needs_servo
-from tests.end_to_end.real_windows import needs_display, virtual_display, wait_for
+from tests.end_to_end.real_windows import needs_display, new_session, virtual_display, wait_for
 from tests.end_to_end.walking import ANSWERS, CORRECTED, TRIALS, Pages, Person, Visitor, laid_out, tabs_to
 
 DARK_MEAN = 90.0  # of the colours of a dark display, 0 to 255
@@ -43,7 +42,7 @@ def plan(program: Visitor, qtbot: Any) -> MainController:
     made = MainController()
     qtbot.addWidget(made.window)
     laid_out(made.window, (HOME.width(), HOME.height()))
-    qtbot.waitUntil(lambda: bool(made.window.findChildren(StudyCard)))
+    qtbot.waitUntil(lambda: new_session(made.window) is not None)
     laid_out(made.window, (HOME.width(), HOME.height()))
     return made
 
@@ -56,15 +55,10 @@ def preflight_window(program: Visitor) -> str:
     return program.window_of("^Liquid Study$", PREFLIGHT)
 
 
-def thesis(plan: MainController) -> StudyCard:
-    cards = plan.window.findChildren(StudyCard)
-    return next(card for card in cards if card.facts.protocol.study.name == "rek2024")
-
-
 def dialog_of(plan: MainController) -> NewSessionDialog:
     place = plan.window.place("home")
     assert isinstance(place, HomePlace)
-    thesis(plan).new.click()
+    new_session(plan.window).click()
     dialog = place.dialog
     assert isinstance(dialog, NewSessionDialog)
     laid_out(dialog, (dialog.width(), dialog.height()))
@@ -118,7 +112,7 @@ def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan:
     pointer = program.xdotool("getmouselocation").split(" window:")[0]  # windows come and go under it
     home, main = home_window(program), plan.window
     person.take_keyboard(home)
-    person.press(*["Tab"] * tabs_to(main, thesis(plan).new), "Return")
+    person.press(*["Tab"] * tabs_to(main, new_session(main)), "Return")
     person.take_keyboard(program.window("^New session$"))
     dialog = dialog_of(plan)
     device = dialog.editors["device"].control

@@ -4,11 +4,13 @@ import json
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from study_app import app
 from study_app import workspace as workspaces
 from study_app.app.main_controller import MainController
-from study_app.app.session.live_session import run
-from study_app.cli.options import keep_offered_workspace
+from study_app.app.session.live_session import LiveSession
+from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.gui.home.study_facts import sources, study_facts
 from study_app.protocol.source.files import source_bytes
@@ -153,14 +155,12 @@ def test_home_shows_no_card_for_a_liquid_file(tmp_path, monkeypatch):
 
 def test_the_first_command_that_writes_keeps_the_offered_workspace_and_says_so_once(documents, tmp_path, monkeypatch):
     start_folder(tmp_path / "start", monkeypatch)
-    said = []
-    monkeypatch.setattr("click.echo", lambda words, err: said.append(words))
-    keep_offered_workspace()
-    assert "Liquid Study" in said[0]
+    made = CliRunner().invoke(commands, ["new", "thick", "--no-window"])
+    assert f"workspace of this machine: {documents / 'Liquid Study'} (" in made.stderr
     start_folder(tmp_path / "clone", monkeypatch, "results", "protocols")
-    keep_offered_workspace()
+    made = CliRunner().invoke(commands, ["new", "thin", "--no-window"])
+    assert made.stderr == ""
     assert workspace().folder == documents / "Liquid Study"
-    assert len(said) == 1
 
 
 def test_a_protocol_file_of_a_command_is_among_the_recent_ones_and_its_results_in_the_workspace(
@@ -169,9 +169,8 @@ def test_a_protocol_file_of_a_command_is_among_the_recent_ones_and_its_results_i
     start_folder(tmp_path / "start", monkeypatch)
     keep_workspace(Workspace(tmp_path / "kept"))
     held = []
-    run_session = "study_app.app.session.live_session.run_session"
-    monkeypatch.setattr(run_session, lambda chosen, _progress: held.append(chosen) or 0)
+    monkeypatch.setattr(LiveSession, "open", lambda session: (held.append(session.chosen), session.over.emit()))
     Path("mine.toml").write_bytes(source_bytes("demo"))
-    assert run("mine.toml", participant="P001") == 0
+    assert app.run("mine.toml", participant="P001") == 0
     assert held[0].results == tmp_path / "kept" / "results" / "demo"
     assert recent_protocols() == (str(tmp_path / "start" / "mine.toml"),)

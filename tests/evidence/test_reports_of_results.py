@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from study_app.evidence.accuracy import accuracy_report, candidates, survey
+from study_app.evidence.accuracy import accuracy_report, comparison, survey
 from study_app.evidence.outlets import streams, triggers
 from study_app.evidence.report_rates import simulation
 from study_app.evidence.soak import soak
@@ -36,7 +36,7 @@ def shown(rng: np.random.Generator) -> tuple[Any, ...]:
 
 def candidate(rng: np.random.Generator) -> Any:
     """Return what a report reads of a candidate."""
-    family = filled(typing.get_type_hints(candidates.Candidate)["family"], rng)
+    family = filled(typing.get_type_hints(typing.get_type_hints(comparison.Row)["candidate"])["family"], rng)
     name, rate = filled(str, rng), float(rng.choice([250, 1000]))
     return namedtuple("Candidate", "name label family rate_hz counted")(name, name[:4], family, rate, bool(rate < 500))
 

@@ -13,8 +13,7 @@ from study_app.errors import VideoError
 
 pytest.importorskip("av", reason="the optional extra video is not installed")
 
-from study_app.video import decoding
-from study_app.video.decoding import Scaler
+from study_app.video import sources
 from study_app.video.sources import Footage
 from tests.video.clips import number_in, write_clip
 
@@ -94,15 +93,16 @@ def test_frames_are_scaled_to_the_tank_with_their_own_ratio(footage: Footage) ->
 
 
 def test_a_file_that_fails_later_stops_without_its_name(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    opened: list[Any] = []
+    opens = vars(sources)["open_video"]
 
     def once(source: str, **options: str) -> Any:
-        if opened:
-            raise VideoError("it is gone")
-        opened.append(source)
-        return decoding.open_video(source, **options)
+        monkeypatch.setattr(sources, "open_video", gone)
+        return opens(source, **options)
 
-    monkeypatch.setattr("study_app.video.sources.open_video", once)
+    def gone(*_: object, **__: object) -> Any:
+        raise VideoError("it is gone")
+
+    monkeypatch.setattr(sources, "open_video", once)
     footage = Footage(clip)
     footage.thread.join(10)
     with pytest.raises(VideoError, match=r"a video of the study stopped \(it is gone\)") as refused:
@@ -118,7 +118,7 @@ def test_an_error_of_ffmpeg_that_is_no_system_error_stops_it_too(clip: Path, mon
     def fail(_scaler: Any, _frame: Any) -> Any:
         raise ExternalError(1, "generic error in an external library")
 
-    monkeypatch.setattr(Scaler, "pixels", fail)
+    monkeypatch.setattr("study_app.video.sources.Scaler.pixels", fail)
     footage.rewind()
     footage.thread.join(10)
     with pytest.raises(VideoError, match=r"stopped \(generic error in an external library\)"):

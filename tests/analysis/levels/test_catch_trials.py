@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.study_tables import Study, load_study
-from study_app.analysis.levels.answers import Answers, of_group
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.results import LevelsResult
@@ -42,8 +41,7 @@ def test_answers_to_catch_trials_are_apart_from_those_at_their_level(
     staircase: LevelsResult, opened: pd.DataFrame
 ) -> None:
     own = opened[(opened["block"] == "staircase") & (opened["participant"] == "P001") & (opened["standard"] == 4)]
-    shown = [one for one in Answers.of(staircase) if one.participant == "P001" and one.standard == 4]
+    shown = [one for one in staircase.statistics["answers"] if one.participant == "P001" and one.standard == 4]
     assert sum(one.n for one in shown if one.catch) == own["catch"].astype(bool).sum()
     assert sum(one.n for one in shown) == len(own)
     assert {one.level for one in shown if one.catch} == {0.6}
-    assert not any(one.catch for one in of_group(staircase))

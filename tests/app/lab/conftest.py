@@ -7,11 +7,10 @@ import pytest
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.failures import Patience
 from study_app.app.lab_controller import LabController
 from study_app.gui.lab.view import LabPlace
 from study_app.protocol.load import load_scene
-from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices, force_n
+from tests.app.lab.worlds import OPENS_MS, PATIENCE, SOON_MS, Prices, force_n
 
 
 @pytest.fixture
@@ -32,7 +31,7 @@ def make_lab(qtbot: Any, prices: Prices) -> Iterator[Callable[..., LabController
 
     yield make
     for lab in made:
-        lab.end(Patience(20.0))
+        lab.end(PATIENCE)
         lab.place.close()
         lab.place.deleteLater()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

@@ -11,10 +11,9 @@ from typing import Any
 import pytest
 from PySide6.QtWidgets import QMainWindow
 
-from study_app.app.failures import Patience
 from study_app.app.lab_controller import LabController
 from study_app.lab.presets import save
-from tests.app.lab.worlds import OPENS_MS, SOON_MS, Prices, Stays, is_let_go
+from tests.app.lab.worlds import OPENS_MS, PATIENCE, SOON_MS, Prices, Stays, is_let_go
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.usefixtures("qapp")]
@@ -188,7 +187,7 @@ def test_a_preset_is_on_the_disk_before_the_program_ends(
         visit.place.ask("save", tmp_path / name, visit.bench.a)
     assert not list(tmp_path.iterdir())
     threading.Timer(0.05, ended.set).start()
-    visit.end(Patience(20.0))
+    visit.end(PATIENCE)
     assert written == ["one.toml", "two.toml"], "in the order in which they were saved"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.toml", "two.toml"]
     assert str(tmp_path / "two.toml") in [it.source for it in visit.liquids]

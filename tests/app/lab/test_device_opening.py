@@ -6,10 +6,9 @@ from typing import Any
 
 import pytest
 
-from study_app.app.failures import Patience
 from study_app.app.lab_controller import LabController, LabOpening
 from study_app.errors import ServoFault
-from tests.app.lab.worlds import SOON_MS, SlowDevices
+from tests.app.lab.worlds import PATIENCE, SOON_MS, SlowDevices
 from tests.compiled import needs_servo
 
 MakeLab = Callable[..., LabController]
@@ -52,7 +51,7 @@ def test_leaving_while_a_device_is_being_opened_lets_go_of_it(make_lab: MakeLab,
     qtbot.waitUntil(lambda: visit.view().busy == "switch scripted on", timeout=SOON_MS)
     visit.place.hide()
     threading.Timer(0.05, devices.gate.set).start()
-    visit.end(Patience(20.0))
+    visit.end(PATIENCE)
     assert (devices.open, devices.closed) == (0, 1)
     assert visit.live is None
 

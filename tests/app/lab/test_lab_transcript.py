@@ -7,13 +7,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from study_app.app import lab_controller
-from study_app.app.failures import Patience
 from study_app.app.lab_controller import LabController
 from study_app.errors import DeviceNotFound, ServoFault
 from study_app.lab.ab_comparison import Workbench
 from study_app.lab.presets import Choice
 from study_app.workers.server import Crashed
-from tests.app.lab.worlds import COSTS, ERRORS, SOON_MS
+from tests.app.lab.worlds import COSTS, ERRORS, PATIENCE, SOON_MS
 from tests.golden import compare
 from tests.golden_values import changed, value_lines
 
@@ -209,7 +208,7 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any,
         lines += [f"== {name}", *done, *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records)]
         lines += changed(before, after)
         before = after
-    lab.end(Patience(1.0))
+    lab.end(PATIENCE)
     caplog.clear()
     lines += [*map(str, sorted(path.name for path in tmp_path.iterdir()))]
     compare(GOLDEN, (line.replace(str(tmp_path), "FOLDER") for line in lines), pytestconfig)

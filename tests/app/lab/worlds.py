@@ -1,6 +1,7 @@
 """What the lab is given in tests: an appraiser and devices that answer when told to, and the force it sends."""
 
 import threading
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,10 @@ OPENS_MS = 120_000  # the first time it compiles
 
 
 SOON_MS = 20_000
+
+
+PATIENCE: Any = SimpleNamespace(left_s=20.0)
+"""How long a lab that ends waits for its threads."""
 
 
 COSTS = Costs(160.0, 60.0, (EffectCost("drag", 10.0), EffectCost("history", None, "not used")))

@@ -14,9 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from study_app.devices.emulators.force_dimension import EmulatedForceDimension
-from study_app.devices.force_dimension.device import ForceDimensionDevice
-from study_app.devices.simulated import ScriptedDevice
+from study_app.devices.registry import open_device
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 
@@ -27,15 +25,15 @@ POLL_S = 0.25
 def main(seconds: float) -> None:
     """Print the table."""
     with tempfile.TemporaryDirectory() as folder:
-        devices: list[Any] = [ScriptedDevice(), EmulatedForceDimension()]
+        devices: list[tuple[str, dict[str, Any]]] = [("scripted", {}), ("force-dimension-emulated", {})]
         if compiler := shutil.which("cc"):
             library = Path(folder) / "libdrd.so"
             options = ["-D_POSIX_C_SOURCE=199309L", "-shared", "-fPIC", "-o", library]
             subprocess.run([compiler, *options, SOURCE, "-lm"], check=True)
-            devices.append(ForceDimensionDevice(library=library))
+            devices.append(("force-dimension", {"options": {"dhd-library": str(library)}}))
         print(f"{'device':<26}lateness p50 / p99 [us]   ticks with a new position")
-        for device in devices * 2:
-            with device, Servo(device) as servo:
+        for name, how in devices * 2:
+            with open_device(name, **how) as device, Servo(device) as servo:
                 servo.load(load("rek2024").scene_for("honey"))
                 time.sleep(POLL_S)
                 reader = servo.telemetry.reader()

@@ -18,8 +18,7 @@ from numba import types
 
 from study_app.devices.emulators.inverse3 import EmulatedInverse3
 from study_app.devices.emulators.inverse3_service import Service
-from study_app.devices.inverse3.device import Inverse3Device
-from study_app.devices.inverse3.exchange import INVERSE3
+from study_app.devices.registry import open_device
 from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.kernels.c_functions import (
@@ -70,7 +69,11 @@ SLOT = np.dtype(
     align=True,
 )
 _logged_at, _slot_at = record_at(LOGGED), record_at(SLOT)
-_device_at, _reading_at, _command_at = record_at(INVERSE3), record_at(READING), record_at(COMMAND)
+_device_at, _reading_at, _command_at = (
+    record_at(EmulatedInverse3().exchange.dtype),
+    record_at(READING),
+    record_at(COMMAND),
+)
 
 
 def _read_logged(context: int, now_ns: int, reading: int) -> int:
@@ -225,7 +228,7 @@ def _measure(driver: Any, hand: Any, seconds: float) -> dict[str, Any]:
     }
 
 
-def _polled(device: Inverse3Device) -> Any:
+def _polled(device: Any) -> Any:
     polled = records(POLLED, 1)
     polled[0].file, polled[0].events = int(device.exchange.handle), 1
     return polled
@@ -238,7 +241,7 @@ def _clock() -> tuple[SystemClock, tuple[int, int, int]]:
 
 def _by_thread(port: int, service: Service, pace_ns: int, seconds: float) -> dict[str, Any]:
     clock, calls = _clock()
-    with Inverse3Device(f"127.0.0.1:{port}") as device:
+    with open_device(f"inverse3:127.0.0.1:{port}") as device:
         slot = records(SLOT, 1)
         slot[0].run = 1
         driver = Logged(device, _read_slot, _write_slot, int(slot.ctypes.data))
@@ -258,7 +261,7 @@ def _by_thread(port: int, service: Service, pace_ns: int, seconds: float) -> dic
             del clock
 
 
-def _round_trips(device: Inverse3Device) -> tuple[Any, Any]:
+def _round_trips(device: Any) -> tuple[Any, Any]:
     """Return times of exchanges and of echoes [ns], taken in turn."""
     clock, calls = _clock()
     server = socket.create_server(("127.0.0.1", 0))
@@ -294,14 +297,14 @@ def main(seconds: float) -> None:
         found["emulated, in the program"] = _measure(Logged(emulated), emulated.hand, seconds)
     service = Service()
     with ServiceServer(service) as server:
-        with Inverse3Device(f"127.0.0.1:{server.port}") as device:
+        with open_device(f"inverse3:127.0.0.1:{server.port}") as device:
             found["TCP, exchanges in the tick"] = _measure(Logged(device), service, seconds)
         for pace_ns, name in ((0, "TCP, thread and slot, free"), (1_000_000, "TCP, thread and slot, 1 kHz")):
             try:
                 found[name] = _by_thread(server.port, service, pace_ns, seconds)
             except StudyError as error:
                 print(f"{name}: {error}")
-        with Inverse3Device(f"127.0.0.1:{server.port}") as device:
+        with open_device(f"inverse3:127.0.0.1:{server.port}") as device:
             exchanges, echoes = _round_trips(device)
     print(f"{'us':30} {'lateness':>15} {'age of position':>17} {'tick took':>15} {'no position':>12}")
     for name, row in found.items():

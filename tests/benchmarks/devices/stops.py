@@ -23,10 +23,9 @@ import numpy as np
 from study_app.devices.driver import FramedDevice
 from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
-from study_app.devices.emulators.force_dimension import EmulatedForceDimension
 from study_app.devices.emulators.inverse3_service import Service
 from study_app.devices.hand import HandOrders
-from study_app.devices.inverse3.device import Inverse3Device
+from study_app.devices.registry import open_device
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 from tests.devices.inverse3.server import ServiceServer
@@ -51,7 +50,7 @@ class Stand(NamedTuple):
 @contextmanager
 def inverse3() -> Iterator[Stand]:
     service = Service()
-    with ServiceServer(service) as server, Inverse3Device(f"127.0.0.1:{server.port}") as device:
+    with ServiceServer(service) as server, open_device(f"inverse3:127.0.0.1:{server.port}") as device:
         yield Stand(device, service, lambda _: service.force_n, lambda: int(service.state.commands))
 
 
@@ -68,7 +67,7 @@ def falcon() -> Iterator[Stand]:
 
 @contextmanager
 def force_dimension() -> Iterator[Stand]:
-    with EmulatedForceDimension() as device:
+    with open_device("force-dimension-emulated") as device:
         hand = device.hand
         yield Stand(device, hand, lambda _: hand.force_n, lambda: int(hand.state.handle.written))
 

@@ -29,9 +29,9 @@ from study_app.designer.document.fields import (
 )
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.document.toml_text import Refused
 from study_app.designer.measures.study_facts import copied_texts, facts, missing_texts
 from study_app.designer.templates import FOLDER
+from study_app.errors import StudyError
 from study_app.ids import MAX_ID
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.orders.schedule import build_schedule
@@ -120,7 +120,7 @@ def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
 
 @pytest.mark.parametrize("name", ["", "Water", "2nd", "with blank", "é", "a" * (MAX_ID + 1)])
 def test_check_id_refuses_what_is_no_id(name: str) -> None:
-    with pytest.raises(Refused, match="is not an id: write at most"):
+    with pytest.raises(StudyError, match="is not an id: write at most"):
         check_id(name)
 
 
@@ -155,7 +155,7 @@ def study() -> Study:
 )
 def test_values_are_refused_in_one_sentence(study: Study, values: tuple[float, ...], why: str) -> None:
     row = number_row(study.document, NO_DELAY, (*NO_DELAY, "delay_ms"))
-    with pytest.raises(Refused, match=f"^{why}$"):
+    with pytest.raises(StudyError, match=f"^{why}$"):
         check_values(study.document, row, values)
 
 

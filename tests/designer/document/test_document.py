@@ -15,8 +15,7 @@ from study_app.designer.document.document import Document, check_version, next_v
 from study_app.designer.document.fields import rows
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.document.toml_text import Refused
-from study_app.errors import ProtocolError, StoreError
+from study_app.errors import ProtocolError, StoreError, StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import protocol_hash, shipped
 from study_app.store.drafts import REST_S, Draft, Keeper, discard, draft_of, drafted_files, keep
@@ -74,7 +73,7 @@ def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> 
 
 
 def test_typed_refuses_half_a_character() -> None:
-    with pytest.raises(Refused, match="half a character"):
+    with pytest.raises(StudyError, match="half a character"):
         DEMO.typed(DEMO.text + "# \ud800")
 
 
@@ -200,9 +199,9 @@ def test_standing_says_when_saving_asks_and_which_version_is_free() -> None:
 @pytest.mark.parametrize("version", ["", "1 2", "1,2", "é"])
 def test_what_cannot_be_a_version_is_refused(version: str) -> None:
     check_version("1.2-rc+3", [Run("abc", "1.2-rc+3", pilots=1)])
-    with pytest.raises(Refused, match="cannot be a version"):
+    with pytest.raises(StudyError, match="cannot be a version"):
         check_version(version, [])
-    with pytest.raises(Refused, match="was run with another content"):
+    with pytest.raises(StudyError, match="was run with another content"):
         check_version("1.0", [Run("abc", "1.0", sessions=1)])
 
 

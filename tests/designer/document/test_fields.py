@@ -10,7 +10,6 @@ from study_app.designer.document.elements import element_of
 from study_app.designer.document.fields import Row, rows, unit_of
 from study_app.designer.document.study import Study, read
 from study_app.designer.form.form import form
-from study_app.designer.form.rows import Form
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.json_schema import schema
 from study_app.protocol.source.problems import Fault, shown
@@ -98,7 +97,7 @@ OF_THE_ELEMENT = {
 
 def shown_at(study: Study, fault: Fault) -> str:
     """Return where the form shows a fault: "row", "section", "id", "element", or "" for nowhere."""
-    found: Form = form(study, element_of(study, fault.path))
+    found = form(study, element_of(study, fault.path))
     sentence = f"{fault.message[:1].upper()}{fault.message[1:]}"
     places = (
         ("row", [words for row in found.rows if fault.path[: len(row.path)] == row.path for words in row.faults]),

@@ -30,8 +30,8 @@ from study_app.designer.document.steps import (
     SwitchKind,
 )
 from study_app.designer.document.study import Study, read
-from study_app.designer.document.toml_text import Refused
 from study_app.designer.outline import addable
+from study_app.errors import StudyError
 from study_app.protocol.source.document import Path, entries
 from tests.designer.document.grown import PROTOCOLS
 from tests.golden import compare
@@ -158,7 +158,7 @@ def said(study: Study, selected: Path, request: Request) -> Iterator[str]:
         step = request.step(Situation(study, selected))
         before = study.typed(step.text)[0] if step.text else study
         after, _ = before.edited(*step.edits)
-    except Refused as refusal:
+    except StudyError as refusal:
         yield f"refused: {refusal}"
         return
     yield f"{step.words}; select {one_line(step.select)}{step.fresh and f', {step.fresh}'}; {step.said}"

@@ -11,7 +11,6 @@ from study_app.cli import commands
 from study_app.designer.document.document import Answers, answered, copy_of, template
 from study_app.designer.document.fields import row_at
 from study_app.designer.document.study import read
-from study_app.designer.document.toml_text import Refused
 from study_app.designer.new_study_page import KnownAnswer, known_answers
 from study_app.designer.templates import FOLDER, QUESTIONS, templates
 from study_app.errors import StudyError
@@ -75,7 +74,7 @@ def test_the_answers_are_edits_of_the_template() -> None:
     assert {fault.message for fault in after.faults} == {"is missing in German"}
     assert after.text.count("#") == before.text.count("#")
     assert answered(before, Answers(languages=("en",))).text == before.text
-    with pytest.raises(Refused, match="must be at least"):
+    with pytest.raises(StudyError, match="must be at least"):
         answered(before, Answers(values=((trials, 0),)))
 
 
@@ -136,7 +135,7 @@ def test_new_refuses_to_overwrite(protocols: Path) -> None:
     assert new("mine").exit_code == 0
     before = (protocols / "mine.toml").read_bytes()
     again = new("mine", "--template", "rate-realism")
-    assert isinstance(again.exception, Refused)
+    assert isinstance(again.exception, StudyError)
     assert str(again.exception).endswith('mine.toml is already there; "mine2" is free')
     assert (protocols / "mine.toml").read_bytes() == before
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.elements import outline, used_by
+from study_app.designer.document.steps import RetypeFile, Situation
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set, Unset
-from study_app.designer.document.toml_text import retyped, shown
 from study_app.designer.form.form import form
 from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.simulation import Controls, Simulated
@@ -101,6 +101,11 @@ def study() -> Study:
     return read(shipped_file("rek2024").read_bytes(), shipped_file("rek2024").parent)
 
 
+def shown(text: str) -> str:
+    """Return a text as the pane shows it: each end of a line is one character."""
+    return text.replace("\r\n", "\n")
+
+
 ENDS = st.sampled_from(["\n", "\r\n"])
 
 
@@ -112,7 +117,7 @@ def test_typing_changes_no_end_of_line_elsewhere(lines: list[tuple[str, str]], d
     first = data.draw(st.integers(0, len(pane)))
     last = data.draw(st.integers(first, len(pane)))
     typed = pane[:first] + data.draw(st.sampled_from(["", "x", "new\nline", "\n"])) + pane[last:]
-    after = retyped(text, typed)
+    after = RetypeFile(typed).step(Situation(Study(text), ())).text
     assert shown(after) == typed
     if typed == pane:
         assert after == text
@@ -151,8 +156,8 @@ def leaves(value: Any, path: tuple[Any, ...] = ()) -> set[tuple[Any, ...]]:
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_every_key_of_every_element_is_in_its_form_with_its_value(file: pathlib.Path) -> None:
     study = read(file.read_bytes(), file.parent)
-    shown = outline(study)
-    for element in {one.path for one in (*shown.session, *shown.parts, *shown.study)}:
+    listed = outline(study)
+    for element in {one.path for one in (*listed.session, *listed.parts, *listed.study)}:
         if len(element) == 1 and element[0] not in {"study", "device", "scene", "limits", "analysis"}:
             continue
         if value_at(study.document, element) is None:

@@ -11,8 +11,6 @@ from study_app.designer.document.document import template
 from study_app.designer.document.steps import DuplicateElement, RetypeFile, Situation
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.measures.measures_controller import ANEW
-from study_app.designer.measures.measures_view import FAILED
 from study_app.designer.measures.simulation import (
     ENOUGH,
     THRESHOLD_STUDIES,
@@ -31,7 +29,7 @@ from study_app.protocol.source.files import shipped_file
 from study_app.workers.server import Crashed, Stopped
 from tests.designer.measures.conftest import Worker, jnd, shown
 
-UNKNOWN = "–"
+UNKNOWN, ANEW, FAILED = "–", "simulating …", "simulation failed"
 
 
 @pytest.mark.slow
@@ -83,7 +81,7 @@ def test_numbers_say_that_their_simulation_crashed(qtbot: Any, designer: Any, wo
     assert {part.note.text() for part in (jnds, one, people)} == {ANEW}
     assert designer.place.measures.function.legend.text().casefold() == ANEW
     worker.given.append((1, Crashed(1)))
-    qtbot.waitUntil(lambda: people.note.text() == FAILED[2])
+    qtbot.waitUntil(lambda: people.note.text() == FAILED)
     assert {part.number.text() for part in (jnds, one, people)} == {UNKNOWN}
     assert people.more.text() == "The process ended with exit code 1; the terminal may show why."
     designer.editing.make("Change", Set(("methods", "adaptive", "trials"), 60))
@@ -96,9 +94,9 @@ def test_without_a_process_the_other_numbers_stay(qtbot: Any, designer: Any) -> 
     designer.controller.measures.rest.setInterval(10)
     jnd(designer)
     part = designer.place.measures.numbers.parts[1]
-    qtbot.waitUntil(lambda: part.note.text() == FAILED[2])
+    qtbot.waitUntil(lambda: part.note.text() == FAILED)
     assert part.more.text() == "The process of the simulations does not start."
-    assert designer.place.measures.function.legend.text() == FAILED[2].capitalize()
+    assert designer.place.measures.function.legend.text() == FAILED.capitalize()
     assert designer.place.measures.numbers.parts[3].number.text() == "17"
 
 

@@ -13,7 +13,6 @@ from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton
 
-from study_app.app.failures import Patience
 from study_app.app.session import playing
 from study_app.app.session.bridge import SessionBridge
 from study_app.designer.document.document import template
@@ -26,6 +25,7 @@ from study_app.gui.widgets.controls import CompactStop
 from study_app.session.pages import ChoicePage, FeedbackPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.transitions.page_builder import preview
 from study_app.store.verification.verify_study import verify
+from tests.app.lab.worlds import PATIENCE
 from tests.app.people import window
 from tests.compiled import needs_servo
 
@@ -199,7 +199,7 @@ def test_stop_above_the_page_closing_the_window_a_failure_and_leaving_the_place_
     caplog.clear()
     likert.window.go("designer")
     press_f5(qtbot, likert)
-    pilots.end(Patience(10.0))  # while it is prepared
+    pilots.end(PATIENCE)  # while it is prepared
     assert not pilots.under_way
     assert not list(folders.iterdir())
 

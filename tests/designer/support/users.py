@@ -5,8 +5,9 @@ notch of the wheel is an action. A part that cannot be reached fails.
 """
 
 from collections.abc import Callable
+from typing import Any
 
-from PySide6.QtCore import QModelIndex, QPoint, QRect
+from PySide6.QtCore import QModelIndex, QObject, QPoint, QRect
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -19,13 +20,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.designer.form.card import FormCard
-from study_app.designer.outline import ROW_ROLE, OutlineCard
-from study_app.designer.place.segments import Segments
-from study_app.gui.participant.intervals.answer_page import ChoiceWidget
-from study_app.gui.participant.pages.page_widget import GoButton
-from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
+from study_app.designer.outline import ROW_ROLE
 from study_app.gui.participant.window import ParticipantWindow
+from study_app.session.pages import ChoicePage, QuestionnairePage
 from tests.designer.support.inputs import Hand, name_of, wait_until, window_in_front
 
 MOST_TABS = 120
@@ -42,6 +39,11 @@ def place_of(box: QComboBox, words: str) -> int:
     found = [at for at, entry in enumerate(entries) if entry == words or entry.startswith(f"{words} (")]
     assert found, f"{words!r} is not among {entries}"
     return found[0]
+
+
+def are_segments(part: QObject | None) -> bool:
+    """Return whether a part is a row of buttons, of which one is chosen."""
+    return part is not None and part.property("role") == "segments"
 
 
 def _of_a_group(focused: QWidget, part: QWidget) -> bool:
@@ -73,18 +75,21 @@ class User:
         """Return the part of a name; wait for it. One of the form comes before others."""
         what = f"a part called {name!r}"
         wait_until(lambda: self.parts(name, *kinds), what)  # the designer may still be loading
-        (form,) = self.window.findChildren(FormCard) or (None,)
+        form = self.area("Form")
         return min(self.parts(name, *kinds), key=lambda part: form is None or not form.isAncestorOf(part))
 
     def sees(self, name: str) -> bool:
         """Return whether a part of a name is shown."""
         return bool(self.parts(name))
 
+    def area(self, name: str) -> Any:
+        """Return the part of the designer's window of a name; None before it is loaded."""
+        return next((one for one in self.window.findChildren(QWidget) if one.accessibleName() == name), None)
+
     @property
-    def outline(self) -> OutlineCard:
+    def outline(self) -> Any:
         """The outline."""
-        (found,) = self.window.findChildren(OutlineCard)
-        return found
+        return self.area("Outline")
 
     def row(self, title: str, section: str = "") -> QModelIndex:
         """Return the row of the outline with a title, below another one or its heading where one is given."""
@@ -153,7 +158,7 @@ class KeyUser(User):
         if focused is not None and self._is_at(part, focused):
             return
         for name, keys in AREAS:
-            area = next((one for one in self.window.findChildren(QWidget) if one.accessibleName() == name), None)
+            area = self.area(name)
             if area is not None and area.isAncestorOf(part) and not (focused and area.isAncestorOf(focused)):
                 self.key(keys, 2 if part.accessibleName() == VIEWS else 1)
         seen: list[str] = []
@@ -196,7 +201,7 @@ class KeyUser(User):
             if focused is part:
                 return
             way = part.mapToGlobal(part.rect().center()) - focused.mapToGlobal(focused.rect().center())
-            upright = abs(way.y()) > abs(way.x()) / 4 and not isinstance(focused.parent(), Segments)
+            upright = abs(way.y()) > abs(way.x()) / 4 and not are_segments(focused.parent())
             keys = ("Up", "Down") if upright else ("Left", "Right")
             before = focused
             self.key(keys[(way.y() if upright else way.x()) > 0])
@@ -217,8 +222,8 @@ class KeyUser(User):
             self.key("Return")
 
     def choose(self, name: str, words: str) -> None:
-        part = self.part(name, Segments, QComboBox)
-        if isinstance(part, Segments):
+        part: Any = self.part(name, QWidget)
+        if are_segments(part):
             self.reach(part)
             wanted = next(button for button in part.buttons if button.text() == words)
             if wanted.isChecked():
@@ -280,10 +285,10 @@ class KeyUser(User):
 
     def answer(self, window: ParticipantWindow) -> None:
         self.hand.come_forward(window)
-        if isinstance(window.widget, QuestionnaireWidget):
-            for _ in window.widget.fields:
+        if isinstance(window.page, QuestionnairePage):
+            for _ in window.page.items:
                 self.key("3")
-        self.key("1" if isinstance(window.widget, ChoiceWidget) else "Return")
+        self.key("1" if isinstance(window.page, ChoicePage) else "Return")
 
 
 class MouseUser(User):
@@ -340,8 +345,8 @@ class MouseUser(User):
         self.type(text)
 
     def choose(self, name: str, words: str) -> None:
-        part = self.part(name, Segments, QComboBox)
-        if isinstance(part, Segments):
+        part: Any = self.part(name, QWidget)
+        if are_segments(part):
             self.click(next(button for button in part.buttons if button.text() == words))
             return
         assert isinstance(part, QComboBox), part
@@ -387,13 +392,11 @@ class MouseUser(User):
         self.press(button)
 
     def answer(self, window: ParticipantWindow) -> None:
-        if isinstance(window.widget, QuestionnaireWidget):
-            for field in window.widget.fields:
+        shown: Any = window.widget
+        if isinstance(window.page, QuestionnairePage):
+            for field in shown.fields:
                 self.click(field.options[2])
-        buttons = [one for one in window.findChildren(GoButton) if one.isVisible() and one.isEnabled()]
-        choices = window.widget.buttons if isinstance(window.widget, ChoiceWidget) else buttons
-        for button in choices[:1]:
-            self.click(button)
+        self.click(shown.buttons[0] if isinstance(window.page, ChoicePage) else shown.button)
 
 
 USERS: dict[str, type[User]] = {"keys": KeyUser, "mouse": MouseUser}

@@ -7,6 +7,7 @@ import ctypes
 import threading
 import time
 from multiprocessing.connection import Client, Listener
+from types import SimpleNamespace
 from typing import Any
 
 from study_app.devices.falcon import constants
@@ -118,11 +119,10 @@ class ServedTransport:
 
     def calls(self) -> Any:
         """Return the bridge as compiled code sees it; good until `close` or `reopen`."""
-        from study_app.devices.falcon.bulk import BulkCalls
         from tests.devices.falcon.support.scripted_bridge import BULK_CALL
 
         self._transfer = BULK_CALL(self._move)
-        return BulkCalls(handle=0, transfer=ctypes.cast(self._transfer, ctypes.c_void_p).value or 0)
+        return SimpleNamespace(handle=0, transfer=ctypes.cast(self._transfer, ctypes.c_void_p).value or 0)
 
     def now_s(self) -> float:
         return float(self._ask("now_ns")) * 1e-9

@@ -11,10 +11,6 @@ import pytest
 from study_app.devices.emulators import inverse3_service
 from study_app.devices.emulators.inverse3 import EmulatedInverse3
 from study_app.devices.emulators.inverse3_service import Service
-from study_app.devices.inverse3 import opening
-from study_app.devices.inverse3.device import Inverse3Device, address
-from study_app.devices.inverse3.exchange import MOST_UNANSWERED, MOST_WEAKER
-from study_app.devices.inverse3.opening import find_device
 from study_app.devices.registry import open_device
 from study_app.errors import DeviceError, DeviceNotFound, ServoFault
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
@@ -26,6 +22,12 @@ from tests.compiled import needs_servo
 from tests.devices.subjects import Ticks
 
 pytestmark = needs_servo
+
+
+def zero_force(device_id: str) -> dict[str, Any]:
+    """Return a command that a service answers without its full state."""
+    vector = dict.fromkeys("xyz", 0.0)
+    return {"inverse3": [{"device_id": device_id, "commands": {"set_cursor_force": {"vector": vector}}}]}
 
 
 @pytest.fixture
@@ -86,7 +88,7 @@ class TestOpening:
     def test_a_service_that_does_not_confirm_is_used_and_the_receipt_says_so(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("study_app.devices.inverse3.opening.full_state_request", opening.zero_force)
+        monkeypatch.setattr("study_app.devices.inverse3.opening.full_state_request", zero_force)
         lines: list[str] = []
         with EmulatedInverse3(progress=lines.append) as device:
             assert device.describe()["service_settings"]["confirmed"] is False
@@ -106,11 +108,16 @@ class TestOpening:
         assert len(str(refused.value)) < 250
         assert (service.state.ended, service.state.commands) == (1, 0)
 
-    def test_entries_without_an_id_are_passed_over(self) -> None:
-        mine = {"device_id": "049D", "config": {"filters": {}}}
-        assert find_device({"inverse3": [7, {}, {"device_id": "0000"}, mine]}, "049D") == mine
+    def test_entries_without_an_id_are_passed_over(self, service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+        message = service.inventory()
+        monkeypatch.setattr(service, "inventory", lambda: message)
+        (mine,) = message["inverse3"]
+        message["inverse3"] = [7, {}, mine]
+        with EmulatedInverse3(service=service) as device:
+            assert device.describe()["device_id"] == mine["device_id"]
+        message["inverse3"] = [7, {}]
         with pytest.raises(DeviceNotFound, match="listed: none"):
-            find_device({"inverse3": [7, {}]})
+            EmulatedInverse3(service=service).open()
 
     def test_no_service_is_one_line_with_its_address_and_the_cure(self) -> None:
         with pytest.raises(DeviceNotFound, match=r"Inverse Service does not answer.*start Haply Hub") as refused:
@@ -123,13 +130,12 @@ class TestOpening:
             EmulatedInverse3(workspace_m=(0.1, 0.03, 0.03))
 
     def test_an_address_names_host_port_and_device(self) -> None:
-        assert address("") == ("127.0.0.1", 10001, "")
-        assert address("049D") == ("127.0.0.1", 10001, "049D")
-        assert address("lab-3:10002") == ("lab-3", 10002, "")
-        assert address("lab-3:10002:049D") == ("lab-3", 10002, "049D")
+        for where, said in (("", "127.0.0.1:10001"), ("049D", "127.0.0.1:10001"), ("localhost:9:049D", "localhost:9")):
+            with pytest.raises(DeviceNotFound, match=rf"does not answer \({said}:"):
+                open_device(f"inverse3:{where}")
         for where in (":1", "a:b", "a:0", "a:65536", "a:1:b:c", "a:-1"):
             with pytest.raises(DeviceError, match="is not an address of the Inverse Service"):
-                Inverse3Device(where)
+                open_device(f"inverse3:{where}")
 
 
 class TestTicks:
@@ -165,8 +171,8 @@ class TestTicks:
         before = int(service.state.commands)
         for k in range(20):
             _answer, sent_n = ticks.take((0.1 * k, 0.0, 0.0))
-        assert service.state.commands - before == MOST_UNANSWERED
-        assert device.counters["skipped"] == 20 - MOST_UNANSWERED
+        assert service.state.commands - before == 4
+        assert device.counters["skipped"] == 20 - 4
         assert sent_n[0] == service.force_n[0]  # it says which force still acts
         assert ticks.take((0.0, 0.0, 0.0))[1][0] == 0.0
         assert service.force_n == (0.0, 0.0, 0.0)
@@ -180,7 +186,7 @@ class TestTicks:
             assert ticks.take(force_n)[1][0] == force_n[0] == pytest.approx(service.force_n[0])
         for k in range(100):
             ticks.take((0.4 - 0.001 * k, 0.0, 0.0))
-        assert device.exchange.sent - device.exchange.answered == MOST_WEAKER
+        assert device.exchange.sent - device.exchange.answered == 60
         assert ticks.take()[1][0] == service.force_n[0] == 0.0
 
     def test_a_state_that_waited_for_longer_than_20_ms_is_not_given(self, device: EmulatedInverse3) -> None:

@@ -10,8 +10,8 @@ import pytest
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE
 from study_app.devices.doctor import DeviceFailure
 from study_app.devices.emulators.inverse3_service import Service
-from study_app.devices.inverse3.device import Inverse3Device
 from study_app.devices.inverse3.service import SocketLink, check_force_scale, force_scale, probe
+from study_app.devices.registry import open_device
 from study_app.errors import DeviceLost
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
@@ -42,7 +42,7 @@ def moved_by(service: Service) -> bool:
 
 
 def test_a_servo_reads_positions_and_sends_forces_and_ends_with_zero(service: Service, server: ServiceServer) -> None:
-    with Inverse3Device(f"127.0.0.1:{server.port}") as device:
+    with open_device(f"inverse3:127.0.0.1:{server.port}") as device:
         assert device.describe()["force_scale"] == 1.0
         with Servo(device) as servo:
             servo.load(load("rek2024").scene_for("honey"))
@@ -56,7 +56,7 @@ def test_a_servo_reads_positions_and_sends_forces_and_ends_with_zero(service: Se
 
 
 def test_a_service_that_is_killed_in_a_stroke_ends_in_its_message(service: Service, server: ServiceServer) -> None:
-    with Inverse3Device(f"127.0.0.1:{server.port}") as device, Servo(device) as servo:
+    with open_device(f"inverse3:127.0.0.1:{server.port}") as device, Servo(device) as servo:
         servo.load(load("rek2024").scene_for("honey"))
         until(lambda: moved_by(service), "it does not happen")
         server.drop()
@@ -134,7 +134,7 @@ def test_a_service_that_does_not_answer_about_its_force_scale_moves_nothing(
     with pytest.raises(
         DeviceFailure, match=r"multiplier of all forces is not known \(no number within 0\.5 s\).*restart"
     ):
-        Inverse3Device(f"127.0.0.1:{server.port}").open()
+        open_device(f"inverse3:127.0.0.1:{server.port}")
     late.set()
     assert service.state.pushes == 0
     until(lambda: service.state.ended == 1, "it does not happen")

@@ -14,16 +14,19 @@ from typing import Any, Final, NamedTuple
 import pytest
 
 from study_app.devices.driver import examine
-from study_app.devices.emulators.inverse3_service import config
-from study_app.devices.inverse3.device import Inverse3Device
-from study_app.devices.inverse3.opening import DEVICE_GLOBAL, SESSION_SCOPED, Messages
+from study_app.devices.emulators.inverse3_service import Service
 from study_app.devices.inverse3.service import force_scale, probe
 from tests.compiled import needs_servo
 from tests.strangers import CLOSE, HTTP_OK, STRANGERS, Parts, dripped, flooded, http_answer, sent, serving
 
 pytestmark = [needs_servo, pytest.mark.slow]
 MOST_S: Final = 3.0
-CONFIG: Final = config() | DEVICE_GLOBAL | SESSION_SCOPED
+NEUTRAL: Final = {
+    "preset": "arm_front_centered",
+    "basis": {"permutation": "XYZ"},
+    "filters": {"force_gate": {"gain": 0.0}, "damping": {"scalar": 0.0}},
+}
+CONFIG: Final = Service().inventory()["inverse3"][0]["config"] | NEUTRAL
 STATUS: Final = {"power_supply": True, "ready": True, "calibrated": True, "in_use": False}
 
 
@@ -146,8 +149,8 @@ def answers(kind: Kind, head: bytes, connection: socket.socket) -> Parts:
 @pytest.fixture(scope="module")
 def compiled() -> None:
     """Compile the driver: the first start takes longer."""
-    Inverse3Device()
-    Messages.compile()
+    with serving(partial(answers, next(iter(ANSWERS.values())))) as port:
+        examine(f"inverse3:127.0.0.1:{port}", progress=str)
 
 
 @pytest.mark.usefixtures("compiled")

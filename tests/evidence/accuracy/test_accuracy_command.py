@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
-from study_app.cli.evidence import motion_along
+from study_app.cli import commands
 from study_app.errors import StudyError
+from study_app.evidence.accuracy import accuracy_report, comparison
 from study_app.evidence.accuracy.comparison import accuracy
 from study_app.evidence.accuracy.survey import PUBLISHED, survey
+from study_app.evidence.table import Evidence
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.load import load_scenes
 from tests.evidence.accuracy.scenes import TANK, compiled
@@ -21,10 +24,16 @@ def test_a_motion_that_meets_no_force_is_refused():
         accuracy(TANK, None, rest, named="a rest")
 
 
-def test_a_motion_file_of_another_rate_is_brought_to_the_scenes(tmp_path):
+def test_a_motion_file_of_another_rate_is_brought_to_the_scenes(tmp_path, monkeypatch):
     rows = "\n".join(f"{k / 50},{k / 100},0,0" for k in range(21))
     (tmp_path / "slow.csv").write_text(f"t_s,x_m,y_m,z_m\n{rows}\n", encoding="utf-8")
-    read = motion_along(str(tmp_path / "slow.csv"), TANK)
+    measured = []
+    monkeypatch.setattr(comparison, "accuracy", lambda *given, **_: measured.append(given))
+    monkeypatch.setattr(accuracy_report, "evidence", lambda _found: Evidence("", {}))
+    words = ["accuracy", "rek2024", "--liquid", "water", "--path", str(tmp_path / "slow.csv"), "--to", str(tmp_path)]
+    done = CliRunner().invoke(commands, words)
+    assert done.exit_code == 0, done.output
+    ((_, _, read, *_),) = measured
     assert read.t_s == pytest.approx(np.arange(401) / 1000)
     assert read.position_m[:, 0] == pytest.approx(read.t_s / 2)
 

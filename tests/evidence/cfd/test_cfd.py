@@ -4,6 +4,7 @@ import csv
 import re
 import shutil
 import sys
+from dataclasses import replace
 from importlib import resources
 
 import numpy as np
@@ -11,15 +12,14 @@ import pytest
 from click.testing import CliRunner
 from scipy.integrate import quad
 
-from study_app.cli.evidence import cfd
-from study_app.cli.options import executor_for
+from study_app.cli import commands
 from study_app.errors import StudyError
 from study_app.evidence.cfd import fits as fitted
-from study_app.evidence.cfd import flow, solved_cases, solver, stored_flows
+from study_app.evidence.cfd import solved_cases, solver, stored_flows
 from study_app.evidence.cfd.solved_cases import PROFILES, RAMP, STOP, STOPPING, Case
 from study_app.evidence.cfd.stored_flows import solver_truths
 from study_app.protocol.load import load_scene
-from study_app.workers.executors import Workers
+from study_app.workers.executors import Workers, open_executor
 from tests.evidence.cfd import stand_ins
 from tests.haptics.scenes import COMPILED as IS_COMPILED
 
@@ -27,7 +27,7 @@ COMPILED = pytest.mark.skipif(not IS_COMPILED, reason="fits need the compiled ti
 PACKAGE = resources.files("study_app.evidence.cfd")
 NAMES = tuple(it.name for it in solved_cases.cases())
 CASES = (*solved_cases.cases(), *solved_cases.cases_of((*solved_cases.TRAINING, *solved_cases.HELD_OUT)))
-COARSE = flow.Grid(ahead=15, behind=30, aside=15, ball=0.2, near=0.8, far=6)
+COARSE = replace(solver.COARSE, ahead=15, behind=30, aside=15, ball=0.2, near=0.8, far=6)
 
 
 @pytest.fixture(scope="module")
@@ -193,10 +193,10 @@ def test_a_fit_made_again_is_the_stored_one(stored, fits):
 
 def test_without_the_library_one_line_says_what_to_install(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "ngsolve", None)
-    finished = CliRunner().invoke(cfd, ["--solve", "--to", str(tmp_path / "new")])
+    finished = CliRunner().invoke(commands, ["cfd", "--solve", "--to", str(tmp_path / "new")])
     assert isinstance(finished.exception, StudyError)
     assert "pip install ngsolve" in str(finished.exception)
-    assert CliRunner().invoke(cfd, ["--solve"]).exit_code == 2
+    assert CliRunner().invoke(commands, ["cfd", "--solve"]).exit_code == 2
 
 
 @pytest.fixture
@@ -214,17 +214,17 @@ def test_an_interrupted_solution_keeps_its_tables(tmp_path):
         if ", 10 of " in said:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt), executor_for(Workers(1)) as executor:
+    with pytest.raises(KeyboardInterrupt), open_executor(Workers(1)) as executor:
         solver.solve(tmp_path, executor, until_the_tenth)
     assert len(list(tmp_path.rglob("*.csv"))) == 9
-    with executor_for(Workers(1)) as executor:
+    with open_executor(Workers(1)) as executor:
         assert len(solver.solve(tmp_path, executor, lambda _: None)) == len(CASES) + 1
 
 
 @pytest.fixture(scope="module")
 def coarse():
     pytest.importorskip("ngsolve", reason="the extra cfd is not installed")
-    return flow.Flow(COARSE)
+    return solver.flow_of(COARSE)
 
 
 def test_a_coarse_flow_without_convection_is_the_exact_one(coarse):

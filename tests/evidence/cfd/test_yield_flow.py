@@ -1,13 +1,14 @@
 """Herschel–Bulkley drag: the law against the fluid solver's stored table, and the solver on a coarse grid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.errors import StudyError
-from study_app.evidence.cfd import yield_flow
-from study_app.evidence.cfd.flow import Grid
+from study_app.evidence.cfd import solver, yield_flow
 from study_app.evidence.cfd.yield_flow import BINGHAM, INDICES, PERMITTED, YieldFlow, errors, stored_materials
 
 
@@ -41,7 +42,7 @@ def test_a_table_that_is_missing_is_named(tmp_path):
 def test_the_solver_on_a_coarse_grid_finds_the_stored_drag(monkeypatch):
     pytest.importorskip("ngsolve", reason="the extra cfd is not installed")
     monkeypatch.setattr(yield_flow, "SMOOTHING", (0.03, 0.001))
-    coarse = YieldFlow(Grid(ahead=10, behind=21, aside=10, ball=0.2, near=0.8, far=4))
+    coarse = YieldFlow(replace(solver.COARSE, ahead=10, behind=21, aside=10, ball=0.2, near=0.8, far=4))
     ((drag, _),) = coarse.drags(1.0, (10.0,))
     table = stored_materials()
     (row,) = np.flatnonzero((table["flow_index"] == 1.0) & (table["bingham"] == 10.0))

@@ -4,8 +4,8 @@ import dataclasses
 
 import pytest
 
-from study_app.evidence.stability.driver_loop import judge_driven
 from study_app.evidence.stability.stability_cases import Case
+from study_app.evidence.stability.stability_report import verdicts_on
 from tests.haptics.scenes import COMPILED
 
 if not COMPILED:
@@ -17,6 +17,6 @@ RELEASE = Case(plant="falcon", liquid="light_oil", hand="lets-go", motion="sine"
 @pytest.mark.parametrize("phase", range(4))
 def test_driver_gives_out_no_more_than_the_scripted_device(phase):
     case = dataclasses.replace(RELEASE, release_s=0.6 + phase / 8)
-    verdict = judge_driven(case)
+    (verdict,) = verdicts_on(case)
     assert verdict.stable, verdict
     assert verdict.balance_j >= verdict.permitted_j

@@ -8,7 +8,6 @@ import pytest
 from click.testing import CliRunner
 
 from study_app import cli
-from study_app.cli.options import EXIT_FOUND
 from study_app.errors import StudyError
 from study_app.evidence.stability import stability_report as stability
 from study_app.evidence.stability.case_groups import Group, groups, some, sweep
@@ -134,7 +133,7 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     monkeypatch.setattr("study_app.evidence.stability.stability_report.fidelities", lambda **_: few)
     monkeypatch.setattr("study_app.cli.evidence.executor_for", lambda _: ThreadPoolExecutor(1))
     ran = command("--cases", "2")
-    assert ran.return_value == EXIT_FOUND
+    assert ran.return_value == 3
     lines = [line for line in ran.stderr.splitlines() if line.startswith("liquid=")]
     assert len(lines) == 2 * (1 + len(groups(count=2)))
     assert {parse(line).plant for line in lines} == {"handle", "arm", "falcon"}

@@ -7,9 +7,7 @@ from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
-from study_app.gui.operator.plots import ForceCard
 from study_app.gui.operator.window import OperatorWindow
-from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import ChoicePage, EndPage, QuestionnairePage, TextPage
 
@@ -23,8 +21,7 @@ def window(kind: type[W]) -> W | None:
 
 def answer(participant: ParticipantWindow, page: QuestionnairePage) -> None:
     """Answer every statement, each other one with a click and those between with a digit, and confirm."""
-    widget = participant.widget
-    assert isinstance(widget, QuestionnaireWidget)
+    widget: Any = participant.widget
     points = len(page.labels)
     for number, row in enumerate(widget.fields):
         if not row.isVisible():  # on the next part of the page
@@ -86,10 +83,8 @@ def words_of(top: QWidget) -> set[str]:
 def traces_of(operator: OperatorWindow) -> set[str]:
     """Return names and labels of all that is plotted, and what stands where the force would be."""
     named = set()
-    plots = [operator.lateness.plot, operator.position.plot]
-    if isinstance(operator.force, ForceCard):
-        plots.append(operator.force.plot)
-    for plot in plots:
+    cards = (operator.lateness, operator.position, operator.force)
+    for plot in (card.plot for card in cards if hasattr(card, "plot")):
         for item in plot.items():
             named |= {str(getattr(item, "toPlainText", str)()), str(getattr(item, "labelText", ""))}
     return named | {label.text() for label in operator.force.findChildren(QLabel)}

@@ -9,8 +9,8 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
 from study_app.gui.lab.lab_state import LabView
-from study_app.gui.lab.parameters import OFF, NumberRow
 from study_app.gui.widgets.main_view import HOLD_MS, EscapeKey
+from study_app.lab.parameters import OFF
 from tests.gui.lab.sample import blind, heard
 from tests.gui.walk import settle
 
@@ -25,8 +25,8 @@ def told(place: Any, still: LabView) -> list[tuple[Any, ...]]:
     return said
 
 
-def fields(place: Any) -> dict[str, NumberRow]:
-    return {name: row for name, row in place.form.rows.items() if isinstance(row, NumberRow)}
+def fields(place: Any) -> dict[str, Any]:
+    return {name: row for name, row in place.form.rows.items() if hasattr(row, "slider")}
 
 
 def enter(field: Any, text: str) -> None:

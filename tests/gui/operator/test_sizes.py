@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.gui.operator.plots import ForceCard
 from study_app.gui.operator.servo_health import Forces
 from study_app.gui.operator.window import OperatorWindow
 from study_app.haptics.model.layout import LIMITER_NORM, SAMPLE, records
@@ -77,7 +76,7 @@ def filled(window: OperatorWindow, told: Any, health: Any, state: str) -> None:
         told.tell(event, **fields)
     forces = Forces(6.0)
     forces.take(pushes())
-    if single := isinstance(window.force, ForceCard):
+    if single := hasattr(window.force, "plot"):
         told.make_single_blind()
     view = told.view(health, forces=forces.figures() if single else None, **said)
     if state == "trouble":
@@ -91,9 +90,8 @@ def filled(window: OperatorWindow, told: Any, health: Any, state: str) -> None:
 
 def beyond_the_plot(window: OperatorWindow) -> list[str]:
     """Return the names of curves that do not stand whole in their plot."""
-    plots = [window.position.plot] + ([window.force.plot] if isinstance(window.force, ForceCard) else [])
     found = []
-    for plot in plots:
+    for plot in (card.plot for card in (window.position, window.force) if hasattr(card, "plot")):
         plot.grab()  # names take their places when they are painted
         box = plot.box.mapRectToScene(plot.box.boundingRect()).adjusted(-1, -2, 1, 2)
         found += [

@@ -12,7 +12,6 @@ from PySide6.QtGui import QImage, QKeyEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.participant.intervals.answer_page import STEP_MS
 from study_app.gui.participant.window import PointerCapture
 from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.pages import Interval, TaskPage
@@ -21,6 +20,8 @@ from tests.gui.participant.driver import KEY, Participant
 from tests.gui.small import ORDINALS, choice, follow, number, task_page, view
 
 Opening = Callable[..., Participant]
+STEP_MS = 125
+"""Between two steps of a key that is held."""
 FULL, SMALL = (1366, 768), (1024, 640)
 NONE = Qt.KeyboardModifier.NoModifier
 
@@ -94,7 +95,7 @@ def test_a_key_that_is_held_steps_eight_times_a_second_and_stops_with_it(opened:
     assert steps(opened) == [1]
     began_s = time.monotonic()
     qtbot.waitUntil(lambda: len(steps(opened)) >= 5)
-    assert time.monotonic() - began_s >= 0.95 * 4 * 0.125
+    assert time.monotonic() - began_s >= 0.95 * 4 * STEP_MS / 1000
     QTest.keyPress(opened.window, KEY.Key_Left)
     QTest.keyRelease(opened.window, KEY.Key_Right)
     right = len(steps(opened))

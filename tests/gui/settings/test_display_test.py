@@ -6,7 +6,6 @@ import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QColor
 
-from study_app.gui.participant.tank.layers import PATCH
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.protocol.wording.languages import words
 from tests.gui.small import task_page
@@ -30,7 +29,7 @@ def test_the_patch_is_where_and_as_large_as_in_the_tank(test_page, qtbot):
     qtbot.addWidget(tank)
     tank.resize(test_page.size())
     tank.patch.lit = test_page.lit = True
-    black = round(PATCH[0])
+    black = 88
     area = (test_page.width() - black, test_page.height() - black, black, black)
     assert test_page.grab().toImage().copy(*area) == tank.grab().toImage().copy(*area)
 

@@ -5,7 +5,6 @@ import pytest
 
 from study_app.haptics.model.effects.current import Channel, Uniform, Vortex
 from study_app.haptics.model.effects.drag import REFERENCE, Drag
-from study_app.haptics.model.effects.history import History
 from study_app.haptics.model.estimators import Given
 from study_app.haptics.model.gate import bounds, calls_for, resolve
 from study_app.haptics.model.motion import Motion
@@ -102,7 +101,7 @@ def test_the_worst_motion_for_history_all_but_reaches_its_bound():
     scene = pool("honey", motion).model_copy(
         update={"motion": MotionBox(speed_mps=SPEED_MPS, acceleration_mps2=ACCELERATION_MPS2)}
     )
-    liquid = Liquid(id="honey", density_kg_m3=1420, viscosity_pa_s=10, history=History(smoothing_s=0))
+    liquid = Liquid(id="honey", density_kg_m3=1420, viscosity_pa_s=10, history={"smoothing_s": 0})
     scene = scene.model_copy(update={"liquids": (liquid,)})
     force_n = felt(with_effects(scene, ["history"]), motion)
     assert -force_n[-1, 0] == pytest.approx(bounds(scene, liquid)["history"], rel=0.02)

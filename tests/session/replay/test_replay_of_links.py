@@ -7,8 +7,7 @@ import pytest
 
 from study_app.analysis.data.blocks import setting_name
 from study_app.analysis.data.study_tables import load_study
-from study_app.analysis.levels.conduct import Withheld
-from study_app.analysis.levels.evaluate import level_results
+from study_app.analysis.levels.evaluate import level_results, level_section
 from study_app.analysis.levels.tracks import tracks
 from study_app.protocol.load import parse
 from study_app.protocol.trials.presentation import presented_by
@@ -78,11 +77,12 @@ def test_the_analysis_finds_delivered_delays_and_what_safety_withheld(rehearsed:
     assert sorted(rows["level"]) == [20, 80]
     assert (rows["level_delivered"] - rows["level"]).abs().max() < 1.5
     pairs, named = level_results(study)
-    assert [(one["low"], one["n"]) for one in Withheld.of(pairs)] == [(20, 1), (80, 1)]
-    assert all(0 <= one["mean_percent"] <= one["most_percent"] < 5 for one in Withheld.of(pairs))
-    assert "Force withheld by safety" in "".join(Withheld(pairs).section())
-    assert Withheld.of(named) == ()
-    assert "".join(Withheld(named).section()) == ""
+    withheld = pairs.statistics["withheld"]
+    assert [(one["low"], one["n"]) for one in withheld] == [(20, 1), (80, 1)]
+    assert all(0 <= one["mean_percent"] <= one["most_percent"] < 5 for one in withheld)
+    assert not named.statistics["withheld"]
+    sections = ["".join(level_section(one, (), None)) for one in (pairs, named)]
+    assert ["Force withheld by safety" in one for one in sections] == [True, False]
     (block,) = (one for one in study.levels if one.id == "named")
     names = {one.condition: setting_name(one, block.settings) for one in block.settings}
     assert names == {"water": "Water, force 15 ms late, 20 % of forces lost"}

@@ -15,7 +15,6 @@ from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.simulated import Comparison
 from study_app.protocol.streams import stream
-from study_app.session.simulated import participant
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
@@ -80,7 +79,7 @@ def run(protocol: Path, folder: Path, secret: int) -> Path:
 def blindly() -> Any:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Comparison, "answer", answer_blindly)
-        patch.setattr(participant, "AdjustingObserver", BlindSetting)
+        patch.setattr("study_app.session.simulated.participant.AdjustingObserver", BlindSetting)
         yield patch
 
 

@@ -18,7 +18,6 @@ from study_app.session.transitions.events import (
     WriteFailed,
     WriteRetried,
 )
-from study_app.session.transitions.moves import STOPPABLE
 from study_app.session.transitions.state import FINAL, Phase
 from study_app.session.transitions.table import advance, open_session
 from tests.golden import compare
@@ -26,6 +25,8 @@ from tests.session import small
 from tests.session.transitions.states import LEFT, shown, state_in
 from tests.session.transitions.transcribed import FOLDER, play
 from tests.transcripts import every, played
+
+STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK, Phase.PAUSED}
 
 
 @pytest.mark.parametrize("file", every(FOLDER, "intervals reading settings table"), ids=lambda file: file.stem)

@@ -24,7 +24,7 @@ from study_app.store.journals.journal_events import CAUSE_WITHHELD
 from study_app.store.recordings import read_frames
 from study_app.store.verification.verify_study import verify
 from study_app.store.workstation import MachineSettings
-from study_app.video.decoding import Scaler
+from study_app.video import sources
 from tests.app.people import Person, attended, events, receipt_of, rows, window
 from tests.compiled import needs_servo
 
@@ -136,14 +136,15 @@ def test_footage_that_stops_is_opened_again_by_the_operator(
     write_clip(study.parent / NAME, frames=20, size=(320, 180))
     reconnected: list[Rig] = []
     monkeypatch.setattr(Rig, "reconnect", reconnected.append)
-    scale, scaled, fail = Scaler.pixels, itertools.count(), SessionBridge.fail
+    scaler: Any = vars(sources)["Scaler"]
+    scale, scaled, fail = scaler.pixels, itertools.count(), SessionBridge.fail
 
-    def pixels(scaler: Scaler, frame: Any) -> Any:
+    def pixels(scaler: Any, frame: Any) -> Any:
         if next(scaled) == 20:  # 15 wait decoded before the first trial
             raise OSError("the file is gone")
         return scale(scaler, frame)
 
-    monkeypatch.setattr(Scaler, "pixels", pixels)
+    monkeypatch.setattr(scaler, "pixels", pixels)
     operator = Operator()
 
     def failed(bridge: SessionBridge, error: BaseException) -> None:

@@ -3,10 +3,10 @@
 import ctypes
 import math
 from collections import deque
+from types import SimpleNamespace
 
 import numpy as np
 
-from study_app.devices.falcon.bulk import BulkCalls
 from study_app.devices.falcon.constants import ENDPOINT_IN, ERROR_TIMEOUT, HOMED_SHIFT, PACKET, SUCCESS, ZERO
 from study_app.devices.falcon.exchange import LEAST_MASS_KG, exchange_functions, new_exchange
 from study_app.devices.falcon.mechanics import GEOMETRIES, REACHED, inverse, new_mechanism
@@ -67,7 +67,7 @@ class FakeBridge:
         self.write_answer = SUCCESS
         self.reads = 0
         self._function = BULK_CALL(self._transfer)
-        self.calls = BulkCalls(7, ctypes.cast(self._function, ctypes.c_void_p).value)
+        self.calls = SimpleNamespace(handle=7, transfer=ctypes.cast(self._function, ctypes.c_void_p).value)
 
     def _transfer(self, handle, endpoint, data, length, transferred, timeout_ms):
         assert handle == 7

@@ -4,7 +4,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.effects.history import History
 from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, UNBENT, examples, liquid, moving, scene, vectors
 
@@ -18,7 +17,7 @@ CREEPING_MPS = 1e-10
 
 def tank(effects=("history",), *, rate_hz=1000.0, history=None, **fluid):
     """Return a scene of one viscous liquid, laws of creeping flow, velocities as given."""
-    one = liquid(**fluid, effects=effects, drag=Drag(law="haider-levenspiel"), history=History(**(history or {})))
+    one = liquid(**fluid, effects=effects, drag=Drag(law="haider-levenspiel"), history=history or {})
     return scene(one, knee=UNBENT, rate_hz=rate_hz)
 
 

@@ -3,12 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from study_app.haptics.kernels.regions import update_volume_fractions
 from study_app.haptics.model.estimators import Given
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Cylinder
 from study_app.haptics.runtime.offline import simulate
-from study_app.haptics.runtime.pack import pack
 from tests.haptics.scenes import UNBENT, WATER_FACTOR, liquid, scene, vectors
 
 RADIUS_M = 0.034
@@ -23,12 +21,13 @@ def pool(*effects, region=POOL, **fields):
 
 def shares(depth, region=POOL):
     """Return the shares of volume, of the frontal areas upright and level, at h/D = ``depth``."""
-    model = pack(pool("drag", region=region))
-    model.state[0].position_m[1] = TOP_M + RADIUS_M - depth * 2 * RADIUS_M
-    update_volume_fractions(model, 1e-3)
-    surface = model.liquid_states[0].surface
-    assert model.liquid_states[0].share == surface.volume
-    return surface.volume, surface.upright, surface.level
+    heights_m = TOP_M + RADIUS_M - np.array([depth, 3.0, -1.0]) * 2 * RADIUS_M
+    found = []
+    for effect, velocity_mps in (("buoyancy", (0, 0, 0)), ("drag", (0, 1.0, 0)), ("drag", (1.0, 0, 0))):
+        felt = pool(effect, region=region, density_kg_m3=500)
+        at, below, above = vectors(simulate(felt, through(heights_m, velocity_mps)), "force").sum(axis=1)
+        found.append((at - above) / (below - above))
+    return found
 
 
 def through(y_m, velocity_mps, interval_s=1e-3):

@@ -1,19 +1,18 @@
-"""Errors of forces, their Pareto front, and the models that a scene is compared with."""
+"""Errors of forces and their Pareto front."""
 
 import math
+from collections import namedtuple
 
 import numpy as np
 import pytest
 
-from study_app.evidence.accuracy import candidates
-from study_app.evidence.accuracy.candidates import Candidate, LinearViscosity
 from study_app.evidence.accuracy.comparison import Row, Time, front
 from study_app.evidence.reference_solutions import Case, Error, Truth, error_of
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import MotionBox
-from tests.evidence.accuracy.scenes import REAL, TANK
 
 pytestmark = pytest.mark.slow
+
+Candidate = namedtuple("Candidate", "name rate_hz")
 
 
 def one_case(*force_n):
@@ -45,7 +44,7 @@ def test_direction_counts_where_the_force_is_felt():
 
 def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal():
     def row(name, ns, rms):
-        candidate = Candidate(name, name, "tick", TANK)
+        candidate = Candidate(name, 1000.0)
         return candidate, Row(
             "numerical", "water", "t", candidate, Error(0, 0, rms, 0, 0, 0.05), Time(ns, ns, 1), 1, chosen=False
         )
@@ -54,13 +53,3 @@ def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal()
     assert [candidate.name for candidate in front(points)] == ["quick", "sums"]
     alike = dict([row("quick", 100, 0.5), row("truer", 104, 0.1), row("truest", 150, 0.01)])
     assert [candidate.name for candidate in front(alike)] == ["truer", "truest"]
-
-
-@pytest.mark.parametrize(("speed_mps", "expects"), [(1e-3, "no resistance"), (0.6, "+ history")])
-def test_the_ladder_has_the_gates_own_choice(speed_mps, expects):
-    box = MotionBox(speed_mps=speed_mps, acceleration_mps2=10 * speed_mps)
-    found, choice = candidates.physical(REAL.model_copy(update={"motion": box}))
-    assert choice in found
-    assert expects in choice.name
-    assert isinstance(found[0], LinearViscosity)
-    assert candidates.numerical(TANK)[1].name == "O(1) wake"
