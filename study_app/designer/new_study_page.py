@@ -40,7 +40,6 @@ from study_app.designer.document.study import Study, read
 from study_app.designer.outline import icon_of
 from study_app.designer.place.header import HeaderState, StudyChoice, problems_chip
 from study_app.designer.place.segments import cut_text, dense
-from study_app.designer.problems import NameRefusal
 from study_app.designer.templates import FOLDER, QUESTIONS, templates
 from study_app.designer.version_rows import VersionChip
 from study_app.errors import StudyError
@@ -56,7 +55,7 @@ from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.labels import Clamped, figures, label
 from study_app.gui.widgets.main_view import last_focused
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
-from study_app.number_text import counted, duration, number_of, typed_numbers
+from study_app.number_text import capitalised, counted, duration, number_of, typed_numbers
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
@@ -672,7 +671,8 @@ class ChosenCard(Card):
         super().__init__(padding=20, gap=10)
         self.questions = Questions()
         self.title = label("", "card")
-        self.refusal = NameRefusal("Make")
+        self.refusal = label("", "label", "bad", wraps=True)
+        self.refusal.hide()
         self.make = ActionButton("plus", "Make study", cap="Enter", role="primary", height=44)
         inside = QWidget()
         self.about, self.details, self.begin = QWidget(), QWidget(), QWidget()
@@ -756,7 +756,6 @@ class NewStudyPage(Themed, QWidget):
         vbox(head, (hbox((self.area, 1), self.card, spacing=12), 1), spacing=12, margins=0, parent=self)
         self.card.make.clicked.connect(self._begin)
         self.card.questions.entered.connect(self._begin)
-        self.card.refusal.chosen.connect(self._take_name)
         self._group.buttonToggled.connect(lambda _button, on: self._show_choice() if on else None)
 
     def show_choices(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
@@ -798,12 +797,9 @@ class NewStudyPage(Themed, QWidget):
         else:
             self.area.ensureWidgetVisible(button)
 
-    def refuse(self, sentence: str, free: str = "") -> None:
-        self.card.refusal.show_refusal(sentence, free)
-
-    def _take_name(self, name: str) -> None:
-        self.card.questions.name.setText(name)
-        self._begin()
+    def refuse(self, sentence: str) -> None:
+        self.refusal.setText(capitalised(sentence))
+        self.refusal.setVisible(bool(sentence))
 
     def _open_file(self) -> None:
         if chosen := choose_protocol(self, "Copy a study"):

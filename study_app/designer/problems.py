@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Final
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QPaintEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QPaintEvent
 from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
 from study_app.designer.document.additions import Repair, additions_for, repairs
@@ -146,15 +146,8 @@ class RepairSearch(QObject):
             self._timer.start(0)
 
 
-LONGEST = 20
-"""So many letters of a name a button has room for in a narrow card."""
-
-
 class RepairButton(ActionButton):
-    """Makes a repair of ``problem``; ``by_keys`` says whether a key led to it, not a click.
-
-    ``typed`` carries the event of a letter, which is meant for the field.
-    """
+    """Makes a repair of ``problem``; ``typed`` carries the event of a letter, which is meant for the field."""
 
     typed = Signal(object)
 
@@ -162,7 +155,6 @@ class RepairButton(ActionButton):
         super().__init__("", words, height=32)
         self.setProperty("dense", "true")
         self.setFont(font("label"))
-        self.by_keys = False
         self.problem = problem
         self.offer(words)
 
@@ -170,46 +162,11 @@ class RepairButton(ActionButton):
         self.show_action("", words)
         self.setAccessibleName(f"{words}: {self.problem.name}")
 
-    def focusInEvent(self, event: QFocusEvent) -> None:
-        super().focusInEvent(event)
-        self.by_keys = event.reason() != Qt.FocusReason.MouseFocusReason
-
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.text().strip() and event.text().isprintable():
             self.typed.emit(event)
         else:
             super().keyPressEvent(event)
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:
-        self.by_keys = False
-        super().mousePressEvent(event)
-
-
-class NameRefusal(QWidget):
-    """Why a name is not taken, and a button with one that is free, which ``chosen`` carries."""
-
-    chosen = Signal(str)
-
-    def __init__(self, does: str) -> None:
-        super().__init__()
-        self._does, self._free = does, ""
-        self.words = label("", "label", "bad", wraps=True)
-        self.use = small_button("", "", height=32)
-        self.use.clicked.connect(lambda: self.chosen.emit(self._free))
-        hbox((self.words, 1), self.use, spacing=8, margins=0, parent=self)
-        self.show_refusal("")
-
-    def text(self) -> str:
-        return self.words.text()
-
-    def show_refusal(self, sentence: str, free: str = "") -> None:
-        self._free = free
-        self.words.setText(capitalised(sentence))
-        words = f"{self._does} {free}"
-        self.use.show_action("", words if len(free) <= LONGEST else f"{self._does.split()[0]} it")
-        self.use.setAccessibleName(words)
-        self.use.setVisible(bool(free))
-        self.setVisible(bool(sentence))
 
 
 HIGHEST, NARROW_BELOW = 290, 1000

@@ -22,17 +22,16 @@ from study_app.designer.place.file import Colours
 from study_app.designer.place.prompts import ConfirmCard, Prompt
 from study_app.designer.place.segments import dense, small_button
 from study_app.designer.place.view import DesignerPlace, PanePage
-from study_app.designer.problems import NameRefusal
 from study_app.designer.version_rows import FILE, Comparison, VersionChip, counts, version_chip, version_choices
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Coloured
 from study_app.gui.widgets.background import Background, delayed
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox
+from study_app.gui.widgets.boxes import add_layout, add_parts, hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
-from study_app.number_text import counted
+from study_app.number_text import capitalised, counted
 from study_app.protocol.differences import differences
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import value_at
@@ -204,14 +203,13 @@ class SaveCard(Prompt):
         self.version = _field("Version to save as", standing.version, 110)
         self.name = _field("Short name of the other study", "", 220)
         self.name.setPlaceholderText("small letters and digits")
-        self.refusal = NameRefusal("Save as")
-        self.refusal.chosen.connect(self._take_name)
+        self.refusal = label("", "label", "bad", wraps=True)
         self.changes = ActionButton("", "Show in Changes", role="plain", height=40)
         self.another = ActionButton("copy", "Save as another study …", height=40)
         self.save = ActionButton("save", "", role="primary", height=40)
         self._of_version = label("Version", "label")
         self._of_name = label("Short name", "label")
-        line = hbox(self._of_version, self.version, self._of_name, self.name, (self.refusal, 1), STRETCH, spacing=10)
+        line = hbox(self._of_version, self.version, self._of_name, self.name, (self.refusal, 1), spacing=10)
         add_parts(self.buttons, self.changes, self.another, self.save)
         add_parts(self.column, line, self.buttons)
         self._naming = False
@@ -224,12 +222,8 @@ class SaveCard(Prompt):
         self.another.clicked.connect(lambda: self._show_name(naming=True))
         self.changes.clicked.connect(self.changes_asked)
 
-    def refuse(self, sentence: str, free: str = "") -> None:
-        self.refusal.show_refusal(sentence, free)
-
-    def _take_name(self, name: str) -> None:
-        self.name.setText(name)
-        self._save()
+    def refuse(self, sentence: str) -> None:
+        self.refusal.setText(capitalised(sentence))
 
     def _show_name(self, *, naming: bool) -> None:
         self._naming = naming

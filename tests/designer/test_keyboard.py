@@ -53,7 +53,7 @@ def test_tab_goes_to_each_stop_of_a_form_once(dutch: Any, editors: None, path: t
     form = dutch.place.form
     assert form.rows
     QApplication.processEvents()
-    dutch.place.areas.focus_header()
+    dutch.place.parts.focus_header()
     seen = passed(dutch, lambda part: part is dutch.place.pane.tabs.buttons[0])
     assert [part.accessibleName() for part in seen if form.inside.isAncestorOf(part)] == [
         part.accessibleName() for part in stops(form.inside) if part.isVisible() and part.isEnabled()

@@ -227,7 +227,7 @@ def versions(record: Record) -> None:
     record.play("ctrl+s")
     record.note("another", prompt().another.click)
     record.play("'kitchen' Return")
-    record.note("that is free", prompt().refusal.use.click)
+    record.play("ctrl+a 'kitchen2' Return")
     record.note("open", designer.open)
     record.play("@questionnaires.delay.items.0")
     record.note("unlock", designer.place.form.head.unlock.click)
@@ -255,8 +255,7 @@ def names(record: Record) -> None:
 
     record.select("liquids", "thin")
     record.ask(RenameElement(("liquids", "thin"), "thick"))
-    record.note("to the free name", form.head.refusal.use.setFocus)
-    record.play("Return @pages.thanks F2 'goodbye' Return")
+    record.play("@pages.thanks F2 'goodbye' Return")
     record.ask(AddElement(("blocks",)))
     first_text()
     record.play("'Sec' 'ond' ' part' Tab")
@@ -391,7 +390,7 @@ def unreadable(record: Record) -> None:
 
 
 def repairs(record: Record) -> None:
-    """Enter goes from repair to repair; a letter there is typed into the field; no line moves below the pointer."""
+    """F8 leads to a repair; a letter there is typed into the field; no line moves below the pointer."""
     designer, problems = record.designer, record.designer.place.problems
 
     def pointer(kind: QEvent) -> None:
@@ -406,7 +405,7 @@ def repairs(record: Record) -> None:
     record.note("repair", lambda: designer.click_on(next(line for line in problems.lines if line.repairs).repairs[0]))
     record.ask(SetValue(VERSION, 3))
     record.note("pointer away", lambda: pointer(QEvent(QEvent.Type.Leave)))
-    record.play("ctrl+z ctrl+z ctrl+1 F8 Return Return F8")
+    record.play("ctrl+z ctrl+z ctrl+1 F8 Return F8 Return F8")
     text = DEMO.replace('languages = ["en"]', 'languages = ["en", "nl"]').replace(
         'title = "Liquids"', 'title.en = "Liquids"'
     )
@@ -513,7 +512,8 @@ def new_study(record: Record) -> None:
         record.note("ask", ask)
         record.note(f"name {name}", partial(page.name.setText, name))
         record.note("make", page.make.click)
-        record.note("that is free", page.refusal.use.click)
+        record.note("free", lambda: page.name.setText(page.refusal.text().split('"')[-2]))
+        record.note("make", page.make.click)
     record.note("copy", lambda: ask("kitchen"))
     record.play("Return ctrl+s")
     record.note("copy again", lambda: ask("kitchen"))

@@ -139,7 +139,7 @@ def taken_names() -> set[str]:
 
 def _refused(why: str, name: str) -> Refused:
     free = free_short_name(taken_names(), short_name_of(name) or "study")
-    return Refused(f'{why}; "{free}" is free', free)
+    return Refused(f'{why}; "{free}" is free')
 
 
 MOST_STEPS: Final = 500

@@ -78,7 +78,7 @@ def renamed(document: Document, thing: Path, name: str, recorded: frozenset[str]
     check_id(name, free)
     if name in taken:
         where = "" if item is None else " by another item of this questionnaire"
-        raise Refused(f'the name "{name}" is taken{where}: "{free}" is free', free)
+        raise Refused(f'the name "{name}" is taken{where}: "{free}" is free')
     if item is None:
         return (Rename(thing, name, references_to(document, thing)),)
     return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
@@ -166,7 +166,7 @@ def check_id(name: str, free: str = "") -> None:
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
         rule = f"at most {MAX_ID} small letters, digits and underscores, a letter first"
         proposed = f'; "{free}" is free' if free else ""
-        raise Refused(f'"{name}" is not an id: write {rule}{proposed}', free)
+        raise Refused(f'"{name}" is not an id: write {rule}{proposed}')
 
 
 def _within(path: Path, outer: Path) -> bool:

@@ -44,7 +44,7 @@ from study_app.designer.form.special import (
     QuestionRows,
 )
 from study_app.designer.place.segments import FIELD_PX, Segments, cut_text, small_button
-from study_app.designer.problems import NameRefusal, ProblemRow, RepairButton
+from study_app.designer.problems import ProblemRow, RepairButton
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
@@ -416,8 +416,8 @@ class FormHead(QWidget):
         self.unlock.hide()
         self._lock: tuple[object, str] = ((), "")
         self._read_only = False
-        self.refusal = NameRefusal("Rename to")
-        self.refusal.chosen.connect(self._take_free)
+        self.refusal = label("", "label", "bad", wraps=True)
+        self.refusal.hide()
         self.feel = IconButton("drop", "Feel", size=34)
         self.series = small_button("bars", "Series …", height=34)
         self.up = IconButton("arrow_up", "Move up", size=34)
@@ -442,10 +442,14 @@ class FormHead(QWidget):
         grid.addWidget(self.refusal, 2, 0, 1, 3)
         grid.setColumnStretch(1, 1)
         self.id.typed.connect(self._rename)
-        self.id.textEdited.connect(self._type_id)
+        self.id.textEdited.connect(lambda name: self.id_typed.emit(self.path, name))
         self.unlock.clicked.connect(self.unlock_asked)
-        self.feel.clicked.connect(self._ask_to_feel)
+        self.feel.clicked.connect(lambda: self.feel_asked.emit(self.path))
         self.ask.clicked.connect(lambda: self.asks.popup(self.ask.mapToGlobal(self.ask.rect().bottomLeft())))
+
+    @property
+    def path(self) -> Path:
+        return () if self.form is None else self.form.path
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
         if self.form is None or self.form.path != form.path or self.form.id != form.id:
@@ -508,23 +512,10 @@ class FormHead(QWidget):
         self.id.setFocus(Qt.FocusReason.ShortcutFocusReason)
         self.id.selectAll()
 
-    def refuse(self, sentence: str, free: str = "") -> None:
-        self.refusal.show_refusal(sentence, free)
+    def refuse(self, sentence: str) -> None:
+        self.refusal.setText(capitalised(sentence))
+        self.refusal.setVisible(bool(sentence))
         self.id.show_refused(bool(sentence))
-
-    def _type_id(self, name: str) -> None:
-        if self.form is not None:
-            self.id_typed.emit(self.form.path, name)
-
-    def _ask_to_feel(self) -> None:
-        if self.form is not None:
-            self.feel_asked.emit(self.form.path)
-
-    def _take_free(self, name: str) -> None:
-        """Take the id that is proposed; the keyboard goes from its button, which is gone then, to the id."""
-        self.id.setFocus(Qt.FocusReason.OtherFocusReason)
-        self.id.setText(name)
-        self._rename(name)
 
     def _rename(self, name: str) -> None:
         if self.form is not None and self.form.id is not None:

@@ -27,10 +27,11 @@ from study_app.designer.form.fields import (
     written,
 )
 from study_app.designer.form.rows import FormRow, QuestionLine, is_right_to_left, question_lines
+from study_app.designer.measures.cards import Verdict
 from study_app.designer.measures.study_facts import valid_part
 from study_app.designer.place.segments import FIELD_PX, dense, small_button
 from study_app.gui.kit.commands import with_key
-from study_app.gui.theme.theme import Tone, TypeRole, font
+from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
@@ -49,51 +50,29 @@ ROUNDS: Final = 3
 SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "williams", "latin": "latin"}
 
 
-@dataclass(frozen=True, slots=True)
-class OrderBalance:
-    """Tone, icon and words of the chip of the order, and a sentence that explains it."""
+def order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
+    """Return how balanced the order of a block is, and what that means.
 
-    tone: Tone
-    icon: str
-    words: str
-    sentence: str
-
-
-def order_balance(study: Study, row: Row) -> OrderBalance | None:
-    """Return how balanced the order of a block is; None where it has one condition, or another method orders it."""
+    None where it has one condition, or another method orders it.
+    """
     block = value_at(study.document, row.path[:-1])
     conditions = block.get("conditions") if isinstance(block, Mapping) else None
     if not isinstance(conditions, tuple) or len(conditions) < 2 or "design" in block:
         return None
     order, codes = row.default if row.value is None else row.value, len(conditions)
     if order == "fixed":
-        return OrderBalance(
-            "neutral", "ring", "same for all", "Effects of condition and of position cannot be separated."
-        )
+        return ("neutral", "ring", "same for all"), "Effects of condition and of position cannot be separated."
     if not isinstance(order, str) or order not in SQUARES:
-        return OrderBalance(
-            "neutral",
-            "ring",
-            "balanced on average",
-            "Drawn anew in every session: positions are balanced on average only.",
-        )
+        drawn = "Drawn anew in every session: positions are balanced on average only."
+        return ("neutral", "ring", "balanced on average"), drawn
     square, repetitions = SQUARES[order], block.get("repetitions", 1)
     rows = row_count(square, codes)
     numbers = ", ".join(str(rows * number) for number in range(1, ROUNDS + 1))
     carries = square == "williams" and isinstance(repetitions, int) and borders_even(codes, max(1, repetitions))
+    at = f"at every multiple of {rows} participants."
     if carries or codes == 2:
-        return OrderBalance(
-            "ok",
-            "check",
-            f"balanced at {numbers} …",
-            f"Positions and carry-over are balanced at every multiple of {rows} participants.",
-        )
-    return OrderBalance(
-        "warn",
-        "warning",
-        f"in part at {numbers} …",
-        f"Only positions are balanced, at every multiple of {rows} participants.",
-    )
+        return ("ok", "check", f"balanced at {numbers} …"), f"Positions and carry-over are balanced {at}"
+    return ("warn", "warning", f"in part at {numbers} …"), f"Only positions are balanced, {at}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,10 +229,10 @@ class BalanceChip(Extra, Chip):
     beside_px = 124
 
     def show_facts(self, facts: Any) -> None:
-        found: OrderBalance = facts
-        self.show_state(found.tone, found.icon, found.words)
-        self.setToolTip(found.sentence)
-        self.setAccessibleDescription(found.sentence)
+        state, sentence = facts
+        self.show_state(*state)
+        self.setToolTip(sentence)
+        self.setAccessibleDescription(sentence)
 
 
 ORDER: Final = SpecialEditor((("Block", "order"),), adds=lambda _field: BalanceChip(small=True), facts=order_balance)
@@ -364,19 +343,16 @@ def order_of_blocks(study: Study, _row: Row) -> str:
 class Said(Extra, QLabel):
     """What the planned participants get."""
 
+    def __init__(self) -> None:
+        super().__init__(wordWrap=True)
+        self.setFont(font("small"))
+        self.setProperty("role", "text2")
+
     def show_facts(self, facts: Any) -> None:
         self.setText(facts)
 
 
-def _said_below(_field: Field) -> Said:
-    made = Said()
-    made.setFont(font("small"))
-    made.setProperty("role", "text2")
-    made.setWordWrap(True)
-    return made
-
-
-BLOCK_ORDER: Final = SpecialEditor((("StudyHead", "block_order"),), adds=_said_below, facts=order_of_blocks)
+BLOCK_ORDER: Final = SpecialEditor((("StudyHead", "block_order"),), adds=lambda _field: Said(), facts=order_of_blocks)
 
 MEASURES: Final = tuple(zip(OF_LEVELS, ("Threshold", "Exponent", "Sensitivity d′", "Setting (PSE)"), strict=True))
 RELATIONS: Final = (

@@ -1,17 +1,17 @@
 """Cards of measures: words, numbers, bars and tables, as values and as the widgets that show them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from study_app.designer.place.segments import cut_text
 from study_app.gui.theme.theme import Tone, font
 from study_app.gui.theme.themed import Themed, remove_widget
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, insert_layout, vbox
+from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule, fill_rounded, smooth_painter
 from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
@@ -341,7 +341,7 @@ def _lines(shown: Lines) -> QWidget:
 
 
 class CardGrid(Themed, QWidget):
-    """Cards in two columns; only those that changed are made anew.
+    """Cards in two columns, wide ones across both; only those that changed are made anew.
 
     While the pointer is over them, none becomes lower: what is pointed at stays where it is.
     """
@@ -351,31 +351,35 @@ class CardGrid(Themed, QWidget):
         self.opens = opens
         self.cards: tuple[MeasureCard, ...] = ()
         self.parts: list[CardWidget] = []
-        self.grid = vbox((STRETCH, 1), spacing=8, margins=0, parent=self)
-        self._rows: list[QHBoxLayout] = []
+        self.grid = grid_of(8, 8, margins=0, parent=self)
+        for column in range(2):
+            self.grid.setColumnStretch(column, 1)
 
     def show_cards(self, cards: tuple[MeasureCard, ...]) -> None:
         if cards == self.cards:
             return
         pointed = self.isVisible() and self.underMouse()
         heights = [(part.height(), part.accessibleName()) for part in self.parts] if pointed else []
-        kept = {at: part for at, (part, card) in enumerate(zip(self.parts, self.cards, strict=True))
-                if at < len(cards) and card == cards[at]}  # fmt: skip
-        for at, part in enumerate(self.parts):
-            if at not in kept:
-                remove_widget(part)
-        for row in self._rows:
-            for part in kept.values():
-                row.removeWidget(part)
-            self.grid.removeItem(row)
-            row.deleteLater()
-        self.parts = []
+        before, self.parts, self.cards = self.parts, [], cards
         for at, card in enumerate(cards):
-            self.parts.append(kept[at] if at in kept else self._made(card))
-        self._rows = [hbox(*((part, 1) for part in some), spacing=8) for some in _rows(self.parts)]
-        for at, row in enumerate(self._rows):
-            insert_layout(self.grid, at, row)
-        self.cards = cards
+            kept = at < len(before) and before[at].shown == card
+            self.parts.append(before[at] if kept else CardWidget(card, self.opens))
+        for part in before:
+            self.grid.removeWidget(part)
+            if part not in self.parts:
+                remove_widget(part)
+        rows: list[list[CardWidget]] = []
+        pair: list[CardWidget] = []
+        for part in self.parts:
+            pair += [] if part.shown.wide else [part]
+            if part.shown.wide or len(pair) == 2:
+                rows.append([part] if part.shown.wide else pair)
+                pair = pair if part.shown.wide else []
+        for at, line in enumerate([*rows, pair]):
+            self.grid.setRowStretch(at, 0)
+            for column, part in enumerate(line):
+                self.grid.addWidget(part, at, column, 1, 2 if part.shown.wide else 3 - len(line))
+        self.grid.setRowStretch(len(rows) + 1, 1)
         for part, (height, title) in zip(self.parts, heights, strict=False):
             part.setMinimumHeight(height if title == part.accessibleName() else 0)
 
@@ -390,22 +394,3 @@ class CardGrid(Themed, QWidget):
     def _let_shrink(self) -> None:
         for part in self.parts:
             part.setMinimumHeight(0)
-
-    def _made(self, card: MeasureCard) -> CardWidget:
-        part = CardWidget(card, self.opens)
-        return part
-
-
-def _rows(parts: Sequence[CardWidget]) -> list[list[CardWidget]]:
-    """Return cards in rows of two, wide ones in a row of their own."""
-    rows: list[list[CardWidget]] = []
-    waiting: list[CardWidget] = []
-    for part in parts:
-        if part.shown.wide:
-            rows.append([part])
-            continue
-        waiting.append(part)
-        if len(waiting) == 2:
-            rows.append(waiting)
-            waiting = []
-    return [*rows, waiting] if waiting else rows

@@ -23,7 +23,7 @@ from study_app.designer.document.document import (
 from study_app.designer.document.fields import renamed
 from study_app.designer.document.steps import DeleteElement, Do, RenameElement, Request, Step, Task
 from study_app.designer.document.study import read
-from study_app.designer.document.toml_text import Refused, free_in
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.form.form import form
 from study_app.designer.measures.measures_controller import MeasuresController
 from study_app.designer.measures.study_facts import facts
@@ -144,7 +144,7 @@ class DesignerController(QObject):
                 study, copy_of = read(file.read_bytes(), file.parent), file.stem
             opened = open_new(answered(study, answers), name)
         except StudyError as error:
-            self.place.new_page.refuse(f"{error}.", free_in(error))
+            self.place.new_page.refuse(f"{error}.")
             return
         self.saving.leave()
         begin_settings(opened.file, copy_of)
@@ -173,9 +173,9 @@ class DesignerController(QObject):
         self.show_outline()
         if opened.study.unreadable:
             self.place.show_tab("file")  # also where the fault has no line
-            self.place.problem_steps.open_next()
+            self.place.open_next_problem()
         else:
-            self.place.areas.focus_element()
+            self.place.parts.focus_element()
 
     def _close(self) -> None:
         if (closed := self.editing.opened) is not None:
@@ -233,15 +233,15 @@ class DesignerController(QObject):
             self.place.show_addable(addable(opened.study, opened.selected))
 
     def _judge_id(self, path: Place, name: str) -> None:
-        opened, why, free = self.editing.writable, "", ""
+        opened, why = self.editing.writable, ""
         if opened is None:
             return
         try:
             if name != str(path[-1]):
                 renamed(opened.study.document, path, name, self.editing.recorded(path))
         except Refused as refusal:
-            why, free = f"{refusal}.", refusal.free
-        self.place.form.head.refuse(why, free)
+            why = f"{refusal}."
+        self.place.form.head.refuse(why)
 
     def _show_step(self, step: Step) -> None:
         if step.fresh or step.said:

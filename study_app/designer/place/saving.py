@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.designer.document.document import Document, Standing, check_version
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.document.toml_text import Refused, free_in
+from study_app.designer.document.toml_text import Refused
 from study_app.designer.new_study_page import source_of
 from study_app.designer.place.editing import Editing
 from study_app.designer.place.header import Notice
@@ -125,7 +125,7 @@ class Saving(QObject):
             self.copy_asked.emit(source_of(opened.file))
             return
         if action == "problems":
-            self.place.areas.focus_problems()
+            self.place.parts.focus_problems()
             return
         if action == "compare":
             drafts = [one.hash for one in kept_versions(opened.file) if one.origin == "draft"]
@@ -212,7 +212,7 @@ class Saving(QObject):
             made = opened.saved_as(name)
         except StudyError as refusal:
             if self.card is not None:
-                self.card.refuse(f"{refusal}.", free_in(refusal))
+                self.card.refuse(f"{refusal}.")
             return
         self.write_draft(at_once=True)
         self.place.close_prompt()

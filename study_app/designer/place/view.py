@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cmp_to_key, partial
 from typing import Any
 
-from PySide6.QtCore import QEvent, QObject, QRect, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QApplication, QSizePolicy, QStackedWidget, QWidget
 
@@ -34,7 +34,7 @@ from study_app.designer.place.file import FileCard
 from study_app.designer.place.header import DesignerHeader, DesignerView, NoticeCard
 from study_app.designer.place.prompts import Prompt
 from study_app.designer.place.segments import Segments, small_button
-from study_app.designer.problems import ProblemRow, ProblemsCard, RepairButton
+from study_app.designer.problems import ProblemRow, ProblemsCard
 from study_app.gui.kit.commands import COMMANDS, add_commands, key_cap, press, tip
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import name_bars, remove_widget
@@ -203,12 +203,36 @@ class PathBar(QWidget):
             self._parts += [sign, made]
 
 
+SHORTCUT = Qt.FocusReason.ShortcutFocusReason
+
+
+def stops(part: QWidget) -> Iterator[QWidget]:
+    """Yield what Tab goes to in a part: from top to bottom, parts beside each other from left to right."""
+    if part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.focusProxy() is None and part.isEnabled():
+        yield part
+    inner = (one for one in part.children() if isinstance(one, QWidget) and one.isVisible() and not one.isWindow())
+    for one in sorted(inner, key=cmp_to_key(_read_before)):
+        yield from stops(one)
+
+
+def _read_before(one: QWidget, other: QWidget) -> int:
+    first, second = one.geometry(), other.geometry()
+    if first.bottom() < second.top() or second.bottom() < first.top():
+        return first.top() - second.top()
+    return first.left() - second.left()
+
+
 class Arrangement(QWidget):
     """Places outline, form, pane and problems; ``used`` is that of the first three that had the keyboard last."""
 
-    def __init__(self, outline: OutlineCard, form: FormCard, pane: RightPane, problems: ProblemsCard) -> None:
+    def __init__(
+        self, header: DesignerHeader, outline: OutlineCard, form: FormCard, pane: RightPane, file: FileCard,
+        problems: ProblemsCard,
+    ) -> None:  # fmt: skip
         super().__init__()
-        self.outline, self.form, self.pane, self.problems = outline, form, pane, problems
+        self.header, self.outline, self.form = header, outline, form
+        self.pane, self.file, self.problems = pane, file, problems
+        header.keyboard_left.connect(self.return_keyboard)
         self.side = "form"
         self.used: QWidget = form
         self.drawer = False
@@ -309,176 +333,92 @@ class Arrangement(QWidget):
         else:
             super().keyPressEvent(event)
 
-
-SHORTCUT = Qt.FocusReason.ShortcutFocusReason
-
-
-def stops(part: QWidget) -> Iterator[QWidget]:
-    """Yield what Tab goes to in a part: from top to bottom, parts beside each other from left to right."""
-    if part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.focusProxy() is None and part.isEnabled():
-        yield part
-    inner = (one for one in part.children() if isinstance(one, QWidget) and one.isVisible() and not one.isWindow())
-    for one in sorted(inner, key=cmp_to_key(_read_before)):
-        yield from stops(one)
-
-
-def _read_before(one: QWidget, other: QWidget) -> int:
-    first, second = one.geometry(), other.geometry()
-    if first.bottom() < second.top() or second.bottom() < first.top():
-        return first.top() - second.top()
-    return first.left() - second.left()
-
-
-class FocusAreas:
-    """Gives the keyboard to a part of the designer, and shows the part where it is hidden."""
-
-    def __init__(self, header: DesignerHeader, parts: Arrangement, file: FileCard, problems: ProblemsCard) -> None:
-        self._header, self._parts, self._file, self._problems = header, parts, file, problems
-        header.keyboard_left.connect(self.return_keyboard)
+    # the keyboard
 
     def focus_header(self) -> None:
-        self._header.study.setFocus(SHORTCUT)
+        self.header.study.setFocus(SHORTCUT)
 
     def focus_form(self) -> None:
-        self._parts.show_side("form")
-        self._parts.form.focus_first()
+        self.show_side("form")
+        self.form.focus_first()
 
     def focus_field(self, path: ElementPath) -> None:
         """Go to a field of the form, with its value selected; where it has no row, to the first row."""
         if not self.focus_row(path):
-            self._parts.form.focus_first()
-        elif isinstance(field := self._parts.form.focusWidget(), TypedLine | TypedText):
+            self.form.focus_first()
+        elif isinstance(field := self.form.focusWidget(), TypedLine | TypedText):
             field.selectAll()
 
     def focus_row(self, path: ElementPath) -> bool:
-        self._parts.show_side("form")
-        return self._parts.form.focus(path)
+        self.show_side("form")
+        return self.form.focus(path)
 
     def focus_element(self) -> None:
         """Go to the selected element: to its row, or to its form where the outline is a drawer."""
-        if self._parts.drawer:
+        if self.drawer:
             self.focus_form()
         else:
-            self._parts.focus_outline()
+            self.focus_outline()
 
     def return_keyboard(self) -> None:
         """Go back to where the keyboard was last in outline, form or pane; from *Find* to the selected element."""
-        last = last_focused(self._parts.used)
-        if last is None or last is self._parts.outline.words:
+        last = last_focused(self.used)
+        if last is None or last is self.outline.words:
             self.focus_element()
         else:
             last.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def focus_pane(self) -> None:
         """Go to the page of the right pane, and from within the pane to its tabs."""
-        pane = self._parts.pane
-        if pane.isAncestorOf(pane.window().focusWidget() or self._header):
+        pane = self.pane
+        if pane.isAncestorOf(pane.window().focusWidget() or self.header):
             pane.tabs.setFocus(SHORTCUT)
         else:
             self._focus_page()
 
     def _focus_tabs(self) -> None:
         """Go to the tabs of the right pane; from there Tab goes to what is beside them, then to the page."""
-        self._parts.show_side("pane")
-        self._parts.pane.tabs.setFocus(SHORTCUT)
+        self.show_side("pane")
+        self.pane.tabs.setFocus(SHORTCUT)
 
     def _focus_page(self) -> None:
-        self._parts.show_side("pane")
-        pane = self._parts.pane
+        self.show_side("pane")
+        pane = self.pane
         page = next(one for one in pane.pages if one.name == pane.tab)
         (page.body.focusProxy() or page.body).setFocus(SHORTCUT)
 
     def show_tab(self, name: str) -> None:
-        self._parts.pane.show_tab(name)
+        self.pane.show_tab(name)
         self._focus_page()
 
     def focus_problems(self) -> None:
-        self._problems.show()
-        self._problems.next.setFocus(SHORTCUT)
+        self.problems.show()
+        self.problems.next.setFocus(SHORTCUT)
 
     def switch_to_file(self) -> None:
         """Go to the file, and from there back to where the keyboard was in the form."""
-        if not self._file.editor.hasFocus():
+        if not self.file.editor.hasFocus():
             self.show_tab("file")
             return
-        last = self._parts.form.focusWidget()  # where the file was over the form, the form gets its keyboard from Qt
-        self._parts.show_side("form")
+        last = self.form.focusWidget()  # where the file was over the form, the form gets its keyboard from Qt
+        self.show_side("form")
         if last is not None and last.isVisible() and last.isEnabled():
             last.setFocus(SHORTCUT)
         else:
-            self._parts.form.focus_first()
+            self.form.focus_first()
 
     def cycle(self, by: int) -> None:
         stops: list[tuple[QWidget, Callable[[], None]]] = [
-            (self._header, self.focus_header),
-            (self._parts.outline, self._parts.focus_outline),
-            (self._parts.form, self.focus_form),
-            (self._parts.pane, self._focus_tabs),
+            (self.header, self.focus_header),
+            (self.outline, self.focus_outline),
+            (self.form, self.focus_form),
+            (self.pane, self._focus_tabs),
         ]
-        if self._problems.isVisible():
-            stops.append((self._problems, self.focus_problems))
-        focused = self._parts.window().focusWidget()
+        if self.problems.isVisible():
+            stops.append((self.problems, self.focus_problems))
+        focused = self.window().focusWidget()
         here = next((at for at, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -by)
         stops[(here + by) % len(stops)][1]()
-
-
-class ProblemSteps(QObject):
-    """Opens problems at their fields and offers their repairs, at the field and in the list.
-
-    ``ask`` selects an element ("select", path), makes a repair ("repair", row, words), or has the repairs of a problem
-    shown at once ("repairs", row).
-    """
-
-    def __init__(
-        self, card: ProblemsCard, form: FormCard, file: FileCard, areas: FocusAreas, ask: Callable[..., None]
-    ) -> None:
-        super().__init__(card)
-        self._card, self._form, self._file, self._areas, self._ask = card, form, file, areas, ask
-        card.opened.connect(self._open)
-        card.next.clicked.connect(self.open_next)
-        for part in (card, form):
-            part.repair_asked.connect(self._repair)
-
-    def open_next(self) -> None:
-        if coming := self._card.coming:
-            self._open_repair(coming[0])
-
-    def _open_repair(self, row: ProblemRow) -> None:
-        self._card.open(row)
-        self._ask("repairs", row)
-        for button in (self._form.repairs_of(row) or self._card.repairs_of(row))[:1]:
-            button.setFocus(Qt.FocusReason.ShortcutFocusReason)
-            for area in (self._form.area, self._card.area):
-                if area.isAncestorOf(button):
-                    area.ensureWidgetVisible(button, 0, 8)  # its field stays in sight
-
-    def _can_be_repaired(self, row: ProblemRow) -> bool:
-        self._ask("repairs", row)
-        return bool(self._card.repairs.get(row))
-
-    def _open(self, row: ProblemRow) -> None:
-        self._card.show()
-        if row.element:
-            self._ask("select", row.element)
-        in_form = bool(row.element) and self._areas.focus_row(row.fault.path)
-        if row.line is not None and not in_form and not row.warning:
-            self._areas.show_tab("file")
-        if row.line is not None:
-            self._file.editor.go_to(row.line - 1)
-
-    def _repair(self, row: ProblemRow, words: str) -> None:
-        """Make a repair; a key leads to the next one, or from the last one to its field, where a click leads."""
-        here = self._card.window().focusWidget()
-        by_keys = isinstance(here, RepairButton) and here.by_keys and here.problem == row
-        self._card.set_current(row)
-        self._ask("repair", row, words)
-        if row in self._card.problems:
-            return
-        coming = [one for one in self._card.coming if not one.warning]
-        if by_keys and coming:
-            self._open_repair(next(filter(self._can_be_repaired, coming), coming[0]))
-        else:
-            self._areas.focus_field(row.fault.path)
 
 
 class DesignerPlace(Place):
@@ -500,10 +440,8 @@ class DesignerPlace(Place):
         self.measures = MeasuresPage()
         self.pane.add_page(PanePage("measures", "Measures", self.measures, self.measures.controls, with_facts=False))
         self.pane.add_page(PanePage("file", "File", self.file, self.file.aside, tip=tip("file")))
-        self.parts = Arrangement(self.outline, self.form, self.pane, self.problems)
+        self.parts = Arrangement(self.header, self.outline, self.form, self.pane, self.file, self.problems)
         self.sides = self.parts.sides
-        self.areas = FocusAreas(self.header, self.parts, self.file, self.problems)
-        self.problem_steps = ProblemSteps(self.problems, self.form, self.file, self.areas, self.finish)
         self.adding, self.nothing = AddList(self), NoStudyCard()
         self._lay_out()
         self._connect()
@@ -528,21 +466,25 @@ class DesignerPlace(Place):
         header.strip.changed.connect(lambda shown: self.banner.make_room(other=shown))
         self.nothing.new.clicked.connect(lambda: self.ask("new"))
         self.nothing.study_asked.connect(partial(self.ask, "open"))
-        self.nothing.study_asked.connect(self.areas.focus_form)
+        self.nothing.study_asked.connect(self.parts.focus_form)
         self.banner.asked.connect(partial(self.ask, "banner"))
-        self.banner.left.connect(self.areas.return_keyboard)
+        self.banner.left.connect(self.parts.return_keyboard)
         outline.chosen.connect(partial(self.finish, "select"))
         outline.find_changed.connect(partial(self.ask, "find"))
-        outline.field_asked.connect(self.areas.focus_field)
-        outline.form_asked.connect(self.areas.focus_form)
-        outline.element_clicked.connect(lambda: self.areas.focus_form() if self.parts.drawer else None)
+        outline.field_asked.connect(self.parts.focus_field)
+        outline.form_asked.connect(self.parts.focus_form)
+        outline.element_clicked.connect(lambda: self.parts.focus_form() if self.parts.drawer else None)
         outline.tree.dropped.connect(lambda entry, to: self.asked.emit(MoveTo(entry, index_of(to))))
         self.adding.chosen.connect(lambda one: self._take_asked(one.asks))
         self.parts.path.open_asked.connect(partial(self.finish, "select"))
         form.asked.connect(self._take_asked)
         form.head.id_typed.connect(partial(self.ask, "judge id"))
         self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
-        self.problems.close_asked.connect(self.areas.return_keyboard)  # first, else Qt hands it to the page
+        self.problems.opened.connect(self._open_problem)
+        self.problems.next.clicked.connect(self.open_next_problem)
+        for part in (self.problems, form):
+            part.repair_asked.connect(self._repair)
+        self.problems.close_asked.connect(self.parts.return_keyboard)  # first, else Qt hands it to the page
         self.problems.close_asked.connect(self.problems.hide)
         self.new_page.begin_asked.connect(partial(self.ask, "begin"))
         self.new_page.given_up.connect(self.close_new)
@@ -636,7 +578,7 @@ class DesignerPlace(Place):
     def close_new(self) -> None:
         if self.stack.currentIndex():
             self.stack.setCurrentIndex(0)
-            self.areas.focus_element()
+            self.parts.focus_element()
 
     def show_prompt(self, prompt: Prompt, first: QWidget) -> None:
         self.close_prompt()
@@ -655,7 +597,7 @@ class DesignerPlace(Place):
             held = closing.isAncestorOf(self.focusWidget())
             remove_widget(closing)
             if held:  # else Qt hands the keyboard to the rail
-                self.areas.focus_element() if elsewhere else self.areas.return_keyboard()
+                self.parts.focus_element() if elsewhere else self.parts.return_keyboard()
 
     def flush(self) -> None:
         self.form.flush()
@@ -698,7 +640,7 @@ class DesignerPlace(Place):
                 self.form.focus((*path, "text"))
             case GoTo(element, field):
                 self.ask("select", element)
-                self.areas.focus_field(field)
+                self.parts.focus_field(field)
             case _:
                 self.asked.emit(asked)
 
@@ -712,16 +654,43 @@ class DesignerPlace(Place):
             self.form.focus_first_text(filled=step.fresh == "copy")  # a copy has its texts
 
     def open_next_problem(self) -> None:
+        """Open the next problem; its repair takes the keyboard, where it has one."""
         if self.view.form is not None:
             self.flush()
-            self.problem_steps.open_next()
+        if not (coming := self.problems.coming):
+            return
+        row = coming[0]
+        self.problems.open(row)
+        self.finish("repairs", row)
+        for button in (self.form.repairs_of(row) or self.problems.repairs_of(row))[:1]:
+            button.setFocus(Qt.FocusReason.ShortcutFocusReason)
+            for area in (self.form.area, self.problems.area):
+                if area.isAncestorOf(button):
+                    area.ensureWidgetVisible(button, 0, 8)  # its field stays in sight
+
+    def _open_problem(self, row: ProblemRow) -> None:
+        self.problems.show()
+        if row.element:
+            self.finish("select", row.element)
+        in_form = bool(row.element) and self.parts.focus_row(row.fault.path)
+        if row.line is not None and not in_form and not row.warning:
+            self.parts.show_tab("file")
+        if row.line is not None:
+            self.file.editor.go_to(row.line - 1)
+
+    def _repair(self, row: ProblemRow, words: str) -> None:
+        """Make a repair and go to its field."""
+        self.problems.set_current(row)
+        self.finish("repair", row, words)
+        if row not in self.problems.problems:
+            self.parts.focus_field(row.fault.path)
 
     def rename(self) -> None:
         if self.form.head.id.isVisible() and not self.view.header.read_only:
             self.form.head.edit_id()
 
     def show_tab(self, name: str) -> None:
-        self.areas.show_tab(name)
+        self.parts.show_tab(name)
 
     def enter(self) -> None:
         self.entered.emit()
