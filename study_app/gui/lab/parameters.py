@@ -2,17 +2,17 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QSizePolicy, QStackedLayout, QWidget
+from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QIcon, QPainter, QPaintEvent, QPixmap
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QStackedLayout, QWidget
 
 from study_app.gui.lab.lab_state import SIDES, Choices, LabView
 from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
+from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Themed, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
-from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, fill_rounded, scrolled, smooth_painter
-from study_app.gui.widgets.controls import ActionButton, Choice, CompactStop, IconButton, Toggle
+from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, scrolled, smooth_painter
+from study_app.gui.widgets.controls import ActionButton, Cap, Choice, CompactStop, IconButton, Toggle
 from study_app.gui.widgets.labels import Clamped, label, set_property
 from study_app.gui.widgets.numbers import NumberField, Range, Slider, read_number, write_number
 from study_app.haptics.model.effect import Parameter, Value
@@ -59,70 +59,55 @@ class Badge(Themed, QWidget):
         draw_badge(painter, QRectF(self.rect()).center(), self.theme, self._side, self._side)
 
 
-class Segment(Themed, QAbstractButton):
+class Segment(Themed, QPushButton):
     """One side: its letter and its name; the felt one is raised, with an accent edge."""
 
-    def __init__(self, side: Side) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._letter: str = side
+        self._shown: tuple[object, ...] = ()
         self.setCheckable(True)
+        self.setIconSize(QSize(BADGE + 6, BADGE))  # with the gap to the name
+        self.setProperty("role", "segment")
+        self.setFont(font("strong", scale=0.94))
         self.setFixedHeight(SWITCH_HEIGHT - 8)
+        self.setMinimumWidth(110)
+        self.setMaximumWidth(WIDEST)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     def show_name(self, name: str, letter: str) -> None:
-        if (name, letter) != (self.text(), self._letter):
-            self._letter = letter
-            self.setText(name)
-            self.setToolTip(name)
-            self.updateGeometry()
-            self.update()
+        if (shown := (name, letter, self.theme)) == self._shown:
+            return
+        self._shown = shown
+        words = self.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, WIDEST - BADGE - 30)
+        self.setText(words.replace("&", "&&"))
+        self.setToolTip(name)
+        picture = QPixmap((QSizeF(self.iconSize()) * self.devicePixelRatioF()).toSize())
+        picture.setDevicePixelRatio(self.devicePixelRatioF())
+        picture.fill(Qt.GlobalColor.transparent)
+        painter = QPainter(picture)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        draw_badge(painter, QPointF(BADGE / 2, BADGE / 2), self.theme, "A" if letter in {"A", "1"} else "B", letter)
+        painter.end()
+        self.setIcon(QIcon(picture))
 
     def nextCheckState(self) -> None:
         """Leave it to the view which side is felt."""
 
-    def sizeHint(self) -> QSize:
-        width = QFontMetricsF(font("strong", scale=0.94)).horizontalAdvance(self.text())
-        return QSize(min(round(width) + 60, WIDEST), SWITCH_HEIGHT - 8)
 
-    def minimumSizeHint(self) -> QSize:
-        return QSize(110, SWITCH_HEIGHT - 8)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        t = self.theme
-        painter = smooth_painter(self)
-        body = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        if self.isChecked() or self.underMouse():
-            painter.setPen(QPen(QColor(t.accent), 1.6) if self.isChecked() else Qt.PenStyle.NoPen)
-            painter.setBrush(QColor(t.surface if self.isChecked() else t.hover))
-            painter.drawRoundedRect(body, RADIUS_CONTROL, RADIUS_CONTROL)
-        if self.hasFocus():
-            painter.setPen(QPen(QColor(t.text if self.isChecked() else t.accent), 2))
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawRoundedRect(body.adjusted(2, 2, -2, -2), RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
-        side: Side = "A" if self._letter in {"A", "1"} else "B"
-        draw_badge(painter, QPointF(24, self.height() / 2), t, side, self._letter)
-        painter.setPen(QColor(t.text if self.isChecked() else t.text2))
-        painter.setFont(font("strong", scale=0.94, weight=600 if self.isChecked() else 500))
-        room = QRectF(42, 0, self.width() - 52, self.height())
-        shown = painter.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, round(room.width()))
-        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, shown)
-
-
-class SideSwitch(Themed, QWidget):
+class SideSwitch(QWidget):
     """Both sides in a track; ``switched`` when the other one is to be felt. The X key does the same."""
 
     switched = Signal()
 
     def __init__(self) -> None:
         super().__init__()
+        self.setProperty("role", "segments")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setFixedHeight(SWITCH_HEIGHT)
-        self.segments = {side: Segment(side) for side in SIDES}
-        row = hbox(spacing=2, margins=(4, 4, 34, 4), parent=self)
+        self.segments = {side: Segment() for side in SIDES}
         for segment in self.segments.values():
             segment.clicked.connect(lambda _on, it=segment: None if it.isChecked() else self.switched.emit())
-            row.addWidget(segment)
+        hbox(*self.segments.values(), 4, Cap(KEY), spacing=2, margins=(4, 4, 8, 4), parent=self)
         self.setToolTip("Feel the other setting (X)")
 
     def show_view(self, view: LabView) -> None:
@@ -134,18 +119,6 @@ class SideSwitch(Themed, QWidget):
             segment.setChecked(side == bench.presented)
             felt = ", felt now" if side == bench.presented else ""
             segment.setAccessibleName(f"{'' if bench.blind else side + ': '}{bench.shown_name(side)}{felt}")
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        t = self.theme
-        painter = smooth_painter(self)
-        fill_rounded(painter, QRectF(self.rect()), RADIUS_CONTROL + 2, t.sunk)
-        cap = QRectF(self.width() - 28, self.height() / 2 - 10, 20, 20)
-        painter.setPen(QPen(QColor(t.ctl), 1))
-        painter.setBrush(QColor(t.surface))
-        painter.drawRoundedRect(cap.adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
-        painter.setPen(QColor(t.text2))
-        painter.setFont(font("key"))
-        painter.drawText(cap, Qt.AlignmentFlag.AlignCenter, KEY)
 
 
 BUTTON = 44
