@@ -53,20 +53,16 @@ def cost_rows(costs: Costs) -> tuple[CostRow, ...]:
 def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
     """Return how far a setting is from the definition."""
     without = ", ".join(NAMED[it].label.lower() for it in errors.left_out)
+    share = f"{errors.wake:.0e}".replace("e-0", "e−").replace("e-", "e−") if errors.wake else "0"
+    wake, force = "no wake" if errors.wake is None else share, "no drag"
+    if errors.force_n is not None:
+        force = f"< {SMALLEST_N:g} N" if errors.force_n < SMALLEST_N else f"{errors.force_n:.3f} N"
     note = f"of drag and wake; no reference for {without}" if without else "along programmed paths"
     return (
-        ErrorRow("Wake, of Σ|e|/S", "no wake" if errors.wake is None else _tiny(errors.wake), note),
-        ErrorRow("Force, largest", "no drag" if errors.force_n is None else _newtons(errors.force_n), note),
+        ErrorRow("Wake, of Σ|e|/S", wake, note),
+        ErrorRow("Force, largest", force, note),
         ErrorRow("Lag of the velocity filter", f"{1e3 * errors.lag_s:z.1f} ms", "at constant acceleration"),
     )
-
-
-def _tiny(share: float) -> str:
-    return f"{share:.0e}".replace("e-0", "e−").replace("e-", "e−") if share > 0 else "0"
-
-
-def _newtons(force_n: float) -> str:
-    return f"< {SMALLEST_N:g} N" if force_n < SMALLEST_N else f"{force_n:.3f} N"
 
 
 log = logging.getLogger(__name__)
@@ -332,8 +328,8 @@ class LabController(QObject):
         for signal, slot in (
             (self.place.asked, self._asked),
             (self._opening.opened, self._begin),
-            (self._opening.failed, self._could_not_open),
-            (self._opening.said, self._say),
+            (self._opening.failed, self.fail),
+            (self._opening.said, partial(setattr, self, "_said")),
             (self._saving.failed, self._could_not_save),
         ):
             signal.connect(slot)
@@ -366,8 +362,10 @@ class LabController(QObject):
                 self._open(name)
             case "cancel", *_:
                 self._cancel()
-            case "stop", *_:
-                self._stop_force()
+            case "stop", *_ if live is not None:
+                live.stop_force()
+            case "stop", *_ if self._opening.busy_with is not None:  # a device would bring its own force
+                self._cancel()
             case "diagnose", *_:  # the main window opens the diagnosis then, which needs the device
                 self.trouble = self.view().trouble
                 self._let_go()
@@ -518,17 +516,9 @@ class LabController(QObject):
         live.feel(self.bench)
         self._cost_due.start()
 
-    @guarded
-    def _could_not_open(self, error: Exception) -> None:
-        raise error
-
     def _cancel(self) -> None:
         self._opening.cancel()
         self.trouble = "No device is open"
-
-    @guarded
-    def _say(self, line: str) -> None:
-        self._said = line
 
     def _choose(self, side: Side, choice: Choice) -> None:
         self._try(lambda: self.bench.choose(side, spoken(choice.liquid), choice.scene), "")
@@ -561,13 +551,6 @@ class LabController(QObject):
     @guarded
     def _ask_price(self) -> None:
         self._prices.ask(self.bench.in_hand.scene)
-
-    def _stop_force(self) -> None:
-        """Send zero force; a device that is being opened, which would bring its own, is given up."""
-        if self.live is not None:
-            self.live.stop_force()
-        elif self._opening.busy_with is not None:
-            self._cancel()
 
     def _save(self, path: Path, setting: Setting) -> None:
         if self.bench.blind:

@@ -317,7 +317,7 @@ class MainController(QObject):
         self._called_off: list[LiveSession] = []
         self._bugs: set[str] = set()
         self.results_place: ResultsPlace | None = None
-        self.window.closed.connect(self._leave)
+        self.window.closed.connect(lambda: self.loop.quit() if self.live is None else None)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
         self.devices.looked.connect(lambda _shown: self._show_machine())
@@ -573,10 +573,6 @@ class MainController(QObject):
             self.window.show_message(title, f"{live.error}.")
         elif live.code == BUG:
             self.window.show_message("A bug in the program stopped the session", "The terminal shows the details.")
-
-    def _leave(self) -> None:
-        if self.live is None:
-            self.loop.quit()
 
 
 def _draft_words() -> DraftWords:

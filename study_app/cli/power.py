@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from study_app.cli.options import EXIT_CANCELLED, FILE, ShowProgress, Target, executor_for, progress, takes_workers
+from study_app.cli.options import (
+    EXIT_CANCELLED,
+    FILE,
+    ShowProgress,
+    Target,
+    echo_files,
+    executor_for,
+    progress,
+    takes_workers,
+)
 from study_app.workers.executors import Workers
 
 if TYPE_CHECKING:
@@ -37,27 +46,19 @@ def _numbers(value: str, least: int, most: int, what: str) -> tuple[int, ...]:
     return tuple(numbers)
 
 
-def _sizes(_context: click.Context, _option: click.Parameter, value: str) -> tuple[int, ...]:
-    return _numbers(value, 2, 1000, "numbers of participants")
-
-
-def _trials(_context: click.Context, _option: click.Parameter, value: str | None) -> tuple[int, ...]:
-    return () if value is None else _numbers(value, *TRIALS, "numbers of trials")
-
-
 @click.command()
 @FILE
 @click.option(
     "--sizes",
     default=",".join(map(str, SIZES)),
     show_default=True,
-    callback=_sizes,
+    callback=lambda _context, _option, value: _numbers(value, 2, 1000, "numbers of participants"),
     metavar="N,N,…",
     help="Numbers of participants.",
 )
 @click.option(
     "--trials",
-    callback=_trials,
+    callback=lambda _context, _option, value: () if value is None else _numbers(value, *TRIALS, "numbers of trials"),
     metavar="N,N,…",
     help="Trials of each standard, comparison or rated level, for studies of thresholds, d′, ratings or magnitude "
     "estimation; default: the protocol's.",
@@ -175,8 +176,7 @@ def _write(found: Powers | Precisions, to: Path | None) -> None:
         click.echo(words, nl=False)
         files = {"power.md": words.encode(), "power.csv": threshold_csv(found)}
         written = write_files(to, files) if to is not None else ()
-    for path in written:
-        click.echo(path)
+    echo_files(written)
 
 
 @click.command()
@@ -209,5 +209,4 @@ def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
     if to is None:
         click.echo(text, nl=False)
         return
-    for path in write_files(to, {NAME: text.encode()}):
-        click.echo(path)
+    echo_files(write_files(to, {NAME: text.encode()}))

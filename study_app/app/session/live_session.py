@@ -35,7 +35,7 @@ from study_app.gui.kit.devices import described, screen_number, settings_here, t
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.widgets.background import Background
 from study_app.protocol.load import load, parse
-from study_app.session.preflight import Check, checks, refused
+from study_app.session.preflight import checks, refused
 from study_app.session.resume import is_rehearsal
 from study_app.session.start import (
     NewSession,
@@ -251,7 +251,11 @@ class LiveSession(QObject):
         shares_screen, rate_hz = shown_on is operated_on, shown_on.refreshRate()
         text_scale = text_scale_on(self.settings, shown_on)
         found = checks(made.facts_with(rate_hz, shown_on.devicePixelRatio()), protocol)
-        self._pass_checks(found)
+        if self._progress is not None:
+            for one in found:
+                self._progress(str(one))
+        if reason := refused(found):
+            raise SessionError(f"the session did not start: {reason}")
         screens = described(self.settings, shown_on, operated_on)
         yield
         operator = bridge.make_cockpit(chosen, protocol, rig, self.theme)
@@ -322,14 +326,6 @@ class LiveSession(QObject):
             self.note.say(line)
         elif self.bridge is not None:
             self.bridge.tell_of_device(line)
-
-    def _pass_checks(self, found: tuple[Check, ...]) -> None:
-        """Tell what the pre-flight found; refuse the session if it must not begin."""
-        for one in found:
-            if self._progress is not None:
-                self._progress(str(one))
-        if reason := refused(found):
-            raise SessionError(f"the session did not start: {reason}")
 
     def _finished(self) -> None:
         """Close the session after its windows; keep the error that ended it for the caller."""

@@ -32,7 +32,7 @@ from study_app.gui.kit.devices import device_choices, settings_here
 from study_app.gui.widgets.background import Background
 from study_app.session.simulated.answers_only import begin_at
 from study_app.session.start import NewSession, resumed
-from study_app.session.transitions.events import EndRequested, Event, ForceStopped, ResumeRequested
+from study_app.session.transitions.events import EndRequested, ForceStopped, ResumeRequested
 from study_app.session.transitions.page_builder import PARTICIPANT
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.store.atomic import copy_folder, write_file
@@ -60,7 +60,7 @@ class PlayedSession(LiveSession):
         self._shown = True
         participant, runner = self.bridge.participant, self.bridge.runner
         participant.installEventFilter(self)
-        participant.event.connect(self._hear)
+        participant.event.connect(lambda event: self._stop_later() if isinstance(event, ForceStopped) else None)
         self.bridge.operator.asked.connect(lambda what, _details: self._stop_later() if what == "stop" else None)
         if self.bridge.strip is not None:
             self.bridge.strip.stop.pressed.connect(self._stop_later)
@@ -98,10 +98,6 @@ class PlayedSession(LiveSession):
         event.ignore()
         self._stop_later()
         return True
-
-    def _hear(self, event: Event) -> None:
-        if isinstance(event, ForceStopped):
-            self._stop_later()
 
     def _follow(self, state: SessionState) -> None:
         if state.phase is Phase.TROUBLE:

@@ -404,10 +404,5 @@ def _screens(settings: MachineSettings) -> tuple[str, ...]:
     """Return a line for each screen: whose it is, size, rate and scaling."""
     screens = screens_shown()
     participants = settings.screen_among([screen.name for screen in screens])
-    return tuple(
-        f"{_whose(screen.number, participants, alone=len(screens) == 1)}: {screen.words}" for screen in screens
-    )
-
-
-def _whose(number: int, participants: int, *, alone: bool) -> str:
-    return f"Participant's screen {number}" if number == participants and not alone else f"Screen {number}"
+    whose = {participants: "Participant's screen"} if len(screens) > 1 else {}
+    return tuple(f"{whose.get(screen.number, 'Screen')} {screen.number}: {screen.words}" for screen in screens)

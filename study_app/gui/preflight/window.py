@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QAccessible, QCloseEvent, QColor, QKeyEvent, QPaintEvent, QPen
-from PySide6.QtWidgets import QAbstractSlider, QLabel, QProgressBar, QWidget
+from PySide6.QtWidgets import QAbstractSlider, QBoxLayout, QLabel, QProgressBar, QWidget
 
 from study_app.devices.descriptor import NOT_AVAILABLE, Backend
 from study_app.gui.kit.dialogs import Question
@@ -213,6 +213,16 @@ class CheckRow(Themed, QWidget):
         painter.drawLine(24, self.height() - 1, self.width() - 24, self.height() - 1)
 
 
+def check_rows(checks: Sequence[Check], before: list[CheckRow], column: QBoxLayout) -> list[CheckRow]:
+    """Return the rows of checks, put into a column in place of those before."""
+    for row in before:
+        remove_widget(row)
+    made = [CheckRow(check, last=check is checks[-1]) for check in checks]
+    for place, row in enumerate(made):
+        column.insertWidget(place, row)
+    return made
+
+
 FULL, LEAST = QSize(1200, 800), QSize(1024, 640)
 ASIDE = 352
 PAGES = {
@@ -299,7 +309,8 @@ class PreflightWindow(QWidget):
         if self._busy and not view.busy:
             self.start.setFocus()  # what was pressed lost the keyboard to Cancel meanwhile
         self._busy = view.busy
-        self._show_checks(view)
+        if [row.check for row in self.rows] != list(view.checks):
+            self.rows = check_rows(view.checks, self.rows, self.checks.column)
         self._show_rows(view)
         late_us = view.facts.lateness_ns / 1e3
         p99_us = float(np.percentile(late_us, 99)) if len(late_us) else None
@@ -314,15 +325,6 @@ class PreflightWindow(QWidget):
             self.chip.show_state("warn", "warning", view.passed)
         else:
             self.chip.show_state("ok", "check", view.passed)
-
-    def _show_checks(self, view: PreflightView) -> None:
-        if [row.check for row in self.rows] == list(view.checks):
-            return
-        for row in self.rows:
-            remove_widget(row)
-        self.rows = [CheckRow(check, last=check is view.checks[-1]) for check in view.checks]
-        for row in self.rows:
-            self.checks.column.addWidget(row)
 
     def _show_rows(self, view: PreflightView) -> None:
         for place, (name, words) in enumerate(view.rows):
@@ -432,11 +434,7 @@ class ComputerWindow(Question):
         self.bar.setValue(round(100 * share))
 
     def show_checks(self, checks: tuple[Check, ...]) -> None:
-        for row in self.rows:
-            remove_widget(row)
-        self.rows = [CheckRow(check, last=check is checks[-1]) for check in checks]
-        for place, row in enumerate(self.rows):
-            self._rows.insertWidget(place, row)
+        self.rows = check_rows(checks, self.rows, self._rows)
         passed = sum(check.verdict == "ok" for check in checks)
         self.show_sentence(f"{passed} of {len(checks)} passed.")
 

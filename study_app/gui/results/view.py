@@ -227,24 +227,19 @@ class ExclusionsCard(Card):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
 
     def _line(self, one: Exclusion) -> QWidget:
+        """Return one decision: what, why, who and when."""
         back = ActionButton("undo", "Include again …", role="plain", height=30)
         back.setAccessibleName(f"Include again: {excluded_words(one)}")
         back.clicked.connect(lambda: self.take_back_asked.emit(one))
-        return _line(one, back)
-
-
-def _line(one: Exclusion, back: ActionButton) -> QWidget:
-    """Return one decision: what, why, who and when."""
-    made = QWidget()
-    what = label(excluded_words(one), "label", wraps=True, weight=600)
-    why = label(one.reason, "label", "text2", wraps=True, weight=400)
-    now = datetime.now().astimezone()
-    at = time_of(one.excluded_at)
-    by = one.rule_or_person + ("" if at is None else f", {started_words(at.astimezone(now.tzinfo), now)}")
-    who = label(by, "small", "text2")
-    vbox(hbox((what, 1), back), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
-    made.setAccessibleName(f"{excluded_words(one)}: {one.reason} ({by})")
-    return made
+        made = QWidget()
+        what = label(excluded_words(one), "label", wraps=True, weight=600)
+        why = label(one.reason, "label", "text2", wraps=True, weight=400)
+        now, at = datetime.now().astimezone(), time_of(one.excluded_at)
+        by = one.rule_or_person + ("" if at is None else f", {started_words(at.astimezone(now.tzinfo), now)}")
+        who = label(by, "small", "text2")
+        vbox(hbox((what, 1), back), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
+        made.setAccessibleName(f"{excluded_words(one)}: {one.reason} ({by})")
+        return made
 
 
 def exclusions_at(study: Path) -> Path:
@@ -416,7 +411,9 @@ class ResultsPlace(Place):
         if self.view.sealed:
             chips.append(("neutral", "lock", "Blinded: shown by code", "The names of the settings are sealed"))
         if self.view.opened:
-            chips.append(("neutral", "eye", _shortened(self.view.opened), self.view.opened))
+            opened, most = self.view.opened, 2 * REASON_SIGNS
+            words = opened if len(opened) <= most else f"{opened[: most - 1].rstrip()}…"
+            chips.append(("neutral", "eye", words, opened))
         if self.view.doubts:
             words = "1 file is" if len(self.view.doubts) == 1 else f"{len(self.view.doubts)} files are"
             chips.append(("warn", "warning", f"{words} not as recorded", "\n".join(self.view.doubts)))
@@ -741,8 +738,3 @@ class ResultsPlace(Place):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._arrange()
-
-
-def _shortened(words: str) -> str:
-    """Return a line for a chip, the end cut where it is long."""
-    return words if len(words) <= 2 * REASON_SIGNS else f"{words[: 2 * REASON_SIGNS - 1].rstrip()}…"
