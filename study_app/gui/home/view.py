@@ -323,7 +323,6 @@ class HomePlace(Place):
         from study_app.gui.sessions.session_page import SessionPage  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         page = SessionPage(self, self.theme, session, open_here)
-        page.changed.connect(self.show_sessions)
         self._open(page)
 
     def end(self) -> None:

@@ -2,7 +2,7 @@
 
 import importlib.util
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
@@ -33,8 +33,8 @@ from study_app.analysis.worker_messages import (
     start_analysis_worker,
 )
 from study_app.gui.application import open_here
-from study_app.gui.kit.dialogs import Work
-from study_app.gui.kit.fields import Field
+from study_app.gui.kit.dialogs import REASON, Question, Work
+from study_app.gui.kit.fields import Field, choice
 from study_app.gui.results.figures import (
     FiguresPanel,
     ResultsView,
@@ -46,9 +46,9 @@ from study_app.gui.results.figures import (
     unblinded_words,
 )
 from study_app.gui.sessions.session_facts import Column, SessionFacts, matching, session_facts, started_words, states_of
-from study_app.gui.sessions.session_page import LeaveOutDialog, SessionPage, take_back_question, unblind_question
+from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.sessions.sessions_table import SessionsTable
-from study_app.gui.theme.theme import font
+from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, Chip, Rule, scrolled
@@ -61,7 +61,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.sites.merged import FOLDER, folders_of
 from study_app.workers.server import Crashed, Refused
 
-WIDTH = 600
+WIDTH, QUESTION_PX = 600, 560
 WARNED = 3
 """Of so many files that are not as recorded each is named."""
 
@@ -115,6 +115,63 @@ class WriteDialog(Work):
         opens = "Open the report" if self._opens_file else "Open the folder"
         warned = "".join(f"\n{line}" for line in warnings[:WARNED])
         self.show_done(f"{counted(len(files), 'file')} in {files[0].parent}.{warned}{more}", opens)
+
+
+NEEDS: Final = {"by": "Please enter a name; it is recorded.", "reason": REASON}
+
+
+def by_and_reason(by: str, who: str, example: str) -> tuple[Field, Field]:
+    """Return the fields that say who decides, and why."""
+    return Field("by", by, placeholder=who), Field("reason", "Reason", placeholder=f"For example: {example}")
+
+
+class LeaveOutDialog(Question):
+    """Asks which session, or which trial of it, by whom and why.
+
+    Parameters
+    ----------
+    sessions : those that are not left out yet
+    trials : of each session (participant, number) the main trials and the words for them
+    chosen : the session to begin with
+    """
+
+    def __init__(
+        self,
+        parent: QWidget,
+        theme: Theme,
+        sessions: Sequence[SessionFacts],
+        trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]],
+        chosen: SessionFacts | None,
+    ) -> None:
+        super().__init__(
+            parent,
+            theme,
+            "Exclude from the analysis",
+            "It no longer counts in measures, figures and tests. Nothing is deleted: exclusions.csv and every report "
+            "state what was excluded, by whom and why.",
+            ActionButton("minus", "Exclude", role="primary"),
+            fields=(
+                choice("session", "Session", {(facts.participant, facts.session): facts.name for facts in sessions}),
+                choice("trial", "Scope", {}),
+                *by_and_reason("By", "Your initials, or the rule's name", "fell asleep"),
+            ),
+            needs=NEEDS,
+            width=QUESTION_PX,
+        )
+        self._trials = trials
+        if chosen is not None:
+            self.editors["session"].show_value((chosen.participant, chosen.session))
+        self.editors["session"].edited.connect(self._show_trials)
+        self._show_trials()
+
+    def _show_trials(self) -> None:
+        trials = self._trials.get(self.value("session"), ())
+        self.editors["trial"].offer({None: "Whole session", **{at: f"Trial {at}: {words}" for at, words in trials}})
+
+    @property
+    def chosen(self) -> tuple[str, int, int | None]:
+        """Participant, session and trial; None for the whole session."""
+        return *self.value("session"), self.value("trial")
 
 
 COLUMNS = (
@@ -429,15 +486,27 @@ class ResultsPlace(Place):
             self._arrange()
 
     def _ask_unblind(self) -> None:
-        open_ones = sum(one.needs_care for one in self.view.sessions)
-        dialog = unblind_question(self, self.theme, self._name(), running=open_ones)
+        running = sum(one.needs_care for one in self.view.sessions)
+        many = "1 session is" if running == 1 else f"{running} sessions are"
+        later = f"{many} not complete. Operators of the remaining sessions will no longer be blind." if running else ""
+        dialog = Question(
+            self,
+            self.theme,
+            f"Unblind {self._name()}?",
+            "Everyone who opens this study will see which setting was which, here and in every table, figure and "
+            "report. This cannot be undone. Your name, the reason and the time are stored with the data.",
+            ActionButton("eye", "Unblind", role="danger"),
+            fields=by_and_reason("Name", "Your name or initials, such as AK", "collection closed"),
+            needs=NEEDS,
+            warning=later,
+            width=QUESTION_PX,
+        )
         decide = partial(self._decide, "opening the key", OpenKey)
         dialog.accepted.connect(lambda: decide(dialog.value("by"), dialog.value("reason")))
         self._open(dialog)
 
     def _open_session(self, session: SessionFacts) -> None:
         page = SessionPage(self, self.theme, session, self._opener)
-        page.changed.connect(self.look)
         self._open(page)
 
     def _ask_leave_out(self) -> None:
@@ -448,7 +517,17 @@ class ResultsPlace(Place):
         self._open(dialog)
 
     def _ask_take_back(self, one: Exclusion) -> None:
-        dialog = take_back_question(self, self.theme, excluded_words(one), one.reason)
+        dialog = Question(
+            self,
+            self.theme,
+            f"Include again: {excluded_words(one)}",
+            f"It was excluded for this reason: “{one.reason}”. It will count again in measures, figures and tests. "
+            "Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
+            ActionButton("undo", "Include again", role="primary"),
+            fields=by_and_reason("By", "Your name or initials, such as AK", "wrong participant"),
+            needs=NEEDS,
+            width=QUESTION_PX,
+        )
         decide = partial(self._decide, "taking the exclusion back", TakeBack, *one.what)
         dialog.accepted.connect(lambda: decide(dialog.value("by"), dialog.value("reason")))
         self._open(dialog)

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QScrollArea, QWidget
 
 from study_app.errors import StoreError
-from study_app.gui.kit.dialogs import REASON, Question
-from study_app.gui.kit.fields import Field, choice
 from study_app.gui.sessions.session_facts import (
     VALIDITY,
     SessionFacts,
@@ -23,7 +21,7 @@ from study_app.gui.sessions.session_facts import (
     validity_chip,
 )
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import Themed, apply_theme, remove_widget
+from study_app.gui.theme.themed import Themed, apply_theme
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip
@@ -33,7 +31,7 @@ from study_app.gui.widgets.row_table import CHIP_ROLE, Rows, Table
 from study_app.number_text import counted
 from study_app.store.blinded.blinding import opened, opened_key
 from study_app.store.delivered import beyond_limits
-from study_app.store.exclusions import Exclusion, exclude, exclusions, include
+from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Answer, Event, Note, Repeat, TrialStarted, start_of
@@ -123,8 +121,8 @@ def limits_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
         return f"All {counted(len(judged), 'measured trial')} met the limits of the study.{later}"
     return (
         f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded a limit of the study. The "
-        "answers are kept and still count; exclude those you do not trust. The column “Limits” and the line below "
-        f"the table name the limit.{later}"
+        "answers are kept and still count; exclude those you do not trust in Results. The column “Limits” and the line "
+        f"below the table name the limit.{later}"
     )
 
 
@@ -201,99 +199,6 @@ def _notes(lines: Sequence[Event]) -> list[str]:
     return found
 
 
-WIDTH = 560
-
-
-NEEDS: Final = {"by": "Please enter a name; it is recorded.", "reason": REASON}
-
-
-def by_and_reason(by: str, who: str, example: str) -> tuple[Field, Field]:
-    """Return the fields that say who decides, and why."""
-    return Field("by", by, placeholder=who), Field("reason", "Reason", placeholder=f"For example: {example}")
-
-
-def unblind_question(parent: QWidget, theme: Theme, study: str, *, running: int) -> Question:
-    """Return the question who opens the key and why, which says what it means."""
-    many = "1 session is" if running == 1 else f"{running} sessions are"
-    later = f"{many} not complete. Operators of the remaining sessions will no longer be blind." if running else ""
-    return Question(
-        parent,
-        theme,
-        f"Unblind {study}?",
-        "Everyone who opens this study will see which setting was which, here and in every table, figure and report. "
-        "This cannot be undone. Your name, the reason and the time are stored with the data.",
-        ActionButton("eye", "Unblind", role="danger"),
-        fields=by_and_reason("Name", "Your name or initials, such as AK", "collection closed"),
-        needs=NEEDS,
-        warning=later,
-        width=WIDTH,
-    )
-
-
-class LeaveOutDialog(Question):
-    """Asks which session, or which trial of it, by whom and why.
-
-    Parameters
-    ----------
-    sessions : those that are not left out yet
-    trials : of each session (participant, number) the main trials and the words for them
-    chosen : the session to begin with
-    """
-
-    def __init__(
-        self,
-        parent: QWidget,
-        theme: Theme,
-        sessions: Sequence[SessionFacts],
-        trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]],
-        chosen: SessionFacts | None,
-    ) -> None:
-        super().__init__(
-            parent,
-            theme,
-            "Exclude from the analysis",
-            "It no longer counts in measures, figures and tests. Nothing is deleted: exclusions.csv and every report "
-            "state what was excluded, by whom and why.",
-            ActionButton("minus", "Exclude", role="primary"),
-            fields=(
-                choice("session", "Session", {(facts.participant, facts.session): facts.name for facts in sessions}),
-                choice("trial", "Scope", {}),
-                *by_and_reason("By", "Your initials, or the rule's name", "fell asleep"),
-            ),
-            needs=NEEDS,
-            width=WIDTH,
-        )
-        self._trials = trials
-        if chosen is not None:
-            self.editors["session"].show_value((chosen.participant, chosen.session))
-        self.editors["session"].edited.connect(self._show_trials)
-        self._show_trials()
-
-    def _show_trials(self) -> None:
-        trials = self._trials.get(self.value("session"), ())
-        self.editors["trial"].offer({None: "Whole session", **{at: f"Trial {at}: {words}" for at, words in trials}})
-
-    @property
-    def chosen(self) -> tuple[str, int, int | None]:
-        """Participant, session and trial; None for the whole session."""
-        return *self.value("session"), self.value("trial")
-
-
-def take_back_question(parent: QWidget, theme: Theme, what: str, reason: str) -> Question:
-    """Return the question who takes an exclusion back and why."""
-    return Question(
-        parent,
-        theme,
-        f"Include again: {what}",
-        f"It was excluded for this reason: “{reason}”. It will count again in measures, figures and tests. Your name, "
-        "the reason and the time are stored in exclusions_reversed.jsonl.",
-        ActionButton("undo", "Include again", role="primary"),
-        fields=by_and_reason("By", "Your name or initials, such as AK", "wrong participant"),
-        needs=NEEDS,
-        width=WIDTH,
-    )
-
-
 HEADINGS = ("Trial", "Presented", "Ended", "Limits", "Answers", "Notes")
 WIDTHS = ((20, 56), (120, 130), (60, 90), (60, 134), (30, 70), (160, 120))
 SIZE = (1040, 700)
@@ -342,18 +247,12 @@ def trial_words(trial: TrialRecord) -> str:
 
 
 class SessionPage(Themed, QDialog):
-    """One session in full, read in a thread.
-
-    ``changed`` comes when something was left out or taken back; ``watched`` is the window of the trial watched last.
-    """
-
-    changed = Signal()
+    """One session in full, read in a thread; ``watched`` is the window of the trial that was watched last."""
 
     def __init__(self, parent: QWidget, theme: Theme, facts: SessionFacts, opener: Callable[[Path], object]) -> None:
         super().__init__(parent)
         self.facts = facts
         self.record: SessionRecord | None = None
-        self.decision: Question | None = None
         self.watched: QDialog | None = None
         self._reader = Background(self)
         self._reader.done.connect(self._show)
@@ -364,24 +263,19 @@ class SessionPage(Themed, QDialog):
         self.model = Rows({heading: heading for heading in HEADINGS}, trial_cell)
         self.trials = Table(self.model, WIDTHS, "Trials")
         self.trial = label("", "label", "text2", wraps=True)
-        self.notes, self.files = (label("", "label", "text2", wraps=True) for _ in range(2))
+        self.out, self.notes, self.files = (label("", "label", "text2", wraps=True) for _ in range(3))
         self.watch = ActionButton("play", "Watch again", height=36)
-        self.leave_out = ActionButton("minus", "Exclude …", height=36)
         self.folder = ActionButton("file", "Open the folder", role="plain", height=34)
         self.close_button = ActionButton("", "Close", role="primary", height=40)
-        self.none_out = label("Nothing is excluded from the analysis.", "label", "text2", wraps=True)
-        self.lines: list[QWidget] = []
         self._lay_out()
         self.trials.selectionModel().selectionChanged.connect(lambda *_changes: self._choose_trial())
         for asks in (self.watch.clicked, self.trials.opened):
             asks.connect(self._watch)
-        self.leave_out.clicked.connect(self._ask_leave_out)
         self.folder.clicked.connect(lambda: opener(facts.folder))
         self.close_button.clicked.connect(self.accept)
-        for button in (self.watch, self.leave_out, self.folder):
+        for button in (self.watch, self.folder):
             button.setAutoDefault(False)
-        for button in (self.watch, self.leave_out):
-            button.setEnabled(False)
+        self.watch.setEnabled(False)
         apply_theme(self, theme)
         available = self.screen().availableSize()
         self.resize(min(SIZE[0], available.width() - 40), min(SIZE[1], available.height() - 60))
@@ -398,9 +292,8 @@ class SessionPage(Themed, QDialog):
         trials = Card("Trials", self.watch, padding=16, gap=8)
         add_parts(trials.column, (self.trials, 1), self.trial)
         left = vbox((trials, 1))
-        out = Card("Excluded", self.leave_out, padding=16, gap=8)
-        self._out = out.column
-        out.column.addWidget(self.none_out)
+        out = Card("Excluded", padding=16, gap=8)
+        out.column.addWidget(self.out)
         notes = Card("Notes", padding=16, gap=8)
         notes.column.addWidget(self.notes)
         files = Card("Files", self.folder, padding=16, gap=8)
@@ -434,26 +327,12 @@ class SessionPage(Themed, QDialog):
             self.trials.selectRow(max(0, row))
         self.notes.setText("\n".join(record.notes) or "No notes.")
         self.files.setText("\n".join(f"{name}  {_size(size)}" for name, size in record.files))
-        self.leave_out.setEnabled(record.facts.excluded is None)
-        self._show_left_out(record.left_out)
+        left_out = (
+            f"{'Whole session' if one.trial is None else f'Trial {one.trial}'}: {one.reason} ({one.rule_or_person})"
+            for one in record.left_out
+        )
+        self.out.setText("\n".join(left_out) or "Nothing is excluded from the analysis.")
         self._choose_trial()
-
-    def _show_left_out(self, listed: tuple[Exclusion, ...]) -> None:
-        for line in self.lines:
-            remove_widget(line)
-        self.lines = []
-        for one in listed:
-            what = "Whole session" if one.trial is None else f"Trial {one.trial}"
-            back = ActionButton("undo", "Include again …", role="plain", height=30)
-            back.setAccessibleName(f"Include again: {what}")
-            back.setAutoDefault(False)
-            back.clicked.connect(partial(self._ask_take_back, one, what))
-            line = QWidget()
-            words = label(f"{what}: {one.reason} ({one.rule_or_person})", "label", wraps=True)
-            hbox((words, 1), back, margins=0, parent=line)
-            self._out.addWidget(line)
-            self.lines.append(line)
-        self.none_out.setVisible(not listed)
 
     @property
     def chosen(self) -> TrialRecord | None:
@@ -478,41 +357,6 @@ class SessionPage(Themed, QDialog):
             )
             made.finished.connect(made.deleteLater)
             made.open()
-
-    def _ask_leave_out(self) -> None:
-        assert self.record is not None  # noqa: S101 - the button is off until it was read
-        who = (self.facts.participant, self.facts.session)
-        trials = {trial.number: trial.words for trial in self.record.trials if trial.excluded is None}
-        dialog = LeaveOutDialog(self, self.theme, [self.facts], {who: tuple(trials.items())}, self.facts)
-        leave_out = partial(exclude, self._study, *who)
-        self._ask(dialog, lambda: partial(leave_out, trial=dialog.value("trial")))
-
-    def _ask_take_back(self, one: Exclusion, what: str) -> None:
-        dialog = take_back_question(self, self.theme, what, one.reason)
-        take_back = partial(include, self._study, one.participant, one.session, trial=one.trial)
-        self._ask(dialog, lambda: take_back)
-
-    @property
-    def _study(self) -> Path:
-        return self.facts.folder.parents[2]
-
-    def _ask(self, dialog: Question, decision: Callable[[], Callable[..., object]]) -> None:
-        self.decision = dialog
-        dialog.accepted.connect(
-            lambda: self._decide(partial(decision(), by=dialog.value("by"), reason=dialog.value("reason")))
-        )
-        dialog.finished.connect(dialog.deleteLater)
-        dialog.open()
-
-    def _decide(self, decide: Callable[[], object]) -> None:
-        """Carry out a decision in the thread that reads, read the session again, and tell of it."""
-
-        def decided() -> SessionRecord:
-            decide()
-            return read_record(self.facts.folder)
-
-        self._reader.run(decided)
-        self._reader.done.connect(lambda _record: self.changed.emit(), Qt.ConnectionType.SingleShotConnection)
 
 
 def _size(size: int) -> str:

@@ -138,7 +138,6 @@ def read_again(**changed: Any) -> Callable[[Any], None]:
 
 PAGE: Actions = {
     **{f"trial {row + 1}": lambda made, row=row: made.trials.selectRow(row) for row in (1, 2, 3)},  # type: ignore[misc]
-    "excluding": lambda made: made.leave_out.click(),
     "sealed": read_again(record=replace(RECORD, left_out=(), notes=())),
     "session excluded": read_again(
         record=replace(

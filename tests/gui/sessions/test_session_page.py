@@ -1,19 +1,17 @@
-"""A session's page: what it reads of a folder, what it shows, and what leaving out does there."""
+"""A session's page: what it reads of a folder, and what it shows."""
 
 import re
 import shutil
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QWidget
 
 from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.sessions.session_page import SessionPage, read_record
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
 from tests.golden import compare
@@ -88,10 +86,6 @@ def page_of(qtbot, study, participant=None):
     return page
 
 
-def said(page, row, column):
-    return page.model.index(row, column).data()
-
-
 def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot, tmp_path, pytestconfig):
     lines, before = [], []
     for hold in (unconfirmed, measured):
@@ -119,30 +113,3 @@ def test_no_page_names_a_condition_of_a_sealed_study(study):
     text = repr(record)
     protocol = load("demo")
     assert [name for name in protocol.conditions if re.search(rf"\b{name}\b", text)] == []
-
-
-def test_a_trial_is_left_out_and_taken_back(qtbot, study):
-    page = page_of(qtbot, study)
-    changed = []
-    page.changed.connect(lambda: changed.append(True))
-    page.leave_out.click()
-    dialog = page.decision
-    dialog.editors["trial"].control.setCurrentIndex(1)
-    number = dialog.value("trial")
-    dialog.editors["by"].show_value("AK")
-    dialog.editors["reason"].show_value("phone rang")
-    qtbot.mouseClick(dialog.go_on, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: bool(changed))
-    (one,) = exclusions(study)
-    assert (one.trial, one.reason) == (number, "phone rang")
-    assert "phone rang" in page.lines[0].findChild(QLabel).text()
-    row = next(row for row, one in enumerate(page.model.rows) if one.number == number)
-    assert said(page, row, 3) == "Excluded"
-    qtbot.mouseClick(page.lines[0].findChild(QPushButton), Qt.MouseButton.LeftButton)
-    page.decision.editors["by"].show_value("BC")
-    page.decision.editors["reason"].show_value("it was another phone")
-    qtbot.mouseClick(page.decision.go_on, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: len(changed) == 2)
-    assert exclusions(study) == ()
-    assert page.lines == []
-    assert said(page, row, 3) != "Excluded"
