@@ -12,7 +12,8 @@ import pytest
 
 pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missing", exc_type=ImportError)
 
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QPoint
+from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.main_controller import MainController
 from study_app.gui.operator.session_panels import Strip
@@ -24,7 +25,6 @@ from study_app.protocol.wording.languages import words
 from study_app.store.sessions.recovery import check_can_go_on
 from tests.compiled import needs_servo
 from tests.end_to_end.real_windows import Program, needs_display, new_session, virtual_display, wait_for
-from tests.end_to_end.walking import place_in
 from tests.gui.small import ManualClock, questionnaire
 
 GIVEN = [7, 1, 4, 6, 2, 3, 5, 7, 1]
@@ -65,6 +65,11 @@ def test_a_session_by_keys_and_clicks_from_the_home_window_into_the_csv(display,
     (folder,) = tmp_path.glob("results/rek2024/data/sub-P042/ses-01")
     study = source_bytes(str(tmp_path / "protocols" / "rek2024.toml"))
     check_can_go_on(folder, parse(study, "rek2024"), study)
+
+
+def place_in(window: QWidget, part: QWidget) -> QPoint:
+    assert part.isVisible()
+    return part.mapTo(window, part.rect().center())
 
 
 def begin_session(program: Program, qtbot) -> None:

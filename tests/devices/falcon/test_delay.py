@@ -11,11 +11,13 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
-from study_app.devices.falcon.replies import FASTER_READS, GIVEN_UP_READS, RETEST_TICKS, SLOWER_READS
 from study_app.haptics.kernels.c_functions import READ_NEW
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.devices.falcon.support.scripted_bridge import Ticks, reply
+
+SLOWER_READS, FASTER_READS, GIVEN_UP_READS, RETEST_TICKS = 8, 200, 32, 30
+"""After how many reads a slower and a quicker link and one that cannot be measured are seen, and it is looked again."""
 
 
 class Link(Ticks):

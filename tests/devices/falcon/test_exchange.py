@@ -17,9 +17,8 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("the exchange is made of C functions", allow_module_level=True)
 
-from study_app.devices.falcon.constants import ERROR_IO, ERROR_NO_DEVICE, ERROR_OVERFLOW, ERROR_TIMEOUT, ZERO
+from study_app.devices.falcon.constants import ERROR_IO, ERROR_NO_DEVICE, ERROR_OVERFLOW, ERROR_TIMEOUT
 from study_app.devices.falcon.exchange import COUNTERS, limit_growth
-from study_app.devices.falcon.replies import FLAGS_AT
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
 from tests.devices.falcon.support.scripted_bridge import (
     CENTRE_M,
@@ -62,7 +61,7 @@ class Recorded(Ticks):
         assert size_n <= 8.0 * 1.001 or falcon.force_limit_n > 8.0
         self.taken += 1
         if self.taken % self.every == 0:
-            flags = [f"{int(packet[FLAGS_AT] - ZERO):04b}" for packet in went]
+            flags = [f"{int(packet[13] - 0x41):04b}" for packet in went]
             vectors = np.round([1e3 * self.position_m, sent_n], 2) + 0.0
             recorded = [" ".join(f"{one:.2f}" for one in vector) for vector in vectors]
             answer = " ".join(ANSWERS[one] for one in answers)

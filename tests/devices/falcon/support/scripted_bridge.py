@@ -7,10 +7,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from study_app.devices.falcon.constants import ENDPOINT_IN, ERROR_TIMEOUT, HOMED_SHIFT, PACKET, SUCCESS, ZERO
+from study_app.devices.falcon.constants import ENDPOINT_IN, ERROR_TIMEOUT, SUCCESS
 from study_app.devices.falcon.exchange import LEAST_MASS_KG, exchange_functions, new_exchange
 from study_app.devices.falcon.mechanics import GEOMETRIES, REACHED, inverse, new_mechanism
-from study_app.devices.falcon.replies import FLAGS_AT, NIBBLES, number, pack
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading
 from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n
@@ -46,16 +45,17 @@ def counts_at(place_m, mechanism=None):
 
 def reply(place_m=CENTRE_M, *, homed=0b111, buttons=0, counts=None):
     """Return the packet of a Falcon whose grip is at a place."""
-    packet = np.zeros(PACKET, np.uint8)
-    pack(counts_at(place_m) if counts is None else np.array(counts), 0, packet)
-    packet[FLAGS_AT] = ZERO + (homed << HOMED_SHIFT) + buttons
-    return packet.tobytes()
+    counts = counts_at(place_m) if counts is None else counts
+    numbers = bytes(0x41 + (int(count) >> shift & 0xF) for count in counts for shift in (0, 4, 8, 12))
+    return b"<" + numbers + bytes([0x41 + (homed << 4) + buttons, 0x41]) + b">"
 
 
 def torques_in(packet):
     """Return the three torques of a packet to the device."""
-    data = np.frombuffer(packet, np.uint8)
-    return [int(number(data, 1 + NIBBLES * arm)) for arm in range(3)]
+    assert (packet[:1], packet[14:]) == (b"<", b"A>")
+    digits = np.frombuffer(packet, np.uint8)[1:13].reshape(3, 4) - 0x41
+    assert digits.max() < 16
+    return (digits.astype(np.int32) @ [1, 16, 256, 4096]).astype(np.int16).tolist()
 
 
 class FakeBridge:
