@@ -267,7 +267,7 @@ def studies(opened: Document | None) -> tuple[StudyChoice, ...]:
         title = _title(file, drafted=file in drafted) if opened is None or source != own else opened.title
         stem = Path(source).stem
         ships, original = is_shipped(source), "" if file is None else kept_original(file)
-        choices.append(StudyChoice(title or stem, f"{stem}.toml", source, ships, file in drafted, original))
+        choices.append(StudyChoice(title or stem, f"{stem}.toml", source, ships, original))
     return tuple(sorted(choices, key=lambda choice: (choice.shipped, choice.title.casefold(), choice.source)))
 
 
@@ -532,12 +532,8 @@ class Questions(Themed, QWidget):
             made = Check(name)
             made.setFont(font("label", weight=400))
             made.setAccessibleName(f"Language {name}")
-            made.toggled.connect(self._show_first_texts)
             self.languages[code] = made
             checks.addWidget(made, at // 2, at % 2)
-        self.first_texts = label("", "label", "text2", wraps=True)
-        checks.addWidget(self.first_texts, checks.rowCount(), 0, 1, 2)
-        self._show_first_texts()
         self._grid.addWidget(label("Languages", "label"), 2, 0, 1, 2)
         self._grid.addWidget(box, 3, 0, 1, 2)
         self._own: list[QWidget] = []
@@ -587,15 +583,6 @@ class Questions(Themed, QWidget):
     def _propose(self) -> None:
         self.name.setPlaceholderText(self._proposed or NAME_HINT)
 
-    def _show_first_texts(self) -> None:
-        """Say in which language the texts begin where none of the template's is chosen."""
-        there = () if self._choice is None else self._choice.languages
-        chosen = [code for code, check in self.languages.items() if check.isChecked()]
-        without = bool(there and chosen) and set(there).isdisjoint(chosen)
-        if without:
-            self.first_texts.setText(f"The texts begin in {dict(languages_offered())[there[0]]}: translate them.")
-        self.first_texts.setVisible(without)
-
     @property
     def _proposed(self) -> str:
         return short_name_of(self.title.text()) or ("" if self._choice is None else self._choice.name)
@@ -633,13 +620,10 @@ ACROSS, COPIES_ACROSS = 3, 4
 
 
 class NoStudyCard(Card):
-    """What is shown while no study is open: drafts to continue (``study_asked``), and the button ``new``."""
-
-    study_asked = Signal(str)
+    """What is shown while no study is open, with the button ``new``."""
 
     def __init__(self) -> None:
         super().__init__(padding=28, gap=12)
-        self.drafts: list[ActionButton] = []
         self.new = ActionButton("plus", "New study …", cap=key_cap("new"), role="primary")
         self.new.setAccessibleName(tip("new"))
         self.new.setToolTip(tip("new"))
@@ -651,17 +635,6 @@ class NoStudyCard(Card):
         )
         centred = ((part, 0, Qt.AlignmentFlag.AlignHCenter) for part in parts)
         add_parts(self.column, (STRETCH, 2), *centred, (STRETCH, 3))
-
-    def show_studies(self, studies: tuple[StudyChoice, ...]) -> None:
-        for old in self.drafts:
-            remove_widget(old)
-        self.drafts = []
-        for study in (one for one in studies if one.drafted):
-            made = ActionButton("save", f"Continue {study.title} ({study.file}) with its unsaved changes")
-            made.clicked.connect(lambda _on=False, source=study.source: self.study_asked.emit(source))
-            name_bars(made)
-            self.column.insertWidget(self.column.indexOf(self.new), made, 0, Qt.AlignmentFlag.AlignHCenter)
-            self.drafts.append(made)
 
 
 class ChosenCard(Card):

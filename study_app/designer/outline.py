@@ -173,18 +173,12 @@ def _row(study: Study, element: Element, times_s: Mapping[str, float], *, in_ses
     sort = singular(kind) if len(path) == 2 else "question" if "items" in path else ""
     at = ""
     if element.step and isinstance(element.step[-1], int):
-        count = len(_at(study.document, element.step[:-1]))
+        count = len(value_at(study.document, element.step[:-1]))
         at = f"{'question' if 'items' in path else 'step'} {element.step[-1] + 1} of {count}"
         sort = "" if "items" in path else sort
     name = ", ".join(filter(None, (element.title, sort, note, at, faults)))
     title, step = element.title, element.step
     return OutlineRow(path, title, icon_of(path, study.document), note, element.depth + 1, element.faults, name, step)
-
-
-def _at(document: Any, path: Path) -> Any:
-    for step in path:
-        document = document[step]
-    return document
 
 
 SECTIONS_OF_TABLES: Final = frozenset(ICONS) - {*OWN, "study", "device", "scene", "limits", "analysis"}

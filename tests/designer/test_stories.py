@@ -282,7 +282,7 @@ def names(record: Record) -> None:
 
 
 def one_instead(record: Record) -> None:
-    """One key is given in place of another and back without losing its value."""
+    """One key is given in place of another and back; undo brings its value back."""
     row = record.designer.form_row
     record.select("tasks", "reach")
     for key, at in (("count", 1), ("duration_s", 0)):

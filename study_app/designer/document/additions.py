@@ -37,13 +37,10 @@ from study_app.protocol.source.problems import Fault, rule_of, shown
 from study_app.protocol.wording.languages import LANGUAGES, language_name
 
 
-def switched(
-    study: Study, path: Path, kind: str | None, left: Mapping[str, Any]
-) -> tuple[tuple[Edit, ...], dict[str, Any]]:
-    """Return the edits that change the kind of a table, None for the kind without the key, and the values removed.
+def switched(study: Study, path: Path, kind: str | None) -> tuple[Edit, ...]:
+    """Return the edits that change the kind of a table, None for the kind without the key.
 
-    Keys of both kinds keep their values, the others are removed; keys that the new kind needs get the value that they
-    had before (``left``, removed by earlier switches), or an initial one.
+    Keys of both kinds keep their values, the others are removed; keys that the new kind needs get an initial one.
     """
     key, named = tags(node_at(study.document, path))
     if not key or kind not in named:
@@ -51,26 +48,16 @@ def switched(
     node = table_of((named[kind],), {})
     if node is None:
         raise Refused(f"{kind} is not a kind of table")
-    table = _table(study, path)
-    gone = {name: value for name, value in table.items() if name != key and name not in node["properties"]}
-    edits: list[Edit] = [Unset((*path, name)) for name in gone]
+    found = value_at(study.document, path)
+    table = found if isinstance(found, Mapping) else {}
+    edits: list[Edit] = [Unset((*path, name)) for name in table if name != key and name not in node["properties"]]
     if kind is not None:
         edits.insert(0, Set((*path, key), kind))
     elif key in table:
         edits.insert(0, Unset((*path, key)))
     after, _ = study.edited(*edits)
-    wanted = [name for name in left if name in node["properties"] and name not in table]
-    edits += [Set((*path, name), left[name]) for name in wanted]
-    needed = [name for name in node.get("required", ()) if name not in {*table, *wanted, key}]
-    edits += [Set((*path, name), initial(after.document, (*path, name))) for name in needed]
-    return tuple(edits), gone
-
-
-def _table(study: Study, path: Path) -> Mapping[str, Any]:
-    value: Any = study.document
-    for step in path:
-        value = value[step] if has(value, step) else {}
-    return value if isinstance(value, Mapping) else {}
+    needed = [name for name in node.get("required", ()) if name not in {*table, key}]
+    return (*edits, *(Set((*path, name), initial(after.document, (*path, name))) for name in needed))
 
 
 def with_language(study: Study, code: str) -> tuple[Edit, ...]:

@@ -333,9 +333,7 @@ class Document:
         It is refused where sessions were run with this version and another content, or the file was changed outside.
         """
         source = self.source()
-        hash_ = content_hash(source)
-        others = sum(run.sessions for run in known if run.version == self.version and run.hash != hash_)
-        if others:
+        if others := self.standing(known).others:
             raise Refused(
                 f"version {self.version} was run by {counted(others, 'session')} with another content: "
                 f"save it as version {next_version(self.version)}"

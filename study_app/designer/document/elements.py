@@ -74,9 +74,7 @@ def outline(study: Study) -> Outline:
 def element(study: Study, path: Path, depth: int = 0) -> Element:
     """Return one line of the outline."""
     faults = sum(fault.path[: len(path)] == path for fault in study.faults)
-    value: Any = study.document
-    for step in path:
-        value = value[step] if has(value, step) else None
+    value = value_at(study.document, path)
     name = value.get("id", path[-1]) if isinstance(value, Mapping) else path[-1]
     return Element(path, title_of(study.document, path), str(name), depth, faults)
 
@@ -86,9 +84,7 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
 
     An entry of a list without either is called by its first texts.
     """
-    value: Any = document
-    for step in path:
-        value = value[step] if has(value, step) else None
+    value = value_at(document, path)
     if not isinstance(value, Mapping) or len(path) == 1:
         return label_of(path[-1])
     if called := _called(document, value):

@@ -108,9 +108,7 @@ def suggested_id(document: Document, thing: Path, recorded: frozenset[str] = fro
 def taken_beside(document: Document, thing: Path) -> set[str]:
     """Return the names that a table or item cannot have, since others have them."""
     if _item_id(document, thing) is None:
-        node: Any = document
-        for step in thing[:-1]:
-            node = node[step] if has(node, step) else {}
+        node = value_at(document, thing[:-1])
         return {*(tuple(node) if isinstance(node, Mapping) else ())} - {str(thing[-1])}
     return {str(other["id"]) for path, other in _items(document) if (thing[:2] == path[:2]) and path != thing}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 from study_app.designer.document.additions import (
@@ -62,13 +62,12 @@ class Step:
     fresh: Literal["", "new", "copy"] = ""  # whether what is selected after it is new: a text takes the keyboard
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Situation:
-    """The study that a step is made in, what is selected, and the values that switches of kinds removed meanwhile."""
+    """The study that a step is made in, what is selected, and ids with recorded answers."""
 
     study: Study
     selected: Path = ()
-    left: dict[Path, dict[str, Any]] = field(default_factory=dict)
     recorded: Recorded = lambda _element: frozenset()
 
 
@@ -173,10 +172,8 @@ class SwitchKind(Request):
     kind: str | None
 
     def step(self, at: Situation) -> Step:
-        kept = at.left.get(self.path, {})
-        edits, gone = switched(at.study, self.path, self.kind, kept)
-        at.left[self.path] = {**kept, **gone}
-        return Step(f"Switch to {label_of(self.kind or 'nothing').lower()}", edits)
+        words = f"Switch to {label_of(self.kind or 'nothing').lower()}"
+        return Step(words, switched(at.study, self.path, self.kind))
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,16 +184,12 @@ class SwitchKey(Request):
     to: str
 
     def step(self, at: Situation) -> Step:
-        table, name = self.path[:-1], str(self.path[-1])
-        before = value_at(at.study.document, self.path)
-        kept = {**at.left.get(table, {}), **({} if before is None else {name: before})}
-        gone: tuple[Edit, ...] = () if before is None else (Unset(self.path),)
-        after, _ = at.study.edited(*gone)
-        value = _listed(kept[self.to]) if self.to in kept else _first_value(after, (*table, self.to))
+        place = (*self.path[:-1], self.to)
+        gone = () if value_at(at.study.document, self.path) is None else (Unset(self.path),)
+        value = _first_value(at.study.edited(*gone)[0], place)
         if value in ("", []):
             raise Refused(f"there is nothing that {label_of(self.to)} can name: add it first")
-        at.left[table] = kept
-        return Step(f"Give {label_of(self.to)}", (*gone, Set((*table, self.to), value)))
+        return Step(f"Give {label_of(self.to)}", (*gone, Set(place, value)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ from study_app.gui.widgets.cards import smooth_painter
 from study_app.gui.widgets.numbers import Range
 from study_app.number_text import capitalised, duration, exact_duration
 from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
-from study_app.protocol.source.document import Path
+from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.trials.designs import ORDINALS, default_design
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
@@ -78,11 +78,8 @@ class LevelAxis:
 
 def level_axis(study: Study, row: Row) -> LevelAxis | None:
     """Return the axis of a stimulus' levels; None where they make no sense."""
-    table: Any = study.document
-    for step in row.path[:-1]:
-        table = table.get(step) if isinstance(table, Mapping) else None
     try:
-        stimulus = Stimulus.model_validate(table)
+        stimulus = Stimulus.model_validate(value_at(study.document, row.path[:-1]))
     except ValidationError:
         return None
     words = LevelWords(stimulus, default_design("2ifc"))

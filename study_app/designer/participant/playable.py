@@ -67,8 +67,6 @@ class ParticipantView:
     focused: str | None = None  # the id of the question that is selected
     note: str = ""  # what cannot be shown and why, "" where all is
     photodiode: bool = True  # whether the tank has a corner for one
-    trial: int = 0  # of its block, from 1; 0 where it is none
-    trials: int = 0
 
     @property
     def name(self) -> str:

@@ -56,7 +56,7 @@ from study_app.designer.place.editing import Editing
 from study_app.designer.place.segments import Segments, dense
 from study_app.designer.place.view import DesignerPlace, PanePage
 from study_app.gui.display.screens import choose_screens
-from study_app.gui.kit.commands import add_commands, key_cap, tip
+from study_app.gui.kit.commands import add_commands, tip
 from study_app.gui.kit.devices import screen_number, settings_here, text_scale_on
 from study_app.gui.participant.forms.questions_page import QuestionsPage
 from study_app.gui.participant.window import ParticipantWindow
@@ -66,9 +66,8 @@ from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.background import delayed
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, fill_rounded
-from study_app.gui.widgets.controls import Cap, Choice, IconButton
+from study_app.gui.widgets.controls import Choice, IconButton
 from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.numbers import NumberField
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
@@ -355,7 +354,6 @@ def _bare(page: Page | None) -> Page | None:
 
 NO_ANSWERS: Final[Mapping[str, Value]] = {}
 MOST_IN_ROW: Final = 2
-TRIAL_PX: Final = 48
 
 
 class ParticipantPreview(Card):
@@ -376,25 +374,21 @@ class ParticipantPreview(Card):
         self.note = label("", "small", "warn", wraps=True)
         self.note.hide()
         self.languages = Segments("Language of the page")
-        self.language_key = Cap(key_cap("language"))
-        self.language_key.setToolTip(tip("language"))
         self.screens = dense(Choice(), "Screen")
         self.screens.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.screens.setMinimumContentsLength(9)
         self.aside = QWidget()
-        hbox(self.languages, self.language_key, self.screens, spacing=10, margins=0, parent=self.aside)
+        hbox(self.languages, self.screens, spacing=10, margins=0, parent=self.aside)
         self.before = IconButton("chevron_left", "Previous step", "Previous step", size=36)
         self.after = IconButton("chevron", "Next step", "Next step", size=36)
         for button in (self.before, self.after):
             button.setAutoRepeat(True)
         self.step = label("", "label", wraps=True)
-        self.trial, self.trials = NumberField(), label("", "label")
-        self.trial.setFixedWidth(TRIAL_PX)
-        self.trial.setToolTip("Trial of the block; Play from here begins with it")
+        self.step.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.moments = Segments("Page of the trial")
         self.zoom = Segments("Size of the page")
         self.zoom.show_values(((True, "Fit"), (False, "100 %")), chosen=True)
-        parts = (self.before, (self.step, 1), self.trial, self.trials, self.after, self.moments, self.zoom)
+        parts = (self.before, (self.step, 1), self.after, self.moments, self.zoom)
         self._row, self._second = hbox(*parts, spacing=8), hbox(STRETCH)
         add_parts(self.column, self.note, (self.page, 1), self._row, self._second, STRETCH)
 
@@ -424,12 +418,9 @@ class ParticipantPreview(Card):
         self.screens.activated.connect(self._choose_screen)
         self.before.clicked.connect(lambda: self.go(-1))
         self.after.clicked.connect(lambda: self.go(1))
-        self.trial.entered.connect(lambda number: self.go_to_trial(round(number)))
-        self.trial.unread.connect(lambda _text: self.trial.put_back())
-        self.trial.stepped.connect(lambda steps: self.go_to_trial(self.view.trial + steps))
         self.moments.chosen.connect(self.show_moment)
         self.zoom.chosen.connect(self._show_fitted)
-        page = PanePage("participant", "Participant", self, self.aside, fit_aside=self.fit_aside,
+        page = PanePage("participant", "Participant", self, self.aside,
                         most_px=lambda: self.most_px, tip=tip("page"))  # fmt: skip
         place.pane.add_page(page, first=True)
         add_commands(place, {"page": self.enter_page, "language": self.show_next_language})
@@ -438,7 +429,6 @@ class ParticipantPreview(Card):
     @property
     def position(self) -> StepPosition | None:
         """Where the preview is; None where it shows nothing, or a page that is not in the first session."""
-        self.trial.flush()
         self._update()
         found = self._found
         if found is None or found.session:
@@ -482,17 +472,6 @@ class ParticipantPreview(Card):
             self._found = Found(found.shown, index, found.session)
             self._moment = None
             self._show()
-
-    def go_to_trial(self, number: int) -> None:
-        """Show a trial of the block that is shown; its first or its last one where there is none of that number."""
-        found = self._found
-        shown = None if found is None else found.shown.schedule.steps[found.index]
-        if found is None or not isinstance(shown, Trial):
-            return
-        number = min(max(number, 1), shown.of)
-        steps = enumerate(found.shown.schedule.steps)
-        at = next(at for at, one in steps if isinstance(one, Trial) and (one.block, one.index) == (shown.block, number))
-        self.go(at - found.index)
 
     def show_moment(self, moment: Moment) -> None:
         self._moment = moment
@@ -617,7 +596,6 @@ class ParticipantPreview(Card):
         if isinstance(page, TaskPage):
             self._place_ball(page, tested_condition(shown, index))
         now = shown.schedule.steps[index]
-        trial, trials = (now.index, now.of) if isinstance(now, Trial) and now.of > 1 else (0, 0)
         step = step_words(shown, now, shown.protocol.study.languages[0])
         if found.session and found.session != STANDALONE:
             step = f"{step} ({found.session})"
@@ -634,8 +612,6 @@ class ParticipantPreview(Card):
                 self._question(study),
                 self._note(study, found),
                 self._photodiode,
-                trial,
-                trials,
             )
         )
 
@@ -697,7 +673,7 @@ class ParticipantPreview(Card):
         self.languages.show_values([(code, code.upper()) for code in view.languages], view.language)
         self.note.setText(view.note)
         self.note.setVisible(bool(view.note))
-        self._show_step(view)
+        self.step.setText(view.step)
         self.before.setEnabled(view.has_before)
         self.after.setEnabled(view.has_after)
         self.moments.setVisible(bool(view.moments))
@@ -712,22 +688,6 @@ class ParticipantPreview(Card):
         if (high := self.column.minimumSize().height()) != self._high:  # another note, or another row of pages
             self._high = high
             self.place.pane.make_room()
-
-    def _show_step(self, view: ParticipantView) -> None:
-        before, _, after = view.step.rpartition(f" {view.trial} of ") if view.trials else (view.step, "", "")
-        sides = Qt.AlignmentFlag.AlignVCenter
-        self.step.setText(before)
-        self.step.setAlignment(sides | (Qt.AlignmentFlag.AlignRight if after else Qt.AlignmentFlag.AlignHCenter))
-        self.trials.setText(f"of {after}" if after else "")
-        for part in (self.trial, self.trials):
-            part.setVisible(bool(after))
-        self.trial.setAccessibleName(f"{before}, 1 to {view.trials}; Play from here begins with it")
-        self.trial.show_text(str(view.trial))
-
-    def fit_aside(self, room_px: int) -> None:
-        """Show the key of the languages where there is room for it."""
-        self.language_key.setVisible(len(self.view.languages) > 1)
-        self.language_key.setVisible(len(self.view.languages) > 1 and self.aside.sizeHint().width() <= room_px)
 
     def offer_screens(self, sizes: tuple[ScreenSize, ...]) -> None:
         if sizes == self._screens_shown:

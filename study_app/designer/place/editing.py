@@ -33,7 +33,6 @@ class Editing(QObject):
         self.results = results
         self.opened: Document | None = None
         self.recorded: Recorded = lambda _element: frozenset()
-        self._left: dict[Place, dict[str, object]] = {}
         self._back: list[Place] = []
         self._added: tuple[Place, str, str] = ((), "", "")
 
@@ -50,7 +49,7 @@ class Editing(QObject):
         self.opened = opened
         if opened is not None:
             opened.rest()
-        self._left, self._back, self._added = {}, [], ((), "", "")
+        self._back, self._added = [], ((), "", "")
         self.opened_other.emit()
 
     def select(self, path: Place, *, back: bool = False) -> None:
@@ -61,7 +60,6 @@ class Editing(QObject):
         self.suggest_id()
         if not back:
             self._back.append(opened.selected)
-        self._left.clear()
         opened.rest()
         opened.selected = with_path(path, before, opened.selected)
         self._keep_selection()
@@ -84,7 +82,7 @@ class Editing(QObject):
             self.suggest_id()
             return
         try:
-            step = asked.step(Situation(opened.study, opened.selected, self._left, self.recorded))
+            step = asked.step(Situation(opened.study, opened.selected, self.recorded))
             opened.edit(step.words, *step.edits, text=step.text, select=step.select, key=step.continues)
         except Refused as refusal:
             path = getattr(asked, "path", opened.selected)

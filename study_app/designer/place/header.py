@@ -45,25 +45,20 @@ class Notice:
     listed: tuple[str, ...] = ()
     closes: bool = False
 
-    @property
-    def only_offers_copy(self) -> bool:
-        return [action for action, _ in self.actions] == ["copy"]
-
 
 class NoticeCard(Card):
     """Draws a `Notice`: that of the study is tinted, that of playing gives its first button the keyboard.
 
-    Signals: ``asked`` (the action of a button, "close" of the one that closes it), ``changed`` (whether there is one),
-    ``left`` before it is hidden while it has the keyboard.
+    Signals: ``asked`` (the action of a button, "close" of the one that closes it), ``left`` before it is hidden with
+    the keyboard.
     """
 
     asked = Signal(str)
-    changed = Signal(bool)
     left = Signal()
 
     def __init__(self, *, of_playing: bool) -> None:
         super().__init__(padding=10, gap=6)
-        self._of_playing, self._other = of_playing, False
+        self._of_playing = of_playing
         self.notice: Notice | None = None
         self.buttons: dict[str, ActionButton] = {}
         self._lines: list[QWidget] = []
@@ -80,11 +75,12 @@ class NoticeCard(Card):
         if notice == self.notice:
             return
         self.notice = notice
-        self.make_room(other=self._other)
+        if notice is None and self.isAncestorOf(self.window().focusWidget()):
+            self.left.emit()  # else Qt hands the keyboard to the next part
+        self.setVisible(notice is not None)
         for part in (*self.buttons.values(), *self._lines):
             remove_widget(part)
         self.buttons, self._lines = {}, []
-        self.changed.emit(notice is not None)
         self.close_button.setVisible(notice is not None and notice.closes)
         self.words.setText("" if notice is None else notice.words)
         if notice is None:
@@ -103,14 +99,6 @@ class NoticeCard(Card):
             self.buttons[action] = made
         if self._of_playing and self.buttons:
             next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
-
-    def make_room(self, *, other: bool) -> None:
-        """Hide what needs no answer while another line is shown (``other``)."""
-        self._other = other
-        shown = self.notice is not None and not (other and self.notice.only_offers_copy)
-        if not shown and self.isAncestorOf(self.window().focusWidget()):
-            self.left.emit()  # else Qt hands the keyboard to the next part
-        self.setVisible(shown)
 
     def close_by_key(self) -> bool:
         """Close a line that can be closed; return whether there was one."""
@@ -229,9 +217,7 @@ class StudyChoice:
     title: str
     file: str
     source: str
-    # whether it ships with the program, and whether a draft of it was kept that is not saved
-    shipped: bool = False
-    drafted: bool = False
+    shipped: bool = False  # whether it ships with the program
     original: str = ""  # the name of the study that it is a copy of; "" where it is not known to be one
 
     @property

@@ -59,7 +59,6 @@ class PanePage:
     body: QWidget  # what the tab shows; its focus proxy takes the keyboard
     aside: QWidget | None = None  # controls at the right of the tabs, while the page is shown
     with_facts: bool = True  # whether the facts stay below the page
-    fit_aside: Callable[[int], None] = lambda _room_px: None  # fits the controls into so much room beside the tabs [px]
     # returns how high the body is at most; the facts take the rest [px]
     most_px: Callable[[], int] = lambda: QWIDGETSIZE_MAX
     tip: str = ""  # the tip of its tab
@@ -109,7 +108,6 @@ class RightPane(QWidget):
         page = next((one for one in self.pages if one.name == self.tab), None)
         if page is not None and page.aside is not None:
             room = self.width() - 2 * SHADOW - self.tabs.sizeHint().width() - ASIDE_GAP
-            page.fit_aside(room)
             row = self._asides if page.aside.sizeHint().width() <= room else self._below
             if row.indexOf(page.aside) < 0:
                 row.addWidget(page.aside)
@@ -463,10 +461,7 @@ class DesignerPlace(Place):
         header.study_asked.connect(partial(self.ask, "open"))
         header.new_asked.connect(partial(self.ask, "new"))
         header.problems_asked.connect(lambda: self.problems.setVisible(not self.problems.isVisible()))
-        header.strip.changed.connect(lambda shown: self.banner.make_room(other=shown))
         self.nothing.new.clicked.connect(lambda: self.ask("new"))
-        self.nothing.study_asked.connect(partial(self.ask, "open"))
-        self.nothing.study_asked.connect(self.parts.focus_form)
         self.banner.asked.connect(partial(self.ask, "banner"))
         self.banner.left.connect(self.parts.return_keyboard)
         outline.chosen.connect(partial(self.finish, "select"))
@@ -538,7 +533,6 @@ class DesignerPlace(Place):
         self.parts.setVisible(view.form is not None)
         self.banner.show_notice(view.banner)
         if view.form is None:
-            self.nothing.show_studies(view.header.studies)
             return
         elsewhere = before.form is None or before.form.path != view.form.path
         if elsewhere:
