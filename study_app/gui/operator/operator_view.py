@@ -67,8 +67,8 @@ class DeviceView:
 class OperatorView:
     """Everything on the operator's window except the two plots' points.
 
-    ``elapsed_s`` is the time that was worked: not the gap before a session was resumed. ``main_trials`` has a pair for
-    each part, of its main trials left behind and of all. ``trial`` is the number of the trial under way or answered.
+    ``elapsed_s`` is the time that was worked: not the gap before a session was resumed. ``main_trials`` counts those
+    that were left behind, and all. ``trial`` is the number of the trial under way or answered.
     ``waits`` says that the trouble is a disk that takes nothing: the session goes on when it does again. ``beyond``
     says whether the device is slower than at the start, which outlets and recordings were lost, then of each trial out
     of limits which it broke, the newest first. ``may_reconnect`` says that the trouble is a device that can be
@@ -84,7 +84,7 @@ class OperatorView:
     saved_ago_s: float | None
     elapsed_s: float
     expected_s: float
-    main_trials: tuple[tuple[int, int], ...]
+    main_trials: tuple[int, int]
     part_line: str
     heading: str
     setting_line: str
@@ -110,7 +110,7 @@ class OperatorView:
 
     @property
     def trials_line(self) -> str:
-        done, of = (sum(counts) for counts in zip(*self.main_trials, strict=True)) if self.main_trials else (0, 0)
+        done, of = self.main_trials
         return f"{done} of {of} {'trial' if of == 1 else 'trials'}"
 
 
@@ -152,14 +152,10 @@ class Session:
         step = self.schedule.steps[progress.here] if progress.here >= 0 else None
         return step if isinstance(step, Trial) else None
 
-    def main_trials(self, progress: Progress) -> tuple[tuple[int, int], ...]:
-        """Return of each part how many of its main trials were left behind, and how many it has."""
-        counts: dict[int | None, tuple[int, int]] = {}
-        for index, step in enumerate(self.schedule.steps):
-            if isinstance(step, Trial) and step.phase == "main":
-                done, of = counts.get(step.part, (0, 0))
-                counts[step.part] = (done + (index < progress.here or progress.ended == "completed"), of + 1)
-        return tuple(counts.values())
+    def main_trials(self, progress: Progress) -> tuple[int, int]:
+        """Return how many main trials were left behind, and how many there are."""
+        main = [at for at, step in enumerate(self.schedule.steps) if isinstance(step, Trial) and step.phase == "main"]
+        return sum(at < progress.here or progress.ended == "completed" for at in main), len(main)
 
     def broken(self, progress: Progress) -> dict[int, tuple[Broken, ...]]:
         """Return what the trials done broke, as far as the operator may know: if double-blind, lateness and gaps."""

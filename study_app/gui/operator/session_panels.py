@@ -26,8 +26,7 @@ STATES: dict[State, tuple[Tone, str]] = {
 OTHER_WINDOW = "F6"  # not every desktop has a key for it, above all not in full screen
 BLINDINGS = {"double": ("lock", "Double-blind"), "single": ("eye", "Single-blind")}
 SAVED_RECENTLY_S = 2.0
-PARTS_WIDTH = 120
-PARTS_GAP = 4
+TRIALS_PX = 120
 
 
 def shown_state(view: OperatorView) -> tuple[Tone, str, str]:
@@ -49,32 +48,6 @@ class ThemeButton(IconButton):
         super().paintEvent(event)
 
 
-class PartsBar(Themed, QWidget):
-    """A bar for each part, as long as its share of all trials, filled as far as its trials are done."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.main_trials: tuple[tuple[int, int], ...] = ()
-        self.setFixedSize(PARTS_WIDTH, 14)
-
-    def show_trials(self, main_trials: tuple[tuple[int, int], ...]) -> None:
-        if main_trials != self.main_trials:
-            self.main_trials = main_trials
-            self.update()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = smooth_painter(self)
-        painter.setPen(Qt.PenStyle.NoPen)
-        room = self.width() - PARTS_GAP * (len(self.main_trials) - 1)
-        x = 0.0
-        for done, of in self.main_trials:
-            width = room * of / sum(trials for _, trials in self.main_trials)
-            for colour, filled in ((self.theme.sunk, width), (self.theme.accent, width * done / of)):
-                painter.setBrush(QColor(colour))
-                painter.drawRoundedRect(QRectF(x, 3, filled, 8), 4, 4)
-            x += width + PARTS_GAP
-
-
 class Header(Themed, QWidget):
     """The strip at the top; ``page`` brings the participant's window to the front, which covers it on one screen."""
 
@@ -91,7 +64,8 @@ class Header(Themed, QWidget):
         self.clock.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.expected = figures("", "small", "text2")
         self.expected.setAlignment(Qt.AlignmentFlag.AlignRight)
-        self.bar = PartsBar()
+        self.bar = Bar()
+        self.bar.setFixedWidth(TRIALS_PX)
         self.trials = figures("", "small", "text2")
         self.theme_button = ThemeButton()
         self.page = ActionButton("", "Participant's window", key=OTHER_WINDOW, height=40)
@@ -118,7 +92,8 @@ class Header(Themed, QWidget):
             self.saved.show_state("ok", "check", "Saved to disk now")
         self.clock.setText(minutes(view.elapsed_s))
         self.expected.setText(f"of about {max(1, round(view.expected_s / 60))} min")
-        self.bar.show_trials(view.main_trials)
+        done, of = view.main_trials
+        self.bar.show_share(done / max(1, of))
         self.trials.setText(view.trials_line)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
