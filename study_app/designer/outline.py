@@ -574,12 +574,11 @@ class Tree(Themed, QTreeView):
 class OutlineCard(Coloured, Card):
     """Draws outline rows.
 
-    Signals: ``chosen`` (path), ``element_clicked``, ``form_asked`` (Enter), ``find_changed`` (words), ``field_asked``
-    (path of a field that was found, instead of these two).
+    Signals: ``chosen`` (path), ``element_clicked``, ``form_asked`` (Enter), ``field_asked`` (path of a field that was
+    found, instead of these two).
     """
 
     chosen = Signal(object)
-    find_changed = Signal(str)
     element_clicked = Signal()
     form_asked = Signal()
     field_asked = Signal(object)
@@ -610,7 +609,6 @@ class OutlineCard(Coloured, Card):
         self.add.setMaximumWidth(self.add.minimumSizeHint().width())
         foot = hbox(self.add, (self.duplicate, 1), spacing=8)
         add_parts(self.column, self.words, self.nothing, (self.tree, 1), foot)
-        self.words.textChanged.connect(self.find_changed)
         self.words.returnPressed.connect(self._open_first)
         self.words.installEventFilter(self)
         self.tree.selectionModel().currentChanged.connect(self._choose)

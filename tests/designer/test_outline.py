@@ -11,7 +11,7 @@ from shiboken6 import isValid
 
 from study_app.designer.outline import ROW_ROLE
 from study_app.protocol.source.files import shipped
-from study_app.store.study_settings import begin_settings
+from study_app.store.study_settings import keep_original
 
 pytestmark = pytest.mark.slow
 
@@ -131,7 +131,7 @@ def add_study(designer: Any, name: str, title: str) -> None:
 def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(designer: Any) -> None:
     for name, title in (("zeta", "apples"), ("beta", "Melons"), ("alpha", "Melons")):
         add_study(designer, name, title)
-    begin_settings(designer.file.with_name("beta.toml"), "alpha")
+    keep_original(designer.file.with_name("beta.toml"), "alpha")
     designer.open()
     own = [words for words in listed(designer) if "(shipped)" not in words][:-2]
     assert own[:2] == ["A first look  ·  kitchen.toml", "apples  ·  zeta.toml"]

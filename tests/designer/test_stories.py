@@ -25,7 +25,7 @@ from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.drafts import Draft, keep
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.store.study_settings import keep_setting, kept_participants
+from study_app.store.study_settings import keep_original, kept_original
 from study_app.store.study_versions import content_hash
 from tests.designer.support.designer import DEMO
 from tests.designer.support.record import Record
@@ -179,12 +179,12 @@ def failing(record: Record) -> None:
         look()
         unreadable.undo()
         look()
-    keep_setting(designer.file.with_name("pantry.toml"), "participants", 7)  # of a study that was deleted
+    keep_original(designer.file.with_name("pantry.toml"), "demo")  # of a study that was deleted
     record.ask(SetValue(VERSION, "1.1"))
     full = refusing("designer.document.document.save", "the disk is full")
     record.note("save as another", lambda: saving.save_as_another("pantry"))
     full.undo()
-    assert kept_participants(designer.file.with_name("pantry.toml")) is None
+    assert kept_original(designer.file.with_name("pantry.toml")) == "kitchen"
     record.note("begin", lambda: designer.controller.begin("template:compare-liquids", "mine"))
     record.note("open another", designer.open)
     record.note("open it again", lambda: designer.open(str(designer.file.with_name("mine.toml"))))

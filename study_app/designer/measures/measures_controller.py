@@ -32,7 +32,6 @@ from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows
 from study_app.gui.widgets.background import delayed
 from study_app.number_text import capitalised
 from study_app.protocol.model import Protocol
-from study_app.store.study_settings import keep_setting, kept_participants
 from study_app.workers.server import Crashed
 
 log = logging.getLogger(__name__)
@@ -80,9 +79,9 @@ class MeasuresController(QObject):
         place.pane.facts.appeared.connect(self._idle.start)
         measures = place.measures
         measures.repair_asked.connect(lambda row, words: place.ask("repair", row, words))
-        measures.controls.participants_asked.connect(self._take_participants)
-        measures.controls.threshold_asked.connect(self._take_threshold)
-        measures.controls.lapses_asked.connect(self._take_lapses)
+        measures.controls.participants.entered.connect(self._take_participants)
+        measures.controls.threshold.entered.connect(self._take_threshold)
+        measures.controls.lapses.entered.connect(self._take_lapses)
         for part in (measures, place.pane.facts):
             part.open_asked.connect(editing.select)
 
@@ -127,10 +126,7 @@ class MeasuresController(QObject):
         return pane.isVisible() and (pane.tab == "measures" or pane.facts.isVisible())
 
     def _forget(self) -> None:
-        opened = self._editing.opened
-        kept = None if opened is None else kept_participants(opened.file)
-        self._participants = None if kept is None else _permitted(kept)
-        self._lapses, self._sound = LAPSES, None
+        self._participants, self._lapses, self._sound = None, LAPSES, None
         self._thresholds, self._answers, self._repairs = {}, {}, {}
         self._idle.start()
 
@@ -229,14 +225,10 @@ class MeasuresController(QObject):
         self._idle.start()
 
     def _take_participants(self, number: float) -> None:
-        """Simulate so many participants from now on, also when the study is opened again."""
-        opened = self._editing.opened
-        if opened is None:
-            return
-        asked = _permitted(number)
-        self._participants = None if asked == participants_of(opened.study) else asked
-        keep_setting(opened.file, "participants", self._participants)
-        self.show()
+        if (opened := self._editing.opened) is not None:
+            asked = min(MOST_PARTICIPANTS, max(2, round(number)))
+            self._participants = None if asked == participants_of(opened.study) else asked
+            self.show()
 
     def _take_threshold(self, number: float) -> None:
         if self._focus.plan is not None and self._focus.block is not None:
@@ -248,8 +240,3 @@ class MeasuresController(QObject):
     def _take_lapses(self, number: float) -> None:
         self._lapses = min(0.2, max(0.0, number / 100))
         self.show()
-
-
-def _permitted(number: float) -> int:
-    """Return the nearest number of participants that can be simulated."""
-    return min(MOST_PARTICIPANTS, max(2, round(number)))

@@ -71,10 +71,6 @@ class Control(QWidget):
 class MeasureControls(QWidget):
     """Simulated threshold, lapse rate and participants."""
 
-    participants_asked = Signal(float)
-    threshold_asked = Signal(float)
-    lapses_asked = Signal(float)
-
     def __init__(self) -> None:
         super().__init__()
         self.setAccessibleName("What is simulated")
@@ -82,9 +78,6 @@ class MeasureControls(QWidget):
         self.lapses = Control("lapses", "%", 1.0)
         self.participants = Control("participants", "", 1.0)
         hbox(STRETCH, self.threshold, self.lapses, self.participants, spacing=10, margins=0, parent=self)
-        self.threshold.entered.connect(self.threshold_asked)
-        self.lapses.entered.connect(self.lapses_asked)
-        self.participants.entered.connect(self.participants_asked)
 
     def show_values(self, shown: Controls, words: LevelWords | None) -> None:
         """Show other values; threshold and lapses only where observers are simulated, at levels with ``words``."""

@@ -79,7 +79,6 @@ from study_app.session.simulated.observers import ProgrammedBall
 from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Chosen, Continue, LanguageChosen, Retracted, Submitted
 from study_app.session.transitions.page_builder import Moment, moments, preview, previewed_page, tested_condition
-from study_app.store.study_settings import keep_setting, kept_language
 
 FRAME_MS: Final = 33
 RING: Final = 2
@@ -460,8 +459,6 @@ class ParticipantPreview(Card):
 
     def show_language(self, language: str) -> None:
         self._language = language
-        if self.editing.opened is not None:
-            keep_setting(self.editing.opened.file, "language", language)
         self._show()
 
     def go(self, by: int) -> None:
@@ -506,9 +503,7 @@ class ParticipantPreview(Card):
 
     def _begin(self) -> None:
         self._found = self._moment = self._protocol = self._study = self._valid = None
-        opened = self.editing.opened
-        self._selected, self._answers = (), {}
-        self._language = "" if opened is None else kept_language(opened.file)
+        self._selected, self._answers, self._language = (), {}, ""
         self._side = "questions"
         self._after_form.start()
 

@@ -43,7 +43,7 @@ from study_app.errors import StudyError
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import find
 from study_app.store.drafts import draft_of
-from study_app.store.study_settings import begin_settings
+from study_app.store.study_settings import keep_original
 
 REST_MS: Final = 200
 
@@ -147,7 +147,7 @@ class DesignerController(QObject):
             self.place.new_page.refuse(f"{error}.")
             return
         self.saving.leave()
-        begin_settings(opened.file, copy_of)
+        keep_original(opened.file, copy_of)
         opened.note_edit(0.0)
         self._take(opened)
         self.saving.leave()

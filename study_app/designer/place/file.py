@@ -278,16 +278,13 @@ class FileEditor(Coloured, QPlainTextEdit):
 
 
 class FileCard(Card):
-    """The editor; ``aside`` holds the name of the file, for the right of the tabs; ``typed`` carries the text."""
-
-    typed = Signal(str)
+    """The editor; ``aside`` holds the name of the file, for the right of the tabs."""
 
     def __init__(self) -> None:
         super().__init__(padding=14, gap=8)
         self.setAccessibleName("File")
         self.name = cut_text("", "label", "text2", right=True)
         self.editor = FileEditor()
-        self.editor.typed.connect(self.typed)
         self.setFocusProxy(self.editor)
         self.aside = QWidget()
         kept = Icon("check", "ok", 16), label("comments and order are kept", "small", "text2")

@@ -338,7 +338,7 @@ class ChipButton(Themed, PressedByEnter):
 
 
 class DesignerHeader(QWidget):
-    """Signals: ``study_asked`` (source), ``new_asked``, ``problems_asked``, undo, redo, save.
+    """Signals: ``study_asked`` (source), ``new_asked``, undo, redo, save.
 
     ``keyboard_left`` is emitted when a button that has the keyboard is about to be disabled, and after a click between
     the buttons or on one that is disabled.
@@ -346,7 +346,6 @@ class DesignerHeader(QWidget):
 
     study_asked = Signal(str)
     new_asked = Signal()
-    problems_asked = Signal()
     keyboard_left = Signal()
 
     def __init__(self) -> None:
@@ -379,7 +378,6 @@ class DesignerHeader(QWidget):
         left = self.title, self.study, self.problems, self.draft, self.version
         add_parts(self._row, *left, STRETCH, self.keys, self.undo, self.redo, self.play, self.save)
         self.study.activated.connect(self._choose)
-        self.problems.clicked.connect(self.problems_asked)
         self.show_state(self.state)
 
     def show_state(self, state: HeaderState) -> None:

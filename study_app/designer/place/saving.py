@@ -4,7 +4,8 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QGuiApplication
 
 from study_app.designer.document.document import Document, Standing, check_version
 from study_app.designer.document.toml_edits import Set
@@ -15,12 +16,12 @@ from study_app.designer.place.header import Notice
 from study_app.designer.place.prompts import ConfirmCard
 from study_app.designer.place.view import DesignerPlace
 from study_app.designer.version_rows import FILE, Comparison
-from study_app.designer.versions import FileWatch, KnownRuns, SaveCard, compare, newest, version_of
+from study_app.designer.versions import KnownRuns, SaveCard, compare, newest, version_of
 from study_app.errors import StudyError
 from study_app.gui.home.study_facts import time_words
 from study_app.number_text import counted
 from study_app.store.drafts import draft_of
-from study_app.store.study_settings import begin_settings
+from study_app.store.study_settings import keep_original
 from study_app.store.study_versions import ChangedOutsideError, kept_versions
 
 DRAFT_MS: Final = 50
@@ -54,8 +55,9 @@ class Saving(QObject):
         self._drafting = QTimer(self)
         self._drafting.setInterval(DRAFT_MS)
         self._drafting.timeout.connect(self.write_draft)
-        self._watch = FileWatch(editing)
-        self._watch.touched.connect(self._look_while_shown)
+        application = QGuiApplication.instance()
+        assert isinstance(application, QGuiApplication)  # noqa: S101 - a window has one
+        application.applicationStateChanged.connect(self._come_back)
         editing.opened_other.connect(self._begin)
         editing.edited.connect(self._end_notice)
         place.left.connect(self.leave)
@@ -112,8 +114,9 @@ class Saving(QObject):
         if before != (opened.read_only, self.banner):
             self.editing.announce()
 
-    def _look_while_shown(self) -> None:
-        if self.place.isVisible():
+    def _come_back(self, state: Qt.ApplicationState) -> None:
+        """Look at the file when the program is in front again: another one may have written it meanwhile."""
+        if state == Qt.ApplicationState.ApplicationActive and self.place.isVisible():
             self.place.flush()
             self.look_again()
 
@@ -216,7 +219,7 @@ class Saving(QObject):
             return
         self.write_draft(at_once=True)
         self.place.close_prompt()
-        begin_settings(made.file, opened.file.stem)
+        keep_original(made.file, opened.file.stem)
         self.continued.emit(made)
         self._write(made)
 

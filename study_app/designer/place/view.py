@@ -460,12 +460,12 @@ class DesignerPlace(Place):
         header, outline, form = self.header, self.outline, self.form
         header.study_asked.connect(partial(self.ask, "open"))
         header.new_asked.connect(partial(self.ask, "new"))
-        header.problems_asked.connect(lambda: self.problems.setVisible(not self.problems.isVisible()))
+        header.problems.clicked.connect(lambda: self.problems.setVisible(not self.problems.isVisible()))
         self.nothing.new.clicked.connect(lambda: self.ask("new"))
         self.banner.asked.connect(partial(self.ask, "banner"))
         self.banner.left.connect(self.parts.return_keyboard)
         outline.chosen.connect(partial(self.finish, "select"))
-        outline.find_changed.connect(partial(self.ask, "find"))
+        outline.words.textChanged.connect(partial(self.ask, "find"))
         outline.field_asked.connect(self.parts.focus_field)
         outline.form_asked.connect(self.parts.focus_form)
         outline.element_clicked.connect(lambda: self.parts.focus_form() if self.parts.drawer else None)
@@ -474,7 +474,7 @@ class DesignerPlace(Place):
         self.parts.path.open_asked.connect(partial(self.finish, "select"))
         form.asked.connect(self._take_asked)
         form.head.id_typed.connect(partial(self.ask, "judge id"))
-        self.file.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
+        self.file.editor.typed.connect(lambda text: self.asked.emit(RetypeFile(text)))
         self.problems.opened.connect(self._open_problem)
         self.problems.next.clicked.connect(self.open_next_problem)
         for part in (self.problems, form):

@@ -8,8 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QWidget
 
 from study_app.designer.measures.simulation import hypotheses_of
-from study_app.store.study_settings import kept_participants
-from tests.designer.measures.conftest import Worker, jnd, shown
+from tests.designer.measures.conftest import Worker, jnd
 
 pytestmark = pytest.mark.slow
 
@@ -61,44 +60,14 @@ def test_the_hypothesis_comes_first_with_what_the_planned_participants_show(
     qtbot.waitUntil(lambda: "Hypotheses" not in texts())
 
 
-def test_the_number_of_participants_is_kept_for_each_study(qtbot: Any, designer: Any, worker: Worker) -> None:
+@pytest.mark.usefixtures("worker")
+def test_the_number_of_participants_is_simulated_beside_the_planned_one(designer: Any) -> None:
     jnd(designer)
     control = designer.place.measures.controls.participants
-
-    def simulate(number: str) -> None:
-        designer.fill(control.field, number)
-
-    def shows(number: str, planned: str) -> None:
-        qtbot.waitUntil(lambda: (control.field.text(), control.unit.text()) == (number, planned))
-
-    shows("24", "planned")
-    simulate("8")
-    shows("8", "(24 planned)")
-    file = designer.editing.opened.file
-    designer.open()
-    shows("12", "(none planned)")
-    designer.open(str(file))
-    shows("8", "(24 planned)")
-    assert kept_participants(file) == 8
+    for typed, planned in (("8", "(24 planned)"), ("24", "planned")):
+        designer.fill(control.field, typed)
+        assert (control.field.text(), control.unit.text()) == (typed, planned)
     assert b"participants = 24" in designer.editing.opened.source()
-    simulate("24")
-    shows("24", "planned")
-    assert kept_participants(file) is None  # from now on it follows the file
-
-
-def test_a_row_opens_the_measures_of_a_block_that_uses_an_element(qtbot: Any, designer: Any, worker: Worker) -> None:
-    jnd(designer)
-    qtbot.waitUntil(lambda: bool(worker.orders))
-    worker.answer()
-    shown(qtbot, designer, 2, "93")
-    designer.editing.select(("liquids", "damper"))
-    page = designer.place.measures
-    qtbot.waitUntil(lambda: page.blocks.isVisible() and len(page.blocks.parts) == 1)
-    part = page.blocks.parts[0]
-    assert "JNDs" in part.buttons[1].accessibleName()
-    click(part.buttons[1])
-    assert designer.editing.selected == ("blocks", "viscosity")
-    qtbot.waitUntil(lambda: not page.blocks.isVisible())
 
 
 def test_a_screen_reader_hears_each_count_of_the_balance(qtbot: Any, designer: Any, worker: Worker) -> None:

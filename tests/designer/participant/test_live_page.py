@@ -13,13 +13,12 @@ from PySide6.QtGui import QCursor, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from study_app.designer.document.steps import ChangeLanguage, DuplicateElement, SetText
+from study_app.designer.document.steps import DuplicateElement, SetText
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage, TextPage
-from study_app.store.study_settings import kept_language
 
 pytestmark = pytest.mark.slow
 
@@ -255,16 +254,6 @@ def test_a_copied_question_has_the_text_of_its_original_and_the_others_keep_thei
     assert tab.view.note.endswith("(reads as an earlier item does): the text as it is written is shown.")
     designer.editing.ask(SetText((*COPY, "text"), "en", "Another statement"))
     assert dict(statements(tab))["like_honey_2"] == "Another statement"
-
-
-def test_the_language_is_kept_for_the_study(designer: Any, tab: Any) -> None:
-    designer.editing.ask(ChangeLanguage("add", "nl"))
-    file = designer.editing.opened.file
-    designer.controller.preview.show_language("nl")
-    designer.open("demo", "pages", "welcome")
-    assert tab.view.language == "en"
-    designer.open("kitchen", *ITEM)
-    assert (tab.view.language, kept_language(file)) == ("nl", "nl")
 
 
 def test_an_answer_that_was_emptied_does_not_come_back_when_the_page_is_repainted(designer: Any, live: Any) -> None:

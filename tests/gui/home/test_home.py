@@ -12,7 +12,7 @@ from study_app.gui.home import view
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.protocol.source.files import source_bytes
 from study_app.store.drafts import Draft, discard, keep
-from study_app.store.study_settings import begin_settings
+from study_app.store.study_settings import keep_original
 from tests.gui.home.home_window import hold, open_home
 from tests.gui.transcript import compare, story
 
@@ -60,7 +60,7 @@ def changes_of_studies(home, folder, chooses):
     text = own_study(folder).read_text(encoding="utf-8")
     fresh_text = 'format = 2\n[study]\nname = "fresh"\ntitle = "Fresh"\n'
     yield "the program was killed", come_back(lambda: keep(file, Draft(text.replace('"Own"', '"Else"', 1), "")))
-    begin_settings(fresh, "demo")
+    keep_original(fresh, "demo")
     yield "a study was never saved", come_back(lambda: keep(fresh, Draft(fresh_text, "")))
     for name in ("fresh", "own", "demo"):
         yield pen(name)

@@ -36,7 +36,7 @@ from study_app.store.drafts import Draft, draft_files, keep
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal_events
 from study_app.store.sessions.folder_lock import open_alone
-from study_app.store.study_settings import begin_settings
+from study_app.store.study_settings import keep_original
 from tests import studies
 from tests.golden import compare
 from tests.golden_values import value_lines
@@ -184,7 +184,7 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
     for name, at in (("older", "2026-11-20T08:00:00+01:00"), ("newer", "2026-11-20T08:30:00+00:00")):
         (kept,) = (file for file in draft_files() if f"{name}.toml" in file.read_text(encoding="utf-8"))
         kept.write_text(json.dumps(json.loads(kept.read_bytes()) | {"kept_at": at}), encoding="utf-8")
-    begin_settings(protocols / "older.toml", "demo")
+    keep_original(protocols / "older.toml", "demo")
     found = read_studies((), lambda: version_rows)
     assert [(Path(it.source).stem, it.origin) for it in found[2:5]] == [
         ("newer", "Own study"),
