@@ -279,12 +279,14 @@ class GroupMean:
 def group_mean(estimates: Sequence[float], variances: Sequence[float], shared: float = 0.0) -> GroupMean:
     """Return the random-effects mean of estimates, shape (n,), with their variances, each above zero.
 
-    ``shared`` is the variance of an error that all have in common.
+    A variance counts as its geometric mean with the median of all: variances are estimates, too, and thresholds that
+    are too high have the smaller ones. ``shared`` is the variance of an error that all have in common.
     """
     y, v = np.asarray(estimates, float), np.asarray(variances, float)
     n = len(y)
     if n == 0:
         raise ValueError("a mean needs an estimate")
+    v = np.sqrt(v * np.median(v))
 
     def excess(between: float) -> float:
         weights = 1.0 / (v + between)
