@@ -13,9 +13,9 @@ from study_app.gui.operator.operator_view import Session, operator_view, stages
 from study_app.gui.operator.servo_health import Vitals
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.simulated import Comparison
+from study_app.protocol.simulated import NO_FEATURES, Comparison
 from study_app.protocol.streams import stream
-from study_app.session.simulated.rehearsal import rehearse
+from study_app.session.simulated.rehearsal import RehearsedSession, rehearse
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.blinded.unblinding import unblind
@@ -34,20 +34,37 @@ from tests.session.sealed.numbers_written import Trials, every_number, told
 pytestmark = [pytest.mark.nightly, pytest.mark.slow, needs_servo]
 
 SESSIONS = 12
-HIDDEN = {"sealed", "resolved", "key_hash", "at", "previous", "fingerprint", "sha256", "frames_sha256"}
+HIDDEN = {"sealed", "resolved", "key_hash", "receipt_hash", "at", "previous", "fingerprint", "sha256", "frames_sha256"}
 """What may differ: sealed fields, hashes, and the time of day."""
 
 Said: TypeAlias = dict[str, Any]
+
+STATEMENTS = """
+[scales.agreement]
+labels.en = ["1", "2", "3", "4", "5", "6", "7"]
+[questionnaires.felt]
+intro = "Do you agree?"
+scale = "agreement"
+items = [{ id = "thick", text = "It is thick.", short = "Thick" }]
+[blocks.said]
+task = "stir"
+conditions = ["oil", "other"]
+repetitions = 4
+order = "shuffled"
+questionnaire = "felt"
+"""
 
 
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("levels") / "levels.toml"
-    path.write_text(edited_studies.text_of("every_design"))
+    path.write_text(edited_studies.text_of("every_design").replace('"expected"]', '"expected", "said"]') + STATEMENTS)
     return path
 
 
-def answer_blindly(_self: object, _study: object, design: Any, _s: Any, _b: Any, draw: Callable[[], float]) -> Any:
+def answer_blindly(
+    _self: object, _study: object, design: Any, _s: Any, _b: Any, draw: Callable[[], float], _course: Any
+) -> Any:
     """Answer by the draw alone, whatever was felt."""
     share = draw()
     if design.reply == "choice":
@@ -79,6 +96,7 @@ def run(protocol: Path, folder: Path, secret: int) -> Path:
 def blindly() -> Any:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Comparison, "answer", answer_blindly)
+        patch.setattr(RehearsedSession, "_felt", lambda _self, _trial: NO_FEATURES)
         patch.setattr("study_app.session.simulated.participant.AdjustingObserver", BlindSetting)
         yield patch
 
@@ -90,7 +108,7 @@ def first(protocol: Path, blindly: Any, tmp_path_factory: pytest.TempPathFactory
 
 @pytest.fixture(scope="module")
 def second(protocol: Path, blindly: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return run(protocol, tmp_path_factory.mktemp("second") / "study", 2)
+    return run(protocol, tmp_path_factory.mktemp("second") / "study", 3)
 
 
 def said_in(folder: Path) -> Said:
@@ -141,15 +159,19 @@ def operator_views(folder: Path, protocol: Path) -> list[Any]:
     return views
 
 
-def levels(folder: Path) -> list[Any]:
+def presented(folder: Path) -> list[Any]:
+    """Return level and arrangement of each trial, and the condition of those of statements."""
     (place,) = StudyFolder(folder).sessions()
-    lines = raw(blinding.opened(journal.read(place.journal), read_key(folder)))
-    return [(line["level"], line["arrangement"]) for line in lines if line["event"] == "trial_started"]
+    lines, codes = raw(blinding.opened(journal.read(place.journal), read_key(folder))), read_key(folder).codes["said"]
+    started = [line for line in lines if line["event"] == "trial_started"]
+    return [(line.get("level"), line.get("arrangement"), codes.get(line["code"], "")) for line in started]
 
 
-def test_sessions_under_two_keys_present_different_levels(first: Path, second: Path) -> None:
-    assert len(levels(first)) == len(levels(second)) > 30
-    assert sum(one != other for one, other in zip(levels(first), levels(second), strict=True)) > 15
+def test_sessions_under_two_keys_present_different_levels_and_conditions(first: Path, second: Path) -> None:
+    one, other = presented(first), presented(second)
+    assert len(one) == len(other) > 30
+    assert sum(it != another for it, another in zip(one, other, strict=True)) > 15
+    assert [it[2] for it in one if it[2]] != [it[2] for it in other if it[2]]
 
 
 def test_sessions_under_two_keys_write_the_same_but_for_sealed_fields(first: Path, second: Path) -> None:
@@ -163,7 +185,7 @@ def test_a_planted_leak_makes_them_differ(first: Path, protocol: Path, blindly: 
     with blindly.context() as patch:
         left = {**blinding._SEALED_IN, IntervalEnded: SEALED - {"force_peak_n"}}
         patch.setattr(blinding, "_SEALED_IN", left)
-        other = said_in(run(protocol, tmp_path / "planted", 2))
+        other = said_in(run(protocol, tmp_path / "planted", 3))
     one = said_in(first)
     assert {name.rpartition("/")[2] for name in one if one[name] != other.get(name)} == {"journal.jsonl"}
 
