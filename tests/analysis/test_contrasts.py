@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import ttest_ind, ttest_rel
+from scipy.stats import ttest_1samp, ttest_ind, ttest_rel
 
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.levels.thresholds import Thresholds
-from study_app.analysis.planning.power_curves import Powers, detectable, power_markdown
-from study_app.analysis.planning.simulated_studies import plan
+from study_app.analysis.planning.power_curves import Powers, detectable, power_markdown, powers, shown_equal
+from study_app.analysis.planning.simulated_studies import count, people, plan, together
 from study_app.analysis.planning.threshold_studies import PrecisionResult, Precisions, threshold_markdown
 from study_app.analysis.report import write_report
 from study_app.analysis.report.write_report import report
@@ -45,6 +45,9 @@ methods.m = { kind = "questplus", trials = 20 }
 participants = 6
 contrasts = [{ measure = "threshold", blocks = ["late", "prompt"], expected = "higher", bound = 1.25 }]
 """
+
+
+COMPARED = 'conditions = ["prompt_one", "late_one"], standard = "prompt_one"'
 
 
 @pytest.fixture(scope="module")
@@ -164,3 +167,61 @@ def test_the_smallest_difference_is_that_of_published_tables() -> None:
     assert detectable(34, tail=0.025)[1] == pytest.approx(0.495, abs=0.001)
     assert detectable(27, tail=0.05)[1] == pytest.approx(0.4912, abs=0.002)
     assert detectable(64, 64, tail=0.025)[1] == pytest.approx(0.4992, abs=0.001)
+
+
+@pytest.mark.parametrize("groups", [(6,), (30,), (12, 6)])
+def test_so_many_studies_without_a_difference_show_equality(groups: tuple[int, ...]) -> None:
+    draw, bound = np.random.default_rng(1), 1.0
+    one, other = (draw.normal(size=(n, 4000)) for n in (*groups, groups[-1])[:2])
+    low, high = (ttest_1samp(one, 0) if len(groups) == 1 else ttest_ind(one, other)).confidence_interval(0.9)
+    within = np.maximum(-low, high) <= bound
+    assert shown_equal(bound, *groups, alpha=0.05) == pytest.approx(within.mean(), abs=0.025)
+
+
+D_PRIMES = [
+    (f'stimulus = "{it}", design = "2ifc", method = "m"', f'design = "2ifc", {COMPARED}') for it in ("prompt", "late")
+]
+
+
+@pytest.mark.parametrize(
+    ("edits", "bound", "spread"),
+    [
+        ([], math.log(1.25), math.hypot(math.log(1.2), math.log(1.3), math.log(1.3))),
+        ([*D_PRIMES, ('"threshold"', '"d_prime"'), ("1.25", "0.3")], 0.3, math.hypot(math.log(1.2), 0.2, 0.2)),
+    ],
+)
+def test_power_plans_differences_and_equality_within_people(
+    edits: list[tuple[str, str]], bound: float, spread: float
+) -> None:
+    text = DELAYED
+    for old, new in edits:
+        text = text.replace(old, new)
+    errors = 0.2 if edits else math.log(1.3)
+    found = {
+        (block, 20): PrecisionResult([np.array([[errors], [-errors]])], [np.full(2, 0.2)])
+        for block in ("late", "prompt")
+    }
+    told = threshold_markdown(Precisions(parse(text.encode(), "delayed.toml"), (40,), 10, 10, 1, found))
+    half, least = (spread * end for end in detectable(40, tail=0.05))
+    ends = f"±{half:.2f} | ±{least:.2f}" if edits else f"×/÷ {math.exp(half):.2f} | ×/÷ {math.exp(least):.2f}"
+    assert "| smallest difference | shown within the bound if truly equal |" in told
+    assert told.strip().endswith(f"| {spread:.0%} | {ends} | {shown_equal(bound / spread, 40, alpha=0.05):.0%} |")
+
+
+def test_power_counts_studies_of_statements_that_show_equality() -> None:
+    text = source_bytes("rek2024").decode().replace("format = 1", "format = 2")
+    contrast = (
+        'contrasts = [{ measure = "different", blocks = ["delays"], conditions = ["delay_50", "delay_0"], bound = 1 }]'
+    )
+    protocol = parse(text.replace("[analysis]\n", f"[analysis]\n{contrast}\n").encode(), "rek2024.toml")
+    planned = plan(protocol, felt_in(protocol))
+    counts = count(planned, (12,), 1, 0, 20)
+    held = [people(planned, 12, 1, study) for study in range(20)]
+    (at,) = (place for place, block in enumerate(planned.blocks) if block.id == "delays")
+    answers = together(held, at, (0.0,))[0, :, :, :2, [item.id for item in planned.blocks[at].items].index("different")]
+    away = answers[..., 1] - answers[..., 0]
+    low, high = ttest_1samp(away - away.mean(), 0.0, axis=1).confidence_interval(0.9)
+    shown = int((np.maximum(-low, high) <= 1).sum())
+    assert 0 < shown < 20
+    row = f"| *{planned.contrasts[0].described()}, if truly equal* | {shown / 20:.0%} |"
+    assert row in power_markdown(powers(planned, (12,), 20, 20, 1, counts))

@@ -16,7 +16,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from scipy.optimize import brentq
-from scipy.stats import nct
+from scipy.stats import chi2, nct, norm
 from scipy.stats import t as student
 
 from study_app import __version__
@@ -27,6 +27,7 @@ from study_app.analysis.figures.page_layout import SMALL, Style
 from study_app.analysis.planning.simulated_studies import (
     EFFECTS,
     FULL,
+    IF_EQUAL,
     ODD,
     ODD_POINTS,
     PLANNED_DRAWS,
@@ -48,6 +49,8 @@ MANY: Final = 200
 
 WANTED: Final = 0.8
 """The power that "smallest detectable effect" and "participants needed" are about."""
+
+SPREADS: Final = 1000
 
 OVER_ALL: Final = "all statements at once"
 
@@ -148,6 +151,10 @@ def _contrast_curves(plan: Plan, counts: Counts, studies: int) -> Iterator[Curve
         power, alarms = _shares(counts[one.described(), "contrast"] / studies)
         within = None if len(one.blocks) == 2 else alarms  # effects are those of the settings of one block
         yield Curve(one.blocks[0], "contrast", None, one.described(), None, power, within, None, None)
+        if one.bound is not None:
+            equal = f"{one.described()}, {IF_EQUAL}"
+            power, _ = _shares(counts[equal, "contrast"] / studies)
+            yield Curve(one.blocks[0], "contrast", None, equal, None, power, None, None, None)
 
 
 def _shares(shares: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -232,8 +239,6 @@ COLUMNS: Final = (
         "The smallest difference of mean answers that 80 % of such studies show, in points.",
     ),
 )
-
-EQUAL: Final = "if truly equal"
 
 _HEADS: Final[dict[Question, tuple[str, str]]] = {
     "settings differ": ("Do the settings differ?", "statement"),
@@ -336,38 +341,48 @@ def _between(found: Powers) -> Iterator[str]:
         spread = float(given[place].answers(1.0)[:, :, item].mean(axis=1).std(ddof=1))
         said = f"SD: of the mean answers of simulated participants, {spread:.2f} points."
         rows = [(one.measure, f"{spread:.2f}", spread)]
-        alpha = plan.decided.alphas[-1]
-        yield from smallest_differences(one, found.sizes, alpha, rows, "statement", said, "±{:.2f}".format, shares)
+        yield from smallest_differences(
+            one, found.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement", said,
+            "±{:.2f}".format, shares, one.bound,
+        )  # fmt: skip
 
 
 def smallest_differences(
     one: Contrast,
     sizes: Sequence[int],
     alpha: float,
+    members: int,
     rows: Sequence[tuple[str, str, float]],
     first: str,
     said: str,
     written: Callable[[float], str],
     shares: tuple[float, float] | None = None,
+    bound: float | None = None,
 ) -> Iterator[str]:
     """Yield a table of the smallest difference in a contrast that 80 % of studies show, as Markdown.
 
-    ``rows`` are its first cell, below the heading ``first``, and the standard deviation in words and as a number;
-    ``said`` says what that is. ``shares`` are those that two groups have of all participants; None: within people.
+    It is one of ``members`` hypotheses, and shown by the strictest p of Holm over them. ``rows`` are its first cell,
+    below the heading ``first``, and the standard deviation in words and as a number; ``said`` says what that is.
+    ``shares`` are those that two groups have of all participants; None: within people. ``bound`` is that of equality,
+    on the scale of the standard deviation.
     """
-    heads = (first, "participants", "SD", "half the 95 % interval", "smallest difference")
-    sides = "two-sided" if one.expected is None else "one-sided"
+    equal = [] if bound is None else [f"shown within the bound {IF_EQUAL}"]
+    heads = (first, "participants", "SD", "half the 95 % interval", "smallest difference", *equal)
+    sides, strictest = "two-sided" if one.expected is None else "one-sided", alpha / members
+    corrected = "" if members == 1 else f" ({alpha:.2g} over {members} hypotheses)"
     both = "" if shares is None else f" Of the participants {shares[0]:.0%} and {shares[1]:.0%} are in the two groups."
     yield from ("", f"## Contrast: {one.described()}", "")
-    yield f"{said}{both} Smallest difference: what {WANTED:.0%} of studies show at α = {alpha:.2g}, {sides}."
+    at = f"at α = {strictest:.2g}{corrected}, {sides}"
+    yield f"{said}{both} Smallest difference: what {WANTED:.0%} of studies show {at}."
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, words, spread in rows:
         for n in sizes:
             groups = [n] if shares is None else [int(n * share + 1e-9) for share in shares]
-            ends = ["–", "–"]
+            ends = ["–"] * (2 + len(equal))
             if min(groups) > 1:
-                reached = detectable(*groups, tail=alpha / (2 if one.expected is None else 1))
+                reached = detectable(*groups, tail=strictest / (2 if one.expected is None else 1))
                 ends = [written(end * spread) for end in reached]
+                ends += [] if bound is None else [f"{shown_equal(bound / spread, *groups, alpha=alpha):.0%}"]
             yield f"| {name} | {n} | {words} | {' | '.join(ends)} |"
 
 
@@ -377,13 +392,29 @@ def detectable(n: int, second: int | None = None, *, tail: float) -> tuple[float
     The tests are of ``n`` pairs, or of two groups of ``n`` and ``second`` people; ``tail`` is the probability of each
     tail that counts as significant.
     """
-    root, freedom = math.sqrt(n), n - 1
-    if second is not None:
-        root, freedom = math.sqrt(n * second / (n + second)), n + second - 2
+    root, freedom = _precision(n, second)
     critical = float(student.isf(tail, freedom))
     most = (2 * critical + 10) / root  # of so large a difference more than 80 % show it
     least = float(brentq(lambda size: nct.sf(critical, freedom, size * root) - WANTED, 0.0, most))
     return float(student.ppf(0.975, freedom)) / root, least
+
+
+def shown_equal(bound: float, n: int, second: int | None = None, *, alpha: float) -> float:
+    """Return the share of studies without a difference whose interval of 1 − 2·alpha lies within ± ``bound`` [SD].
+
+    Of ``n`` pairs, or of two groups of ``n`` and ``second`` people; the mean over quantiles of the estimated SD.
+    """
+    root, freedom = _precision(n, second)
+    spreads = np.sqrt(chi2.ppf((np.arange(SPREADS) + 0.5) / SPREADS, freedom) / freedom)
+    inside = bound * root - float(student.isf(alpha, freedom)) * spreads
+    return float(np.maximum(2 * norm.cdf(inside) - 1, 0.0).mean())
+
+
+def _precision(n: int, second: int | None) -> tuple[float, int]:
+    """Return one over the standard error of a mean difference [1/SD], and the degrees of freedom of its t."""
+    if second is None:
+        return math.sqrt(n), n - 1
+    return math.sqrt(n * second / (n + second)), n + second - 2
 
 
 def _truly_equal(curves: list[Curve]) -> list[Curve]:
@@ -391,7 +422,15 @@ def _truly_equal(curves: list[Curve]) -> list[Curve]:
     items = {curve.item: [one.alarms for one in curves if one.item == curve.item and one.alarms] for curve in curves}
     return [
         Curve(
-            curves[0].block, "equivalence", item, "", EQUAL, tuple(np.mean(alarms, axis=0).tolist()), None, None, None
+            curves[0].block,
+            "equivalence",
+            item,
+            "",
+            IF_EQUAL,
+            tuple(np.mean(alarms, axis=0).tolist()),
+            None,
+            None,
+            None,
         )
         for item, alarms in items.items()
     ]
@@ -417,7 +456,10 @@ def _explained(question: Question, found: Powers) -> list[str]:
                 "it, finding equivalence would be wrong, and few should."
             ]
         case "contrast":
-            return ["Paired t tests of each participant's mean answers, by Holm over the hypotheses."]
+            return [
+                "Paired t tests of each participant's mean answers, by Holm over the hypotheses. Equality is shown "
+                f"where the interval of {1 - 2 * found.plan.decided.alphas[-1]:.3g} lies within the bound."
+            ]
 
 
 def _markdown_table(

@@ -17,6 +17,8 @@ from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
 from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.report.html_page import bullets, heading, paragraph
 from study_app.analysis.results import counted, least, listed
+from study_app.analysis.statistics.outcome import FEW
+from study_app.analysis.statistics.thresholds import FEWEST
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.expected_precision import expected_of, precision_plan, precision_rows, threshold_plan
@@ -96,6 +98,7 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
             f"Hypothesis: {contrast.described(words)}. Test: {'Welch' if contrast.groups else 'paired'} t test of "
             f"{'the logarithm of ' if ratio else ''}one number of each participant, "
             f"{'two-sided' if contrast.expected is None else 'one-sided'}, corrected by Holm over all contrasts."
+            f"{'' if contrast.bound is None else ' Equality: the interval of 1 − 2 alpha lies within the bound.'}"
         )
     for block in protocol.main_blocks:
         if block.design is not None:
@@ -171,7 +174,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             )
             yield (
                 f"Block {block.id}, group: random-effects mean of logarithmic thresholds (Paule–Mandel) with the "
-                "Hartung–Knapp 95 % interval."
+                f"Hartung–Knapp 95 % interval from {FEWEST} participants on, each variance as its geometric mean with "
+                "the median."
             )
             if plan.standards > 1:
                 yield f"Block {block.id}, exponent: slope of ln JND over ln standard of each participant, t interval."
@@ -204,7 +208,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     yield (
         "A statement counts only where the permutation test over all statements of its block shows a difference, "
         "corrected by Holm over the blocks; the report's first page states only what counts. Contrasts are corrected "
-        "by Holm among themselves."
+        f"by Holm among themselves. Bootstrap intervals and mixed models take at least {FEW} participants."
     )
     yield (
         f"α = {decided.alpha:g}; primary statements ({', '.join(decided.primary) or 'all'}) are corrected by Holm, the "

@@ -17,6 +17,7 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 from scipy.stats import ttest_1samp
 
 from study_app.analysis.data.blocks import Block as StatementBlock
@@ -337,13 +338,17 @@ def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int)
     return counts | means
 
 
+IF_EQUAL: Final = "if truly equal"
+
+
 def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDArray[np.bool_]]:
     """Return which studies (studies, effects) show each contrast of statements, in words: paired t tests, by Holm.
 
-    ``given`` are each block's answers (effects, studies, participants, settings, items).
+    With a bound also which would show equality within it, `IF_EQUAL`, by the interval of 1 − 2·alpha. ``given`` are
+    each block's answers (effects, studies, participants, settings, items).
     """
     blocks = {block.id: (block, answers) for block, answers in zip(plan.blocks, given, strict=True)}
-    ps = []
+    ps, equal = [], dict[str, NDArray[np.bool_]]()
     for one in plan.contrasts:
         sides = []
         for name, condition in zip(
@@ -357,11 +362,16 @@ def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDA
         found = np.ones(differ.shape)
         found[differ] = ttest_1samp(away[differ], 0.0, axis=-1, alternative=SIDES[one.expected]).pvalue
         ps.append(found.T)
+        if one.bound is not None:
+            none = away[0] - away[0].mean()
+            reach = float(student.isf(alpha, none.shape[-1] - 1)) * none.std(axis=-1, ddof=1) / none.shape[-1] ** 0.5
+            within = np.abs(none.mean(axis=-1)) + reach <= one.bound
+            equal[f"{one.described()}, {IF_EQUAL}"] = np.repeat(within[:, None], len(away), axis=1)
     if not ps:
         return {}
     family = np.stack([*ps, *[np.ones_like(ps[0])] * plan.untested], axis=-1)
     adjusted = np.apply_along_axis(lambda each: np.array(holm(each.tolist())), -1, family)
-    return {one.described(): adjusted[..., place] <= alpha for place, one in enumerate(plan.contrasts)}
+    return {one.described(): adjusted[..., place] <= alpha for place, one in enumerate(plan.contrasts)} | equal
 
 
 def _counted(found: NDArray[np.bool_], shown: NDArray[np.bool_], effects: int) -> dict[str, NDArray[np.bool_]]:

@@ -22,6 +22,7 @@ from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.errors import AnalysisError
 from study_app.protocol.checks.expected_precision import (
+    EstimationPlan,
     MeanPlan,
     RatingPlan,
     SensitivityPlan,
@@ -30,7 +31,7 @@ from study_app.protocol.checks.expected_precision import (
 )
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.table import text_in
-from study_app.protocol.trials.tracks import standards_of
+from study_app.protocol.trials.tracks import standards_of, stimulus_of
 from study_app.psychophysics.people import BETWEEN_PEOPLE, ESTIMATE_NOISE, Estimates, Person
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
@@ -340,27 +341,50 @@ def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
         )
 
 
+MEASURED: Final = {ThresholdPlan: "threshold", SensitivityPlan: "d_prime", EstimationPlan: "exponent"}
+
+
 def _contrasts(precisions: Precisions) -> Iterator[str]:
-    """Yield for each contrast of thresholds a table of the smallest difference that 80 % of studies show."""
+    """Yield for each contrast whose blocks are planned a table of the smallest difference that 80 % of studies show."""
     if (decided := precisions.protocol.analysis) is None:
         return
+    planned = plans(precisions.protocol, ())
     for one in decided.contrasts:
-        rows = [*_spreads(precisions, one)] if one.measure == "threshold" else []
+        firsts = [next(iter(planned[block].values())) for block in one.blocks if block in planned]
+        if len(firsts) < len(one.blocks) or any(MEASURED.get(type(it)) != one.measure for it in firsts):
+            continue
+        first, ratio = firsts[0], one.measure == "threshold"
+        mean = 1.0 if isinstance(first, ThresholdPlan) else first.value
+        rows = [(name, words, mean * spread) for name, words, spread in _spreads(precisions, one)]
         if not rows:
             continue
-        whose = "one participant's threshold: the estimate's, and that of people, who differ"
+        what = one.measure.replace("_", " ")
+        whose = f"one participant's {what}: the estimate's, and that of people, who differ"
         if one.groups is None:
             whose = "the difference of one participant: that of both estimates, and of people, whose differences vary"
         yield from smallest_differences(
-            one, precisions.sizes, decisions(precisions.protocol).alphas[-1], rows, "trials per standard",
-            f"SD: of {whose} by a factor of {BETWEEN_PEOPLE:g}.", lambda end: f"×/÷ {math.exp(end):.2f}",
-            group_shares(precisions.protocol, one),
+            one, precisions.sizes, decisions(precisions.protocol).alphas[-1], len(decided.contrasts), rows,
+            f"trials{first.per}",
+            f"SD {first.words}of {whose} by a factor of {BETWEEN_PEOPLE:g}.",
+            (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format,
+            group_shares(precisions.protocol, one), log_bound(precisions.protocol, one) if ratio else one.bound,
         )  # fmt: skip
+
+
+def log_bound(protocol: Protocol, one: Contrast) -> float | None:
+    """Return the logarithm of the bound of equality; None: there is none, or thresholds are no ratios."""
+    stimuli = [stimulus_of(protocol, protocol.blocks[block]) for block in one.blocks]
+    if one.bound is None or any(stimulus.spacing != "log" for stimulus in stimuli):
+        return None
+    return abs(math.log(one.bound))
 
 
 def _spreads(precisions: Precisions, one: Contrast) -> Iterator[tuple[str, str, float]]:
     """Yield numbers of trials, and the standard deviation of what is compared of a participant with them."""
-    standards = [len(standards_of(precisions.protocol, precisions.protocol.blocks[block])) for block in one.blocks]
+    protocol = precisions.protocol
+    standards = [
+        len(standards_of(protocol, protocol.blocks[it])) if one.measure == "threshold" else 1 for it in one.blocks
+    ]
     for trials in (trials for block, trials in precisions.found if block == one.blocks[0]):
         held = [found for block in one.blocks if (found := precisions.found.get((block, trials))) is not None]
         spreads = [found.spread / math.sqrt(count) for found, count in zip(held, standards, strict=False)]

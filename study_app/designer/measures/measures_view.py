@@ -255,18 +255,12 @@ def _ruled(verdicts: Iterable[Verdict]) -> tuple[Part, ...]:
     return (None, *found) if (found := tuple(verdicts)) else ()
 
 
-EQUAL: Final = "no power is computed for an equality"
-
-
 def hypotheses_card(protocol: Protocol, path: Path, controls: Controls, simulated: Simulated) -> MeasureCard | None:
     """Return the hypotheses about a block, or at the session's order all, with what the participants show of each."""
     block = str(path[1]) if path[:1] == ("blocks",) and len(path) > 1 else ""
     found = hypotheses_of(protocol, block) if block or path == SEQUENCE else ()
     known, waiting = dict(simulated.hypotheses), simulated.failed or simulated.waiting or "liquid-study power plans it"
-    said = [
-        f"{capitalised(one.described())}: {EQUAL if one.bound is not None else known.get(one.described(), waiting)}"
-        for one in found
-    ]
+    said = [f"{capitalised(one.described())}: {known.get(one.described(), waiting)}" for one in found]
     who = people(controls.participants, controls.planned)
     return MeasureCard("Hypotheses", who, tuple(("neutral", "flag", one) for one in said), wide=True) if said else None
 

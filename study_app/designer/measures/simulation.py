@@ -514,32 +514,49 @@ def _studies(plan: ThresholdPlan, sizes: Sequence[int], check: Check) -> thresho
     return total
 
 
+SHOWN: Final = "{:.0%} of studies of {} show it, if people answer as the model does"
+EQUALITY: Final = "{:.0%} of studies of {} show equality, if there is no difference"
+
+
 def _ratios(protocol: Protocol, block: str, people: int, check: Check) -> Iterator[tuple[str, str]]:
-    """Yield for each hypothesis about thresholds which ratio 80 % of studies show, as ``power`` computes it."""
+    """Yield for each hypothesis about thresholds what studies show, as ``power`` computes it."""
     from study_app.analysis.data.blocks import decisions  # noqa: PLC0415 - loads scipy: only in this process
-    from study_app.analysis.planning.power_curves import detectable  # noqa: PLC0415 - the same
+    from study_app.analysis.planning.power_curves import detectable, shown_equal  # noqa: PLC0415 - the same
     from study_app.analysis.planning.simulated_studies import group_shares  # noqa: PLC0415 - the same
-    from study_app.analysis.planning.threshold_studies import Case, study_batch  # noqa: PLC0415 - the same
+    from study_app.analysis.planning.threshold_studies import Case, log_bound, study_batch  # noqa: PLC0415 - the same
 
     for one in hypotheses_of(protocol, block):
         plans = [threshold_plan(protocol, protocol.blocks[name]) for name in one.blocks]
         groups = [int(people * share + 1e-9) for share in group_shares(protocol, one) or (1.0,)]
         spreads = []
-        for plan in plans if one.measure == "threshold" and one.bound is None and min(groups) > 1 else ():
+        for plan in plans if one.measure == "threshold" and min(groups) > 1 else ():
             check()
             if plan is not None:
                 found = study_batch(Case("", plan, (SEED, 0, plan.trials, 0)), (max(people, SPREAD_OF),))
                 spreads.append(found.spread / math.sqrt(plan.standards))
         if len(spreads) == len(plans) and all(map(math.isfinite, spreads)):
-            tail = decisions(protocol).alphas[-1] / (2 if one.expected is None else 1)
-            apart = math.hypot(math.log(BETWEEN_PEOPLE), *spreads) * detectable(*groups, tail=tail)[1]
-            yield one.described(), f"80 % of studies of {people} show a ratio of {math.exp(apart):.2f}"
+            spread, alpha = math.hypot(math.log(BETWEEN_PEOPLE), *spreads), decisions(protocol).alphas[-1]
+            if one.bound is None:
+                tail = alpha / len(hypotheses_of(protocol)) / (2 if one.expected is None else 1)
+                apart = spread * detectable(*groups, tail=tail)[1]
+                yield one.described(), f"80 % of studies of {people} show a ratio of {math.exp(apart):.2f}"
+            elif (bound := log_bound(protocol, one)) is not None:
+                share = shown_equal(bound / spread, *groups, alpha=alpha)
+                yield one.described(), EQUALITY.format(share, people)
 
 
 def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tuple[tuple[str, str], ...]]:
     """Return the smallest differences that studies show, and how many show each hypothesis about statements."""
     from study_app.analysis.planning.power_curves import powers  # noqa: PLC0415 - loads scipy
-    from study_app.analysis.planning.simulated_studies import BATCH, HIGHEST, Counts, compares_statements, count, plan  # noqa: PLC0415 - loads scipy
+    from study_app.analysis.planning.simulated_studies import (  # noqa: PLC0415 - loads scipy
+        BATCH,
+        HIGHEST,
+        IF_EQUAL,
+        Counts,
+        compares_statements,
+        count,
+        plan,
+    )
 
     if not compares_statements(order.protocol):
         return None, ()
@@ -558,11 +575,17 @@ def _detectable(order: Simulation, check: Check) -> tuple[Detectable | None, tup
         and one.item not in planned.unknown
     ]  # fmt: skip
     findings.sort(key=lambda one: (one.detectable is None, one.detectable or 0.0))
-    of_block = {one.described() for one in hypotheses_of(order.protocol, order.block)}
+    shares = {one.over: one.power[0] for one in curves if one.question == "contrast"}
+    stated = [(one.described(), one.bound) for one in hypotheses_of(order.protocol, order.block)]
     shown = tuple(
-        (one.over, f"{one.power[0]:.0%} of studies of {people} show it, if people answer as the model does")
-        for one in curves
-        if one.question == "contrast" and one.over in of_block
+        (
+            one,
+            SHOWN.format(shares[one], people)
+            if bound is None
+            else EQUALITY.format(shares[f"{one}, {IF_EQUAL}"], people),
+        )
+        for one, bound in stated
+        if one in shares
     )
     return Detectable(people, STUDIES, HIGHEST, tuple(findings)), shown
 

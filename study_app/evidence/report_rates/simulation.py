@@ -290,12 +290,12 @@ def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) ->
     if cell.looks:
         planned = replace(simulation.decided, looks=cell.looks, spending=cell.spending)
         seen = (
-            _report(simulation, planned.at(n), [values[:n] for values in given], study, failures)[1] for n in cell.looks
+            report(simulation, planned.at(n), [values[:n] for values in given], study, failures)[1] for n in cell.looks
         )
         claimed = any(any(map(_claims, results)) for results in seen)
         return {(f"{ANYWHERE}, at any look", "at most 5 %"): claimed, LOST: bool(failures.found)}
     decided = simulation.decided if cell.extent != "partial" else replace(simulation.decided, noticed=None)
-    asked, results = _report(simulation, decided, given, study, failures)
+    asked, results = report(simulation, decided, given, study, failures)
     found: dict[Event, bool] = {}
     for place, (block, result) in enumerate(zip(simulation.blocks, results, strict=True)):
         judged = _in_delays if block.kind == "delays" else _in_liquids
@@ -315,7 +315,7 @@ def _study(simulation: Plan, cell: Cell, truth: Truth, seed: int, study: int) ->
     return found
 
 
-def _report(
+def report(
     simulation: Plan, decided: Decided, given: Sequence[Array], study: int, failures: Failures
 ) -> tuple[list[BlockAnswers], tuple[BlockResult, ...]]:
     """Return the answers of each block, and what the report finds in them."""

@@ -187,10 +187,11 @@ def test_the_share_of_studies_is_that_of_the_command_power() -> None:
 
 @pytest.mark.nightly
 @pytest.mark.slow
-def test_the_ratio_that_studies_show_is_that_of_the_command_power() -> None:
+@pytest.mark.parametrize("bound", [None, 1.25])
+def test_what_studies_show_of_a_contrast_is_that_of_the_command_power(bound: float | None) -> None:
     study, _ = template("viscosity-jnd").edited(*NO_BREAKS, Set(("methods", "adaptive", "trials"), 20))
     step = DuplicateElement(("blocks", "viscosity")).step(Situation(study))
-    contrast = {"measure": "threshold", "blocks": ["viscosity", "viscosity_2"]}
+    contrast = {"measure": "threshold", "blocks": ["viscosity", "viscosity_2"]} | ({"bound": bound} if bound else {})
     protocol = study.edited(*step.edits, Set(("analysis", "contrasts"), [contrast]))[0].protocol
     assert protocol is not None
     focus = focus_of(protocol, ("sequence",))
@@ -201,7 +202,8 @@ def test_the_ratio_that_studies_show_is_that_of_the_command_power() -> None:
     ((done, found),) = list(sweep(plans(protocol, ()), (30,), 10, 1, Serial()))[-1:]
     (row,) = [line for line in threshold_markdown(Precisions(protocol, (30,), done, done, 1, found)).splitlines()
               if line.startswith("| 20 | 30 | ") and "×/÷" in line]  # fmt: skip
-    assert float(said.rsplit(" ", 1)[1]) == pytest.approx(float(row.rsplit("×/÷ ", 1)[1].split()[0]), rel=0.05)
+    shown, planned = (said.split("%")[0], row.split("|")[-2]) if bound else (said.split()[-1], row.split("×/÷ ")[-1])
+    assert float(shown) == pytest.approx(float(planned.strip(" |%")), rel=0.05)
 
 
 @pytest.mark.slow

@@ -1,0 +1,66 @@
+"""Whether a finding shows in 80 % of studies of the size that ``power`` says it takes, by the report's own tests.
+
+Run it by itself: ``python tests/benchmarks/analysis/needed.py [STUDIES] [SIZE …]``. ``power`` plans rek2024 for the
+sizes; then so many other studies of each size that it names are answered, one answer in ten 3 points too high, and
+reported. Exit code 3 if less than 80 % of them show a statement, but for chance.
+"""
+
+import sys
+from collections import Counter
+from concurrent.futures import Executor, Future
+from typing import Any
+
+import numpy as np
+
+from study_app.analysis.findings.finding import FOUND
+from study_app.analysis.findings.statement_tests import DelayTrend, SettingsDiffer
+from study_app.analysis.planning.power_curves import WANTED, interval, powers
+from study_app.analysis.planning.simulated_studies import people, plan, sweep
+from study_app.analysis.results import Failures
+from study_app.evidence.report_rates.simulation import report
+from study_app.protocol.load import load
+from study_app.session.simulated.rehearsal import condition_features
+
+SEED, OTHER = 1, 2
+
+
+class Here(Executor):
+    """Computes in this process."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Compute it at once."""
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def main(studies: str = "200", *sizes: str) -> int:
+    """Print for each statement the size that ``power`` names, and how many other studies show it; return the code."""
+    protocol = load("rek2024")
+    planned, asked = plan(protocol, condition_features(protocol, seed=SEED)), int(studies)
+    tried = tuple(map(int, sizes)) or (5, 8, 12, 16, 20, 24)
+    *_, (done, counts) = sweep(planned, tried, asked, SEED, Here())
+    curves = [one for one in powers(planned, tried, done, asked, SEED, counts).curves if one.item is not None]
+    wanted = {(one.block, one.item): (n, one.power[tried.index(n)]) for one in curves
+              if one.question in ("settings differ", "trend") and (n := one.needed(tried))}  # fmt: skip
+    found: Counter[tuple[int, str, str | None]] = Counter()
+    for n in sorted({n for n, _ in wanted.values()}):
+        for study in range(asked):
+            given = [np.asarray(one.answers(1.0)) for one in people(planned, n, OTHER, study)]
+            _, results = report(planned, planned.decided, given, study, Failures())
+            for block, result in zip(planned.blocks, results, strict=True):
+                tests = (*SettingsDiffer.of(result), *DelayTrend.of(result))
+                found.update((n, block.id, one.item) for one in tests if one.verdict in FOUND)
+    print("block, statement         n   power %   shown in %  [Wilson]")
+    failed = False
+    for (block, item), (n, power) in wanted.items():
+        share = found[n, block, item] / asked
+        low, high = interval(share, asked)
+        failed |= high < WANTED
+        ends = f"[{100 * low:.1f}, {100 * high:.1f}]"
+        print(f"{block}, {item:16s} {n:4d} {100 * power:8.1f} {100 * share:11.1f}  {ends}")
+    return 3 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
