@@ -58,7 +58,7 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     assert "50 trials per standard" in text
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
     assert "presented again, up to 3 times" in text
-    assert "Hartung–Knapp" in text
+    assert "Hartung–Knapp 95 % interval from 3 participants on" in text
     assert "No power was computed" not in preregistration(load("thickness"), "0" * 64)
 
 
@@ -78,6 +78,7 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
     assert "within ±1 points?" in text
     assert "like_water, honey by like_honey and light_oil by like_oil) more often than by chance?" in text
     assert "α = 0.05; primary statements (all) are corrected by Holm" in text
+    assert "Bootstrap intervals and mixed models take at least 10 participants." in text
     assert "Their number is not decided: there is no stopping rule." in text
     assert "`liquid-study power rek2024 --to DIR`" in text
 
