@@ -46,11 +46,11 @@ from study_app.errors import StudyError
 from study_app.gui.home.study_facts import holds_liquids_alone, is_shipped, sources
 from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.kit.dialogs import choose_protocol
-from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, TANK, font
+from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, SHADOW, TANK, font
 from study_app.gui.theme.themed import Themed, name_bars, remove_widget, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
-from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, Rule, fill_rounded, scrolled, smooth_painter
+from study_app.gui.widgets.cards import Card, Chip, Icon, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Check, IconButton
 from study_app.gui.widgets.labels import Clamped, figures, label
 from study_app.gui.widgets.main_view import last_focused

@@ -27,7 +27,7 @@ from study_app.gui.results.view import ResultsPlace
 from study_app.gui.settings import view as settings_view
 from study_app.gui.settings.view import DisplayTest, MachinePlace
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.gui.theme.themed import Themed, apply_theme
+from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.main_view import Place
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.telemetry import Timing
@@ -72,7 +72,7 @@ OPENED = unblinded_words({"at": "2026-11-19", "by": "AK", "reason": "collection 
 def shown(qtbot: Any, made: Any, size: tuple[int, int], theme: Any = LIGHT) -> Any:
     """Return a window or a place on the screen."""
     qtbot.addWidget(made)
-    if isinstance(made, Themed):
+    if not hasattr(made, "given_theme"):
         apply_theme(made, theme)
     made.resize(*size)
     made.show()

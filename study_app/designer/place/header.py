@@ -16,11 +16,11 @@ from study_app.designer.problems import ProblemRow
 from study_app.designer.version_rows import VersionChip
 from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
 from study_app.gui.kit.dialogs import choose_protocol
-from study_app.gui.theme.theme import RADIUS_CARD, Tone, font
+from study_app.gui.theme.theme import RADIUS_CARD, SHADOW, Tone, font
 from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, chip_size, paint_chip, smooth_painter
+from study_app.gui.widgets.cards import Card, Chip, Icon, chip_size, paint_chip, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import label
 from study_app.number_text import counted

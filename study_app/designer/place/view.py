@@ -36,11 +36,11 @@ from study_app.designer.place.prompts import Prompt
 from study_app.designer.place.segments import Segments, small_button
 from study_app.designer.problems import ProblemRow, ProblemsCard
 from study_app.gui.kit.commands import COMMANDS, add_commands, key_cap, press, tip
-from study_app.gui.theme.theme import font
+from study_app.gui.theme.theme import SHADOW, font
 from study_app.gui.theme.themed import name_bars, remove_widget
 from study_app.gui.widgets.accessible import say
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Icon
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Icon
 from study_app.gui.widgets.controls import PressedByEnter
 from study_app.gui.widgets.main_view import Place, last_focused
 

@@ -14,9 +14,9 @@ from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QLabel, QWidget
 from study_app.devices.descriptor import DeviceOption
 from study_app.gui.kit.devices import DeviceShown, remembered_options
 from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, file_of
-from study_app.gui.theme.theme import font
+from study_app.gui.theme.theme import SHADOW, font
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, Chip, Rule, scrolled
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.main_view import Place

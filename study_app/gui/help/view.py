@@ -32,10 +32,10 @@ from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, Q
 
 from study_app import documentation
 from study_app.documentation import anchor_of, plain
-from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.theme import SHADOW, Theme, font
 from study_app.gui.theme.themed import Coloured
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Card
+from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place

@@ -15,10 +15,10 @@ from study_app.gui.home.study_facts import BrokenFacts, DraftFacts, Interrupted,
 from study_app.gui.kit.devices import DeviceShown
 from study_app.gui.sessions.session_facts import KINDS, Column, SessionFacts
 from study_app.gui.sessions.sessions_table import SessionsTable
-from study_app.gui.theme.theme import RADIUS_CARD, TANK, font
-from study_app.gui.theme.themed import Themed, remove_widget
+from study_app.gui.theme.theme import RADIUS_CARD, SHADOW, TANK, font
+from study_app.gui.theme.themed import give_ground, remove_widget
 from study_app.gui.widgets.boxes import add_layout, add_parts, grid, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon, smooth_painter
+from study_app.gui.widgets.cards import Card, Chip, Icon, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Clamped, Elided, label, set_ink
 from study_app.number_text import counted
@@ -112,13 +112,14 @@ def _paint_wake(painter: QPainter, water: QRectF) -> None:
     painter.drawEllipse(middle, radius, radius)
 
 
-class ResumeBanner(Themed, QWidget):
+class ResumeBanner(QWidget):
     """A tinted strip; hidden while there is nothing to go on with. ``resume_asked`` carries the session."""
 
     resume_asked = Signal(object)
 
     def __init__(self) -> None:
         super().__init__()
+        give_ground(self, "warn tint")
         self._shown: Interrupted | None = None
         self.heading = label("", "strong", "text", wraps=True)
         self.line = label("", "label", "warn", wraps=True)
@@ -138,13 +139,6 @@ class ResumeBanner(Themed, QWidget):
         self.line.setText(session.line)
         self.resume.show_action("play", f"Resume {session.participant}")
         self.resume.setAccessibleName(f"Resume {session.participant}")
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = smooth_painter(self)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(self.theme.warn_bg))
-        strip = QRectF(self.rect()).adjusted(SHADOW, 0, -SHADOW, 0)
-        painter.drawRoundedRect(strip, RADIUS_CARD, RADIUS_CARD)
 
 
 COLUMNS = (

@@ -4,17 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import (
-    QCloseEvent,
-    QColor,
-    QGuiApplication,
-    QKeySequence,
-    QPainter,
-    QPaintEvent,
-    QPen,
-    QResizeEvent,
-    QShortcut,
-)
+from PySide6.QtGui import QCloseEvent, QColor, QGuiApplication, QKeySequence, QPaintEvent, QPen, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QDialog, QMainWindow, QSizePolicy, QStackedWidget, QWidget
 from shiboken6 import isValid
 
@@ -23,7 +13,7 @@ from study_app.errors import StudyError
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import DARK, LIGHT, RADIUS_CONTROL, Theme, font
-from study_app.gui.theme.themed import Coloured, Themed, apply_theme, name_bars
+from study_app.gui.theme.themed import Coloured, Themed, apply_theme, give_ground, name_bars
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Logo, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, PressedByEnter
@@ -137,6 +127,7 @@ class Rail(Coloured, QWidget):
 
     def __init__(self, names: Iterable[str]) -> None:
         super().__init__()
+        give_ground(self, "rail")
         names = set(names)
         self.name = label("Liquid Study", "card")
         self.switch = RailButton("moon", "Dark theme", "Dark")
@@ -165,11 +156,6 @@ class Rail(Coloured, QWidget):
     def apply_theme(self, theme: Theme) -> None:
         word = "Light" if theme.dark else "Dark"
         self.switch.say("sun" if theme.dark else "moon", f"{word} theme", word)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(self.theme.surface))
-        painter.fillRect(self.width() - 1, 0, 1, self.height(), QColor(self.theme.border))
 
 
 FULL = QSize(1440, 900)

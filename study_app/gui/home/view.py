@@ -42,9 +42,10 @@ from study_app.gui.kit.commands import add_commands, key_cap, with_key
 from study_app.gui.kit.devices import DeviceShown, looking
 from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.sessions.session_facts import SessionFacts, extent_of, sessions
+from study_app.gui.theme.theme import SHADOW
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, scrolled
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.gui.widgets.main_view import Place

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QStackedLayout, 
 from study_app.gui.lab.lab_state import SIDES, Choices, LabView
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import Themed, replace_inside
+from study_app.gui.theme.themed import Themed, give_ground, replace_inside
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, Cap, Choice, CompactStop, IconButton, Toggle
@@ -101,8 +101,7 @@ class SideSwitch(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setProperty("role", "segments")
-        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        give_ground(self, "segments")
         self.setFixedHeight(SWITCH_HEIGHT)
         self.segments = {side: Segment() for side in SIDES}
         for segment in self.segments.values():
@@ -158,7 +157,7 @@ class Picker(Choice):
         draw_icon(QPainter(self), self._icon, QRectF(13, self.height() / 2 - 10, 20, 20), self.theme.text2, 1.9)
 
 
-class LabHeader(Themed, QWidget):
+class LabHeader(QWidget):
     """One row in a wide window, two in a narrow one."""
 
     blind_asked = Signal(bool)
@@ -167,6 +166,7 @@ class LabHeader(Themed, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        give_ground(self, "header")
         self.title = label("Liquid lab", "title_dense")
         self.sides = SideSwitch()
         self.blind = Toggle("Blind A/B")
@@ -233,9 +233,6 @@ class LabHeader(Themed, QWidget):
     def _ask_blind(self, on: bool) -> None:
         self.blind.setChecked(not on)  # the view says when it is
         self.blind_asked.emit(on)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        QPainter(self).fillRect(0, self.height() - 1, self.width(), 1, QColor(self.theme.border))
 
 
 def _row() -> QHBoxLayout:

@@ -15,9 +15,9 @@ from study_app.gui.lab.cards import CostCard, ErrorCard, ForceCard, LimiterCard,
 from study_app.gui.lab.lab_state import LabView
 from study_app.gui.lab.lab_tank import LabTank, TankNote
 from study_app.gui.lab.parameters import KEY, FormPanel, LabHeader
-from study_app.gui.theme.theme import SPACE
+from study_app.gui.theme.theme import SHADOW, SPACE
 from study_app.gui.widgets.boxes import add_layout, grid, vbox
-from study_app.gui.widgets.cards import SHADOW, scrolled
+from study_app.gui.widgets.cards import scrolled
 from study_app.gui.widgets.main_view import EscapeKey, Place
 from study_app.lab.ab_comparison import Setting
 from study_app.workspace import workspace

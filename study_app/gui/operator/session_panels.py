@@ -1,16 +1,16 @@
 """The operator's header and rail: state and trouble, where the session is, counts, the strip over one screen."""
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtGui import QColor, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.kit.commands import key_cap
 from study_app.gui.operator.operator_view import OperatorView, State, StepRow
 from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import RADIUS_CARD, Tone, TypeRole, font
-from study_app.gui.theme.themed import Themed
+from study_app.gui.theme.theme import Tone, TypeRole, font
+from study_app.gui.theme.themed import Themed, give_ground
 from study_app.gui.widgets.boxes import STRETCH, add_parts, grid, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Bar, Card, Chip, Icon, Logo, Rule, scrolled, smooth_painter
+from study_app.gui.widgets.cards import Bar, Card, Chip, Icon, Logo, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, CompactStop, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
 from study_app.number_text import minutes
@@ -48,11 +48,12 @@ class ThemeButton(IconButton):
         super().paintEvent(event)
 
 
-class Header(Themed, QWidget):
+class Header(QWidget):
     """The strip at the top; ``page`` brings the participant's window to the front, which covers it on one screen."""
 
     def __init__(self) -> None:
         super().__init__()
+        give_ground(self, "bar")
         self.setFixedHeight(64)
         self.study = Elided("card")
         self.who = Elided("label", "text2")
@@ -96,11 +97,6 @@ class Header(Themed, QWidget):
         self.bar.show_share(done / max(1, of))
         self.trials.setText(view.trials_line)
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(self.theme.surface))
-        painter.fillRect(0, self.height() - 1, self.width(), 1, QColor(self.theme.border))
-
 
 def _column(*widgets: QWidget) -> QVBoxLayout:
     return vbox(STRETCH, *widgets, STRETCH, spacing=2)
@@ -119,11 +115,12 @@ WAITS = (
 AFTERWARDS = "The session is closed and the force is off. Everything in the journal is safe."
 
 
-class Banner(Themed, QWidget):
+class Banner(QWidget):
     """A tinted strip with a sign, what happened, what to do, and a button where the device can be reconnected."""
 
     def __init__(self) -> None:
         super().__init__()
+        give_ground(self, "bad tint")
         self.what = label("", "strong", "bad", wraps=True)
         self.then = label(WHAT_TO_DO, "label", "text", wraps=True)
         words = vbox(self.what, self.then, spacing=4)
@@ -144,18 +141,11 @@ class Banner(Themed, QWidget):
         self.reconnect.setEnabled(not view.reconnects)
         self.setVisible(bool(view.trouble))
 
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = smooth_painter(self)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(self.theme.bad_bg))
-        strip = QRectF(self.rect()).adjusted(SHADOW, 0, -SHADOW, 0)
-        painter.drawRoundedRect(strip, RADIUS_CARD, RADIUS_CARD)
-
 
 HEIGHT = 52
 
 
-class Strip(Themed, QWidget):
+class Strip(QWidget):
     """State, where the session is, the way to the operator's window and the force stop; it never takes the keyboard.
 
     A session that is ``played`` has no operator's window; its stop ends it.
@@ -163,6 +153,7 @@ class Strip(Themed, QWidget):
 
     def __init__(self, *, played: bool = False) -> None:
         super().__init__()
+        give_ground(self, "bar")
         self.setFixedHeight(HEIGHT)
         self.state = Chip("neutral", "clock", "Preparing")
         self.where = Elided("label", "text2")
@@ -177,11 +168,6 @@ class Strip(Themed, QWidget):
     def show_view(self, view: OperatorView) -> None:
         self.state.show_state(*shown_state(view))
         self.where.show_text(view.heading)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(self.theme.surface))
-        painter.fillRect(0, self.height() - 1, self.width(), 1, QColor(self.theme.border))
 
 
 HEADINGS: tuple[TypeRole, ...] = ("display", "title", "title_dense", "card")

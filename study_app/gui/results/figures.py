@@ -15,11 +15,11 @@ from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QWidget
 
 from study_app.analysis.worker_messages import FigureDrawn, Progress, StudyAt
 from study_app.gui.sessions.session_facts import SessionFacts
-from study_app.gui.theme.theme import FAMILIES, Theme, font
+from study_app.gui.theme.theme import FAMILIES, SHADOW, Theme, font
 from study_app.gui.theme.themed import Coloured, remove_widget
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Bar, Card
+from study_app.gui.widgets.cards import Bar, Card
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted

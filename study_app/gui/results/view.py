@@ -48,10 +48,10 @@ from study_app.gui.results.figures import (
 from study_app.gui.sessions.session_facts import Column, SessionFacts, matching, session_facts, started_words, states_of
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.sessions.sessions_table import SessionsTable
-from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.theme import SHADOW, Theme, font
 from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, SHADOW, Card, Chip, Rule, scrolled
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place

@@ -37,10 +37,10 @@ from study_app.devices.registry import list_devices, title_of
 from study_app.gui.display.screens import Frames, ScreenShown, screens_shown
 from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, choice, number
 from study_app.gui.participant.tank.layers import paint_patch, patch_place
-from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
+from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, SHADOW, font
 from study_app.gui.theme.themed import apply_theme, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
-from study_app.gui.widgets.cards import SHADOW, Card, Rule, scrolled
+from study_app.gui.widgets.cards import Card, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.gui.widgets.main_view import Place

@@ -100,6 +100,7 @@ GRID = 4
 SPACE = (4, 8, 12, 16, 24, 32, 40)
 RADIUS_CONTROL = 8
 RADIUS_CARD = 12
+SHADOW = 3  # of a card, within its rectangle
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +215,12 @@ def stylesheet(theme: Theme) -> str:
                 f"QLabel[role='{role}'] {{ color: {getattr(t, role)}; }}"
                 for role in ("text2", "text3", "ok", "warn", "bad", "accent")
             ),
+            f"QWidget[role='bar'], QWidget[role='rail'] {{ background: {t.surface}; }}",
+            f"QWidget[role='bar'], QWidget[role='header'] {{ border-bottom: 1px solid {t.border}; }}",
+            f"QWidget[role='rail'] {{ border-right: 1px solid {t.border}; }}",
+            f"QWidget[role='rule'] {{ background: {t.border}; }}",
+            *(f"QWidget[role='{it} tint'] {{ background: {getattr(t, it + '_bg')}; }}" for it in ("bad", "warn")),
+            f"QWidget[role$='tint'] {{ border-radius: {RADIUS_CARD}px; margin: 0 {SHADOW}px; }}",
             f"QWidget#earlier QLabel:disabled {{ color: {t.text3}; }}",
             "QListWidget { background: transparent; border: none; outline: none; }",
             f"QFrame[role='entry'] {{ border: 1px solid {t.ctl}; border-radius: {RADIUS_CONTROL}px; }}",

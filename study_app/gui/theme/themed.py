@@ -1,6 +1,6 @@
 """How the theme of a window reaches what the style sheet does not: parts that paint themselves, marks, selections."""
 
-from PySide6.QtCore import QEvent
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QScrollArea, QScrollBar, QWidget
 
@@ -69,6 +69,12 @@ def _palette(theme: Theme) -> QPalette:
     ):
         made.setColor(role, QColor(colour))
     return made
+
+
+def give_ground(part: QWidget, role: str) -> None:
+    """Let the style sheet paint the ground of a part, by its ``role``."""
+    part.setProperty("role", role)
+    part.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
 
 
 def name_bars(whole: QWidget) -> None:

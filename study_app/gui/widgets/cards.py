@@ -7,14 +7,13 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, 
 from PySide6.QtWidgets import QLayout, QScrollArea, QSizePolicy, QWidget
 
 from study_app.gui.theme.icons import draw_icon, draw_logo
-from study_app.gui.theme.theme import RADIUS_CARD, RADIUS_CONTROL, Theme, Tone, font
-from study_app.gui.theme.themed import Themed
+from study_app.gui.theme.theme import RADIUS_CARD, RADIUS_CONTROL, SHADOW, Theme, Tone, font
+from study_app.gui.theme.themed import Themed, give_ground
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
 from study_app.gui.widgets.labels import Ink, label
 
 QWIDGETSIZE_MAX = (1 << 24) - 1
 """Of Qt; PySide does not offer it."""
-SHADOW = 3
 SHADOW_ALPHAS = (5, 5, 4)
 
 
@@ -82,15 +81,13 @@ def paint_ground(part: QWidget, colour: str) -> None:
     fill_rounded(smooth_painter(part), QRectF(part.rect()), RADIUS_CONTROL, colour)
 
 
-class Rule(Themed, QWidget):
+class Rule(QWidget):
     """A hairline between groups; decoration only."""
 
     def __init__(self) -> None:
         super().__init__()
+        give_ground(self, "rule")
         self.setFixedHeight(1)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        QPainter(self).fillRect(self.rect(), QColor(self.theme.border))
 
 
 class Icon(Themed, QWidget):
