@@ -45,8 +45,8 @@ from study_app.designer.document.elements import (
     title_of,
     words_sought,
 )
-from study_app.designer.document.fields import label_of, languages_of, node_at, row_at, rows, singular, tags
-from study_app.designer.document.steps import AddElement, AddInstrument, ChangeLanguage
+from study_app.designer.document.fields import label_of, languages_of, node_at, rows, singular, tags
+from study_app.designer.document.steps import AddElement, AddInstrument
 from study_app.designer.document.study import Study
 from study_app.designer.place.segments import dense
 from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
@@ -63,7 +63,6 @@ from study_app.protocol.checks.cross_references import OWN
 from study_app.protocol.formats import TABLES, is_second
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.source.document import Path, names, value_at
-from study_app.protocol.wording.languages import LANGUAGES
 
 ICONS: Final = {
     "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",
@@ -194,7 +193,7 @@ class Addable:
 
     words: str
     icon: str
-    asks: AddElement | AddInstrument | ChangeLanguage
+    asks: AddElement | AddInstrument
     help: str = ""
 
 
@@ -208,7 +207,7 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
         row.path for row in rows(document, ()) if row.kind == "tables" and (second or row.path[0] not in TABLES)
     ]
     sections.sort(key=lambda path: path[:1] != selected[:1])
-    found = [one for path in lists for one in _of_list(study, path)]
+    found = [_of_list(study, path) for path in lists]
     found += [
         Addable(
             label_of(singular(path[0])),
@@ -220,12 +219,6 @@ def addable(study: Study, selected: Path) -> tuple[Addable, ...]:
     ]
     found += _questions(study, around) if not any(path[0] == QUESTIONNAIRES for path in lists) else ()
     found += _instruments() if second else ()
-    there = languages_of(study.document)
-    found += [
-        Addable(f"Language: {words.english_name}", "info", ChangeLanguage("add", code), "To every text of the study")
-        for code, words in LANGUAGES.items()
-        if code not in there
-    ]
     return tuple(found)
 
 
@@ -238,7 +231,7 @@ def _questions(study: Study, around: Path) -> Iterator[Addable]:
     tables = names(study.document, QUESTIONNAIRES)
     every = [one for one in tables if value_at(study.document, (QUESTIONNAIRES, one, "instrument")) is None]
     for name in (named,) if named in every else every:
-        first = next(_of_list(study, (QUESTIONNAIRES, str(name), "items")))
+        first = _of_list(study, (QUESTIONNAIRES, str(name), "items"))
         title = title_of(study.document, (QUESTIONNAIRES, str(name)))
         yield first if len(every) == 1 else replace(first, words=f"{first.words} of {title}")
 
@@ -256,20 +249,12 @@ def _instruments() -> tuple[Addable, ...]:
     return tuple(found)
 
 
-def _of_list(study: Study, path: Path) -> Iterator[Addable]:
-    """Yield what can be added to a list: where its tables are of several kinds, one of each."""
-    words = label_of(singular(path[-1]))
-    to = f"To {title_of(study.document, path[:2])}"
-    key, kinds = tags(node_at(study.document, (*path, 0)))
-    if not kinds or not is_second(study.document):
-        yield Addable(words, icon_of(path, study.document), AddElement(path), to)
-        return
-    row = row_at(study.document, (*path, 0, key))
-    choices = sorted(() if row is None else row.choices, key=lambda choice: choice.value is not None)
-    for choice in choices:
-        named = words if choice.value is None else f"{words}: {label_of(choice.value).lower()}"
-        asks = AddElement(path, () if choice.value is None else (key, choice.value))
-        yield Addable(named, icon_of(path, study.document), asks, f"{to}. {choice.sentence}")
+def _of_list(study: Study, path: Path) -> Addable:
+    """Return what adds an entry to a list, found by each kind that it can be."""
+    known = tags(node_at(study.document, (*path, 0)))[1] if is_second(study.document) else ()
+    kinds = ", ".join(label_of(kind).lower() for kind in known if kind)
+    to = f"To {title_of(study.document, path[:2])}{kinds and f'; kinds: {kinds}'}"
+    return Addable(label_of(singular(path[-1])), icon_of(path, study.document), AddElement(path), to)
 
 
 WIDTH, HIGHEST, ADD_ROW_PX, HELP_PX = 360, 520, 34, 78

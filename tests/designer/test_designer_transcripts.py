@@ -49,7 +49,7 @@ def by_keys(record: Record) -> None:
 
 
 def adding_and_deleting(record: Record) -> None:
-    record.play("ctrl+1 Insert 'question' Down Return ctrl+z Insert 'Language: Du' Return ctrl+z ctrl+shift+d")
+    record.play("ctrl+1 Insert 'question' Down Return ctrl+z ctrl+shift+d")
     record.play("@conditions.late ctrl+shift+d '50 100 x' Return Escape")
     record.play("@liquids.thin ctrl+1 Delete Escape Delete Return ctrl+z shift+Down ctrl+d Delete")
 

@@ -177,7 +177,7 @@ class Repair:
 def repairs(study: Study, fault: Fault) -> tuple[Repair, ...]:
     """Return the repairs of a fault, by its kind: after each of them it is gone."""
     offered = (*_levels(study, fault), *_stated(study, fault), *_by_kind(study, fault))
-    return (*(repair for repair in offered if removes(study, fault, repair)), *_every_text(study, fault))
+    return tuple(repair for repair in offered if removes(study, fault, repair))
 
 
 def removes(study: Study, fault: Fault, repair: Repair) -> bool:
@@ -230,14 +230,6 @@ def _by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
         first = next(iter(value))
         words = f"Copy {language_name(first)} to {language_name(lacking)}"
         yield Repair(words, (Set((*path, lacking), value[first]),))
-
-
-def _every_text(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield copies of all texts in the first language that another one lacks; they are too many to be tried out."""
-    lacking = fault.missing_language
-    edits = filled_in(study, lacking) if lacking else ()
-    if lacking and len(edits) > 1 and any(edit.path[: len(fault.path)] == fault.path for edit in edits):
-        yield Repair(f"Copy all {len(edits)} to {language_name(lacking)}", edits)
 
 
 def _levels(study: Study, fault: Fault) -> Iterator[Repair]:
@@ -300,23 +292,17 @@ _ROUNDS: Final = 12
 
 
 def added(
-    study: Study,
-    section: Path,
-    kind: Mapping[str, Any] | None = None,
-    *,
-    name: str = "",
-    behind: str | int | None = None,
+    study: Study, section: Path, *, name: str = "", behind: str | int | None = None
 ) -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that add an element to a section or list, as one step, and the path of the element.
 
-    ``kind`` are its initial keys, ``name`` is the preferred name of a table; it is written after the table or entry
-    ``behind``, else at the end.
+    ``name`` is the preferred name of a table; it is written after the table or entry ``behind``, else at the end.
     """
     row = row_at(study.document, section)
     if row is None or row.kind not in {"tables", "list"}:
         raise Refused(f"nothing can be added to {label_of(section[-1])}")
     several = row.kind == "list"
-    value: dict[str, Any] = dict(kind or {})
+    value: dict[str, Any] = {}
     path: Path
     first: Edit
     if several:

@@ -194,19 +194,15 @@ class SwitchKey(Request):
 
 @dataclass(frozen=True, slots=True)
 class AddElement(Request):
-    """Add an element to a section or list of tables, after the selected one of its kind.
-
-    ``kind`` is the key that tells kinds apart with its value; () leaves it out.
-    """
+    """Add an element to a section or list of tables, after the selected one of its kind."""
 
     section: Path
-    kind: tuple[()] | tuple[str, str] = ()
 
     def step(self, at: Situation) -> Step:
         section, selected = self.section, at.selected
         inside = selected[: len(section)] == section and len(selected) > len(section)
         behind = selected[len(section)] if inside else None
-        edits, path = added(at.study, section, dict([self.kind]) if self.kind else None, behind=behind)
+        edits, path = added(at.study, section, behind=behind)
         return Step(f"Add {singular(section[-1])}", _beside(at.study, edits, selected, path), path, fresh="new")
 
 
