@@ -162,6 +162,7 @@ def methods(study: Study, results: Results) -> str:
 def _sentences(study: Study, results: Results) -> Iterator[str]:
     blocks = [found for found in results.blocks if found.n]
     yield _sample(study)
+    yield _apparatus(study)
     yield from level_methods(study.levels, results.levels)
     if blocks:
         yield from _of_statements(study, results, blocks)
@@ -203,6 +204,22 @@ def _sample(study: Study) -> str:
     return (
         f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, "
         f"{version_words(study)}){under}{gone}.{late}"
+    )
+
+
+def _apparatus(study: Study) -> str:
+    """Return what exerted the force, how often, and how large ball and motion were, as receipts have it."""
+    used = study.participants.loc[study.participants["counted"], "device"].dropna()
+    device, scene = study.protocol.get("device"), study.protocol.get("scene")
+    if not (device and scene and len(used)):
+        return ""
+    velocity = {None: "", "device": ", its velocity measured by the device"}.get(
+        study.estimator, f", its velocity estimated by {study.estimator}"
+    )
+    return (
+        f"Apparatus: {listed(sorted(set(map(str, used))))}, forces computed at {device['rate_hz']:g} Hz and limited to "
+        f"{device['force_limit_n']:g} N, a ball of {1000 * scene['body']['diameter_m']:g} mm that moves "
+        f"{scene['scale']:g} times as far as the hand{velocity}."
     )
 
 
