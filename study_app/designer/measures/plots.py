@@ -1,6 +1,7 @@
 """The plots of a block with a method: psychometric function, expected track, force of each level."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,9 @@ MOST_LABELS = 9
 
 
 class MeasurePlot(Plot):
-    """A plot that is drawn anew from its value."""
+    """A plot that is drawn anew from its value; ``sentence`` says what observers answered."""
+
+    sentence: Callable[[LevelWords, Observed], str]
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -52,6 +55,13 @@ class MeasurePlot(Plot):
             self.shown, self.grey = shown, grey
             self.setAccessibleDescription(sentence)
             self._draw()
+
+    def show_observed(self, of: LevelBlock, found: Observed | None, *, grey: bool) -> None:
+        """Show what observers answered; None before the first answer."""
+        if found is None or not found.course:
+            self.show_plot("Not known yet.")
+        else:
+            self.show_plot(self.sentence(of.words, found), of.words, found, of.clipped_from, grey=grey)
 
     def _draw(self) -> None:
         for item in self.drawn:
@@ -112,14 +122,8 @@ class FunctionView(MeasurePlot):
 
     def __init__(self) -> None:
         super().__init__("Psychometric function")
+        self.sentence = function_sentence
         self.apply_theme(LIGHT)
-
-    def show_observed(self, of: LevelBlock, found: Observed | None, *, grey: bool) -> None:
-        """Show what observers answered; None before the first answer."""
-        if found is None:
-            self.show_plot("Not known yet.")
-        else:
-            self.show_plot(function_sentence(of.words, found), of.words, found, of.clipped_from, grey=grey)
 
     def draw(self, words: LevelWords, found: Observed, clipped_from: tuple[float, Limit] | None) -> None:
         """Draw bands, function, mark and bars; places along x are in the coordinate of the levels, y in percent."""
@@ -178,14 +182,8 @@ class TrackView(MeasurePlot):
 
     def __init__(self) -> None:
         super().__init__("Expected track")
+        self.sentence = track_sentence
         self.apply_theme(LIGHT)
-
-    def show_observed(self, of: LevelBlock, found: Observed | None, *, grey: bool) -> None:
-        """Show what observers answered; None before the first answer."""
-        if found is None or not found.course:
-            self.show_plot("Not known yet.")
-        else:
-            self.show_plot(track_sentence(of.words, found), of.words, found, of.clipped_from, grey=grey)
 
     def draw(self, words: LevelWords, found: Observed, clipped_from: tuple[float, Limit] | None) -> None:
         """Draw bands, median, planted threshold and trials; places along y are in the coordinate of the levels."""

@@ -1,6 +1,6 @@
 """What is known of a study, even of a faulty one: its texts by language, its valid part, and facts of that."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
@@ -81,7 +81,7 @@ def revealing(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
     words = Telltales(_words(protocol))
     debriefs = {name for name, page in protocol.pages.items() if page.kind == "debrief"}
     found = []
-    for path, value in _texts(study.document):
+    for path, value in texts_of(study):
         if path[0] not in READ or (path[0] == "pages" and path[1] in debriefs):
             continue
         texts = value.values() if isinstance(value, Mapping) else (value,)
@@ -106,21 +106,6 @@ def _words(protocol: Protocol) -> set[str]:
             if condition.delay_ms:
                 found.add(f"{condition.delay_ms:g} ms")
     return found
-
-
-def _texts(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
-    """Yield every text of the study that is in its languages, with its place."""
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            place = (*path, key)
-            texts = inner.values() if isinstance(inner, Mapping) else (inner,)
-            if key in text_keys() and len(path) > 0 and all(isinstance(one, str) for one in texts):
-                yield place, inner
-            else:
-                yield from _texts(inner, place)
-    elif isinstance(value, tuple):
-        for at, inner in enumerate(value):
-            yield from _texts(inner, (*path, at))
 
 
 @cache

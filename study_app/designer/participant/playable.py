@@ -215,13 +215,16 @@ def showing(study: Protocol, path: Path) -> Found | None:
 def same_step(study: Protocol, name: str, trial: int, session: str) -> Found | None:
     """Return the step of a name, of a block the trial of that index or its last; None where it is no longer there."""
     for called, shown in previews(study):
-        if called != session:
-            continue
-        named = [(at, step) for at, step in enumerate(shown.schedule.steps) if step_name(step) == name]
-        exact = [at for at, step in named if isinstance(step, Trial) and step.index == trial]
-        if named:
-            return Found(shown, (exact or [named[-1][0] if trial > 1 else named[0][0]])[0], session)
+        if called == session and (at := step_of(shown, name, trial)) is not None:
+            return Found(shown, at, session)
     return None
+
+
+def step_of(shown: Preview, name: str, trial: int) -> int | None:
+    """Return the index of the step of a name, of a block the trial of that index or its last; None without one."""
+    named = [(at, step) for at, step in enumerate(shown.schedule.steps) if step_name(step) == name]
+    exact = (one for one in named if isinstance(one[1], Trial) and one[1].index == trial)
+    return next((at for at, _ in (*exact, *(named[::-1] if trial > 1 else named))), None)
 
 
 def side_of(path: Path) -> Side | None:
@@ -281,7 +284,9 @@ def playable(study: Study, path: Path, position: StepPosition | None = None) -> 
         own = tuple(one for problem in found.problems if (one := known.get((problem.place, problem.message))))
         raise NotPlayableError(own or found.problems)
     shown = preview(found.protocol, position.seed)
-    step = _step_at(shown, position) if position.name else first_step(shown, path) or 0
+    step = first_step(shown, path) or 0
+    if position.name:
+        step = step_of(shown, position.name, position.trial) or 0
     return Playable(
         with_liquid_files(found.text.encode(), found.folder),
         found.folder,
@@ -301,14 +306,6 @@ def _filled_texts(study: Study, language: str) -> Iterator[Edit]:
             yield Set((*fault.path, lacking), text.get(language) or next(iter(text.values())))
         elif fault.kind == "one language" and isinstance(text, str):
             yield Set(fault.path, dict.fromkeys(languages_of(study.document), text))
-
-
-def _step_at(shown: Preview, position: StepPosition) -> int:
-    """Return the index of the step at a position; the nearest trial of its block, or the first step."""
-    steps = list(enumerate(shown.schedule.steps))
-    named = [at for at, step in steps if step_name(step) == position.name]
-    exact = [at for at in named if isinstance(step := steps[at][1], Trial) and step.index == position.trial]
-    return next(iter([*exact, *named]), 0)
 
 
 OF_THE_STUDY: Final = frozenset({"scene", "velocity", "knee", "body"})
