@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.devices.bench import procedure
+from study_app.devices.bench import measurements, procedure
 from study_app.devices.bench.procedure import as_json, as_markdown, kept
 from study_app.devices.driver import dynamics_of
 from study_app.devices.registry import descriptor_of, open_device
@@ -232,7 +232,7 @@ def test_force_of_an_excitation_never_exceeds_its_limit():
 
 
 def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
-    from study_app.devices.bench import procedure
+    from study_app.devices.bench import measurements, procedure
 
     def never_lets_go(device, _tell):
         device.hold(0.0, 0.0, 0.0)
@@ -248,6 +248,25 @@ def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
     assert "the handle was touched" in (tmp_path / "report" / "bench.md").read_text()
     assert "Nothing was kept" in done.output
     assert workstation.load().benches == ()
+
+
+def test_refused_position_does_not_enter_the_noise():
+    from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
+
+    samples = records(SAMPLE, 1000)
+    samples.fresh, samples.time_ns = 1, 1_000_000 * np.arange(1000)
+    samples.position_m = 1e-6 * np.random.default_rng(1).standard_normal((1000, 3))
+    samples[500].position_m = np.nan
+    samples[500].limiters = LIMITER_GLITCH
+    assert measurements.noise(samples).position_um == pytest.approx([1.0] * 3, rel=0.1)
+
+
+def test_gain_is_the_slope_of_readings_over_forces():
+    sent_n = (0.0, 1.0, 2.0, 3.0)
+    shown_g = [1e3 * (0.1 + 0.8 * it) / measurements.GRAVITY_MPS2 for it in sent_n]
+    found = measurements.gain_of(sent_n, shown_g)
+    assert (found.gain, found.offset_n, found.readings) == (pytest.approx(0.8), pytest.approx(0.1), 4)
+    assert found.residual_n < 1e-12
 
 
 def liquid_study(*words):

@@ -32,7 +32,6 @@ WELL = Measurements(
 """What the pre-flight finds on a computer on which everything is well."""
 
 TABLES: dict[str, Any] = tomllib.loads(text_of("session"))
-SCALE = TABLES["scales"]["plain"]["labels"]["en"]
 RESPONSES = 2 * 3 + 2 * 1
 
 
