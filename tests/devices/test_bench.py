@@ -232,7 +232,7 @@ def test_force_of_an_excitation_never_exceeds_its_limit():
 
 
 def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
-    from study_app.devices.bench import measurements, procedure
+    from study_app.devices.bench import procedure
 
     def never_lets_go(device, _tell):
         device.hold(0.0, 0.0, 0.0)

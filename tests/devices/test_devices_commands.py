@@ -106,7 +106,6 @@ class TestTheTerminal:
         with pytest.raises(click.Abort):
             self.until(answered)
 
-
     def test_at_the_bench_enter_alone_answers_only_the_question_to_let_go(self):
         asked = SimpleNamespace(ask=lambda kind, _words: kind)
         assert [_ask_operator(asked)(kind, "") for kind in ("let-go", "hang")] == ["let-go", "reading"]

@@ -8,11 +8,17 @@ from study_app.cli import commands
 from study_app.evidence.cfd import fits, law_fit, stored_flows
 from study_app.evidence.cfd.stored_flows import MOTION, Table
 from study_app.evidence.reference_model import CONSTANTS, Constants, unsteady_n
+from study_app.haptics.kernels.effects import unsteady_drag
 from study_app.haptics.model.scene import Liquid, Scene
 from tests.haptics.scenes import COMPILED
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")]
 PLANTED = Constants(c_m=0.5, c_y=1.4, c_z=5.0, c_s=1.5, beta=2.0, r_0=8.0)
+
+
+def test_the_programs_constants_are_those_of_the_letter():
+    names = ("MEMORY_LOSS", "EXCESS_GAIN", "WAKE_GAIN", "FAR_WAKE_GAIN", "OVERTAKING", "OVERTAKING_REYNOLDS")
+    assert tuple(getattr(unsteady_drag, name) for name in names) == tuple(CONSTANTS)
 
 
 @pytest.mark.nightly

@@ -8,6 +8,7 @@ from study_app.evidence.reference_model import unsteady_n
 from study_app.evidence.reference_solutions import oscillation, start
 from study_app.evidence.stability.stability_cases import parse
 from study_app.evidence.stability.verdict import judge
+from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS_RPS
 from study_app.haptics.model.estimators import Kalman
 from study_app.haptics.model.laws import finite_reynolds
 from study_app.haptics.model.motion import Motion
@@ -19,6 +20,12 @@ from tests.haptics.scenes import COMPILED, UNBENT, Hand, liquid, moving, scene, 
 from tests.haptics.unsteady import ADDED_M3, FLUIDS, force, highest_gain, random_motion, tank
 
 compiled = pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")
+
+
+def test_the_exponentials_are_the_kernel_within_1_5_percent_from_1_ms_to_30_s():
+    t_s = np.geomspace(1e-3, 30, 4000)
+    kernel = (np.array(WEIGHTS_RPS) * np.exp(-np.outer(t_s, RATES_PER_S))).sum(axis=1)
+    assert abs(kernel * np.sqrt(t_s) - 1).max() < 0.0155
 
 
 def test_steady_drag_is_stokes_at_rest_and_that_of_the_solver_to_re_200():
