@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from datetime import date
 from functools import partial
 from pathlib import Path
@@ -15,25 +15,16 @@ from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, ended_from_outside, guard_painting
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.session.timing import collecting_here
-from study_app.devices.descriptor import Backend
-from study_app.devices.registry import backends, descriptor_of
+from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError, StoreError
 from study_app.gui.application import application_here
-from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog, diagnosis
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.display.screens import place
 from study_app.gui.home.dialogs import WorkspaceDialog
 from study_app.gui.home.main_window import MainWindow, bug_words
 from study_app.gui.home.study_facts import DraftWords
 from study_app.gui.home.view import HomePlace
-from study_app.gui.kit.devices import (
-    DeviceShown,
-    device_named,
-    devices_shown,
-    screen_number,
-    settings_here,
-    theme_named,
-)
+from study_app.gui.kit.devices import device_named, screen_number, settings_here, theme_named
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.widgets.background import Background, wait_for_jobs
 from study_app.gui.widgets.main_view import Place
@@ -131,101 +122,6 @@ class WorkstationController(QObject):
             )
 
 
-PATIENCE_S = 5.0
-
-
-class DevicesController(QObject):
-    """Looks at the machine when it is asked, one look at a time, and shows what was found.
-
-    ``looked`` comes with what was found of every device; ``troubled(title, sentence)`` where one could not look.
-    """
-
-    looked = Signal(object)
-    troubled = Signal(str, str)
-
-    def __init__(self, workstation: WorkstationController, look: Callable[[], Sequence[Backend]] = backends) -> None:
-        super().__init__()
-        self._workstation, self.backends = workstation, look
-        self.looking = Background(self)
-        self.looking.done.connect(self._show_found)
-        self.looking.failed.connect(self._show_unexamined)
-        self._ended = False
-        self.shown: tuple[DeviceShown, ...] = ()
-        self.place: DevicesPlace | None = None
-        self.dialog: DiagnosisDialog | None = None
-        workstation.changed.connect(self._show)
-
-    @property
-    def preferred(self) -> DeviceShown:
-        return device_named(self._workstation.settings.device, self.shown)
-
-    def make_place(self) -> DevicesPlace:
-        place = self.place = DevicesPlace()
-        place.asked.connect(self._asked)
-        self._show()
-        return place
-
-    def _asked(self, what: str, detail: Any) -> None:
-        match what:
-            case "look":
-                self.look()
-            case "choose":
-                self._workstation.change({"device": detail})
-            case "option":
-                self._workstation.change(detail)
-            case "diagnose":
-                self.diagnose(detail)
-            case "leave":
-                self.end_diagnosis()
-
-    def look(self) -> None:
-        if self.looking.busy or self._ended:
-            return
-        if self.place is not None:
-            self.place.show_looking(True)
-        self.looking.run(lambda: devices_shown(self.backends()))
-
-    def end(self, patience_s: float = PATIENCE_S) -> None:
-        """Look no more, wait for a look that is under way, and show nothing of it: the windows go."""
-        self._ended = True
-        self.looking.wait(min(patience_s, PATIENCE_S))
-
-    def diagnose(self, name: str, window: MainWindow | None = None) -> None:
-        """Open the diagnosis of a device over a window, by default the place's; the preferred serial number counts."""
-        settings = self._workstation.settings
-        asked = settings.device if settings.device.partition(":")[0] == name else name
-        over = window or self.place
-        assert over is not None  # noqa: S101 - the place has just asked
-        self.end_diagnosis()
-        self.dialog = diagnosis(over.window(), over.theme, asked, settings)
-        self.dialog.finished.connect(self._forget_dialog)
-        self.dialog.show()
-
-    def end_diagnosis(self) -> None:
-        if self.dialog is not None:
-            self.dialog.reject()
-
-    def _forget_dialog(self) -> None:
-        self.dialog = None
-
-    def _show_found(self, found: tuple[DeviceShown, ...]) -> None:
-        if not self._ended:
-            self.shown = found
-            self._show()
-            self.looked.emit(found)
-
-    def _show_unexamined(self, error: Exception) -> None:
-        if not self._ended:
-            self._show()
-            self.troubled.emit("This machine could not be examined", f"{error}.")
-
-    def _show(self) -> None:
-        if self.place is not None:
-            self.place.show_looking(self.looking.busy)
-            self.place.show_devices(self.shown, self._workstation.settings.device)
-            self.place.show_options(self._workstation.settings.device_options)
-
-
 def load_modules() -> None:
     """Load the modules of lab and designer, the compiler, and what the first page is computed from."""
     import study_app.app.lab_controller  # noqa: PLC0415
@@ -287,8 +183,6 @@ class MainController(QObject):
     def __init__(self, results: Path | None = None) -> None:
         super().__init__()
         self.machine = WorkstationController()
-        self.devices = DevicesController(self.machine)
-        self._home_place: HomePlace | None = None
         self._follows_machine = results is None
         self.results = results if results is not None else workspace().results
         self.question: WorkspaceDialog | None = None
@@ -298,7 +192,7 @@ class MainController(QObject):
             "designer": self._designer,
             "results": self._results,
             "lab": self._lab,
-            "devices": self.devices.make_place,
+            "devices": self._devices,
             "machine": self._machine,
             "help": self._help,
         }
@@ -306,6 +200,7 @@ class MainController(QObject):
             {name: _with_guarded_painting(make) for name, make in makers.items()},
             theme=theme_named(self.machine.settings.theme),
         )
+        self.window.place("devices")  # before it is visited, home shows what it found
         self.loop = QEventLoop()
         self.code = 0
         self.live: LiveSession | None = None
@@ -320,10 +215,9 @@ class MainController(QObject):
         self.window.closed.connect(lambda: self.loop.quit() if self.live is None else None)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
-        self.devices.looked.connect(lambda _shown: self._show_machine())
         QShortcut(QKeySequence(QKeySequence.StandardKey.HelpContents), self.window, self.show_help)
-        for controller in (self.machine, self.devices):
-            controller.troubled.connect(self.window.show_message)
+        self.machine.troubled.connect(self.window.show_message)
+        self.devices.troubled.connect(self.window.show_message)
         self._opened = QTimer(self, singleShot=True, interval=LOOK_AFTER_MS)
         self._opened.timeout.connect(self.devices.look)
         self._opened.timeout.connect(self.preload)
@@ -392,7 +286,7 @@ class MainController(QObject):
         if what in {"enter", "device", "fade in"}:
             self.devices.end_diagnosis()  # it would hold the device
         elif what == "diagnose" and self.lab is not None:
-            self.devices.diagnose(self.lab.device, self.window)
+            self.devices.diagnose(self.lab.device)
 
     def _put_back(self, side: Side, setting: Setting) -> None:
         if self.designer is not None:
@@ -406,7 +300,7 @@ class MainController(QObject):
         self.designer = DesignerController(self.results)
         self.playing = Playing(self.designer)
         for saved in (self.designer.saving.saved, self.playing.kept):
-            saved.connect(self._show_saved)
+            saved.connect(self._home_place.show_studies)
         self.designer.feeling.asked.connect(self._feel)
         self.designer.place.form.foot.glossary.clicked.connect(lambda: self.show_help("glossary"))
         self.designer.place.keys_asked.connect(lambda: self.show_help("designer-keys"))
@@ -452,26 +346,33 @@ class MainController(QObject):
         made.edit_asked.connect(self.open_designer)
         made.new_asked.connect(self.begin_study)
         made.device.display.clicked.connect(self._test_display)
-        made.show_machine(self.machine.settings, self.devices.preferred)
         self._home_place = made
         return made
 
+    def _devices(self) -> DevicesPlace:
+        self.devices = DevicesPlace(self.machine.settings)
+        self.devices.changed.connect(self.machine.change)
+        self.devices.looked.connect(self._show_machine)
+        self._show_machine()
+        return self.devices
+
     def _show_machine(self) -> None:
         """Show the settings and the state of the preferred device on the home page."""
-        if self._home_place is not None:
-            self._home_place.show_machine(self.machine.settings, self.devices.preferred)
+        settings = self.machine.settings
+        self._home_place.show_machine(settings, device_named(settings.device, self.devices.shown))
 
     def _machine_changed(self, settings: MachineSettings) -> None:
         """Follow what is set for this machine, as far as nothing else was asked for by command."""
         self.window.show_theme(theme_named(settings.theme))
         here = workspace()
-        if self._follows_machine and here.results != self.results and self._home_place is not None:
+        if self._follows_machine and here.results != self.results:
             self.results = here.results
             self._home_place.show_results(self.results)
             if self.results_place is not None:
                 self.results_place.show_results(self.results)
             if self.designer is not None:
                 self.designer.editing.results = self.results
+        self.devices.show_settings(settings)
         self._show_machine()
 
     def _test_display(self) -> None:
@@ -507,10 +408,6 @@ class MainController(QObject):
             self.help.open_page(page)
         self.window.go("help")
 
-    def _show_saved(self) -> None:
-        if self._home_place is not None:
-            self._home_place.show_studies()
-
     def end(self) -> None:
         """Let go of what the places hold, and wait for what is under way in other threads: a device may be opening.
 
@@ -518,8 +415,7 @@ class MainController(QObject):
         """
         patience = Patience(BY_SIGNAL_S if self.code else OPENING_PATIENCE_S)
         self._opened.stop()  # what it begins would outlive Python
-        if self._home_place is not None:
-            self._home_place.end()
+        self._home_place.end()
         for part in (self.playing, self.lab):
             if part is not None:
                 part.end(patience)
@@ -566,7 +462,7 @@ class MainController(QObject):
                 "The session did not start",
                 f"{live.error}.",
                 partial(self._start, live.chosen),
-                partial(self.devices.diagnose, name, self.window) if examined else None,
+                partial(self.devices.diagnose, name) if examined else None,
             )
         elif live.error is not None:
             title = "The session did not finish" if live.began else "The session did not start"

@@ -113,7 +113,7 @@ def test_a_device_that_cannot_be_opened_is_tried_again_or_examined(
         raise DeviceNotFound("no Falcon is connected: plug it in")
 
     monkeypatch.setattr(live_session, "open_rig", missing)
-    monkeypatch.setattr(visit.devices, "diagnose", lambda name, _window: examined.append(name))
+    monkeypatch.setattr(visit.devices, "diagnose", examined.append)
     visit.window.place("home").session_asked.emit(replace(CHOSEN, device="falcon"))
     for count, words in ((1, "Try again"), (2, "Diagnose …")):
         qtbot.waitUntil(lambda count=count: len(tried) == count and visit.live is None)
@@ -131,10 +131,10 @@ def test_what_opens_a_device_ends_a_diagnosis_that_is_under_way(
     visit: MainController, monkeypatch: Any, asked: str
 ) -> None:
     monkeypatch.setattr(main_controller, "LiveSession", Held)
-    monkeypatch.setattr(main_controller, "diagnosis", lambda window, *_device: QDialog(window))
+    monkeypatch.setattr("study_app.gui.devices.view.diagnosis", lambda window, *_device: QDialog(window))
     monkeypatch.setattr("study_app.app.lab_controller.LabController._open", lambda *_device: None)
     visit.window.place("lab")
-    visit.devices.diagnose("falcon", visit.window)
+    visit.devices.diagnose("falcon")
     dialog = visit.devices.dialog
     assert dialog is not None
     assert dialog.isVisible()

@@ -11,10 +11,12 @@ from PySide6.QtWidgets import QApplication, QDialog, QLabel
 
 from study_app.analysis import worker_messages as of
 from study_app.app import main_controller
-from study_app.app.main_controller import DevicesController, MainController, WorkstationController
+from study_app.app.main_controller import MainController, WorkstationController
 from study_app.app.session.live_session import BUG
 from study_app.devices.descriptor import NONE, READY, Backend
 from study_app.errors import DeviceNotFound
+from study_app.gui.devices.view import DevicesPlace
+from study_app.gui.kit.devices import device_named
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.theme.theme import DARK
 from study_app.session.start import NewSession
@@ -191,30 +193,32 @@ def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pyt
         def connect(self, _slot: Any) -> None: ...
 
     monkeypatch.setattr("study_app.gui.devices.diagnosis_dialog.DiagnosisDialog", Dialog)
-    devices = DevicesController(machine, look)
-    devices.looked.connect(lambda shown: heard.append(f"looked {len(shown)}"))
-    devices.troubled.connect(lambda *words: heard.append(f"troubled {words}"))
-    lines = [*value_lines(devices.preferred, "preferred")]
-    place = devices.make_place()
+    place = DevicesPlace(machine.settings, look)
     qtbot.addWidget(place)
+    machine.changed.connect(place.show_settings)
+    place.changed.connect(machine.change)
+    place.looked.connect(lambda: heard.append(f"looked {len(place.shown)}"))
+    place.troubled.connect(lambda *words: heard.append(f"troubled {words}"))
+    lines = [*value_lines(device_named(machine.settings.device, place.shown), "preferred")]
     steps: list[tuple[str, Any]] = [
-        ("look", None), ("choose", "falcon"), ("look", None), ("option", {"firmware": "/f.bin"}),
-        ("choose", "falcon:FT1"), ("diagnose", "falcon"), ("diagnose", "mouse"), ("leave", None),
-        ("look", None), ("look", None),
+        ("enter", None), ("change", {"device": "falcon"}), ("look", None), ("change", {"firmware": "/f.bin"}),
+        ("change", {"device": "falcon:FT1"}), ("diagnose", "falcon"), ("diagnose", "mouse"), ("leave", None),
+        ("look", None), ("end", None), ("look", None),
     ]  # fmt: skip
-    for number, (name, given) in enumerate(steps):
+    for name, given in steps:
         heard.clear()
-        if number == len(steps) - 1:
-            devices.end()
-        place.asked.emit(name, given)
-        if devices.looking.busy:
+        if name == "change":
+            place.changed.emit(given)
+        else:
+            getattr(place, name)(*([] if given is None else [given]))
+        if place.looking.busy:
             heard.append(f"looking {place.refresh.isEnabled()}")
-            devices.looking.wait()
+            place.looking.wait()
             QApplication.processEvents()
         lines += [f"== {name} {given}", *heard, f"refresh: {place.refresh.isEnabled()}"]
         lines += [
-            *value_lines(devices.preferred, "preferred"),
-            *value_lines([one.word for one in devices.shown], "shown"),
+            *value_lines(device_named(machine.settings.device, place.shown), "preferred"),
+            *value_lines([one.word for one in place.shown], "shown"),
         ]
     compare(GOLDEN / "devices.txt", lines, pytestconfig)
 
@@ -270,7 +274,8 @@ STAY: dict[str, Any] = {
     "protocol": home("protocol_opened", Path("/studies/mine.toml")), "results": home("results_asked", STUDY),
     "machine": go("machine"), "help": lambda visit: visit.show_help(), "help again": lambda visit: visit.show_help(),
     "devices": go("devices"), "workspace": lambda visit: visit.machine.change({"workspace": "/elsewhere"}),
-    "device": lambda visit: visit.machine.change({"device": "scripted"}), "saved": lambda visit: visit._show_saved(),
+    "device": lambda visit: visit.machine.change({"device": "scripted"}),
+    "saved": lambda visit: visit._home_place.show_studies(),
     "trouble": lambda visit: visit.machine.troubled.emit("a", "b"), "begin last": home("session_asked", CHOSEN),
     "signal": lambda visit: visit.end_by_signal(15), "over": ends(), "end": lambda visit: visit.end(),
 }  # fmt: skip
@@ -279,7 +284,7 @@ STAY: dict[str, Any] = {
 def test_the_stay(visit: MainController, monkeypatch: Any, pytestconfig: pytest.Config) -> None:
     monkeypatch.setattr(main_controller, "LiveSession", Live)
     monkeypatch.setattr(ResultsPlace, "look", lambda self: Live.done.append(f"look at {self.view.chosen}"))
-    monkeypatch.setattr(DevicesController, "look", lambda _self: Live.done.append("look for devices"))
+    monkeypatch.setattr(DevicesPlace, "look", lambda _self: Live.done.append("look for devices"))
     lines: list[str] = []
     visit.window.closed.connect(lambda: Live.done.append("closed"))
     for name, step in STAY.items():

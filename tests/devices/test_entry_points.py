@@ -10,6 +10,7 @@ from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.home.dialogs import NewSessionDialog
 from study_app.gui.home.study_facts import study_facts
 from study_app.gui.kit.devices import devices_shown
+from study_app.store.workstation import MachineSettings
 from tests.plug_in_packages import install
 
 pytestmark = pytest.mark.slow
@@ -80,9 +81,9 @@ class TestDeviceOfAnotherPackage:
         assert "toy-hand" in list_devices()
         listed = liquid_study("devices")
         assert "toy-hand            ready  (a string; simulated, 2 degrees of freedom)" in listed.output
-        place = DevicesPlace()
+        place = DevicesPlace(MachineSettings(device="toy-hand"))
         qtbot.addWidget(place)
-        place.show_devices(devices_shown(backends()), "toy-hand")
+        place.show_devices(devices_shown(backends()))
         row = place.rows["toy-hand"]
         assert row.title.text() == "Toy hand"
         assert row.title.isChecked()
@@ -135,7 +136,7 @@ def test_a_broken_entry_point_is_one_row_and_every_other_device_stays(site, qtbo
     assert "uninstall the package toy_broken" in " ".join(listed.output.split())
     place = DevicesPlace()
     qtbot.addWidget(place)
-    place.show_devices(devices_shown(backends()), "mouse")
+    place.show_devices(devices_shown(backends()))
     row = place.rows["toy (toy_broken)"]
     assert row.chip.word == "Not available"
     assert reason in row.why.text()

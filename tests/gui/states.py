@@ -99,7 +99,11 @@ DIAGNOSIS: Actions = {
 
 
 def of_devices(*found: Backend, preferred: str = "falcon") -> Callable[[Any], None]:
-    return lambda place: place.show_devices(devices_shown([*FOUND, *found]), preferred)
+    def act(place: Any) -> None:
+        place.show_settings(MachineSettings(device=preferred))
+        place.show_devices(devices_shown([*FOUND, *found]))
+
+    return act
 
 
 DEVICES: Actions = {
@@ -107,7 +111,10 @@ DEVICES: Actions = {
     "to be checked": of_devices(Backend("falcon", "other", "connected: FT1", "felt, up to 8 N", "home it")),
     "another preferred": of_devices(preferred="falcon-emulated"),
     "looking": lambda place: place.show_looking(True),
-    "firmware": lambda place: (place.show_looking(False), place.show_options({"firmware": Path("/there/f.bin")})),
+    "firmware": lambda place: (
+        place.show_looking(False),
+        place.show_settings(MachineSettings.model_validate({"device": "falcon-emulated", "firmware": "/there/f.bin"})),
+    ),
     "pressed": in_turn(
         clicked("rows.falcon.title", "rows.falcon.diagnose", "refresh"),
         typed("options.firmware.editor.control", " "),

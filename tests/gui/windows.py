@@ -81,8 +81,10 @@ def shown(qtbot: Any, made: Any, size: tuple[int, int], theme: Any = LIGHT) -> A
 
 
 def devices(qtbot: Any) -> DevicesPlace:
-    made: DevicesPlace = shown(qtbot, DevicesPlace(), (1200, 700), DARK)
-    made.show_devices(devices_shown(FOUND), "mouse")
+    place: Any = DevicesPlace(DEFAULTS, lambda: FOUND)
+    place.diagnose = lambda name: place.message.emit("diagnose", name)
+    made: DevicesPlace = shown(qtbot, place, (1200, 700), DARK)
+    made.show_devices(devices_shown(FOUND))
     return made
 
 

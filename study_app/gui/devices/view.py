@@ -1,33 +1,33 @@
-"""The devices' place: every device, which one sessions begin with, and what is wrong with one.
+"""The devices' place: every device, which one sessions begin with, and what is wrong with one; it opens none."""
 
-It draws values and says what is asked for; it opens no device.
-"""
-
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QLabel, QWidget
 
-from study_app.devices.descriptor import DeviceOption
-from study_app.gui.kit.devices import DeviceShown, remembered_options
+from study_app.devices.descriptor import Backend, DeviceOption
+from study_app.devices.registry import backends
+from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog, diagnosis
+from study_app.gui.kit.devices import DeviceShown, devices_shown, remembered_options
 from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, file_of
 from study_app.gui.theme.theme import SHADOW, font
+from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Chip, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton, Radio
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.main_view import Place
+from study_app.store.workstation import DEFAULTS, MachineSettings
 
 INSET = 30  # behind a radio's mark
 
 
 class DeviceRow(QWidget):
-    """One device; ``ask`` is given what is asked for of it."""
+    """One device; ``diagnose`` is called with its name."""
 
-    def __init__(self, shown: DeviceShown, ask: Callable[..., object]) -> None:
+    def __init__(self, shown: DeviceShown, diagnose: Callable[[str], object]) -> None:
         super().__init__()
         self.name = shown.name
         self.title: Radio | QLabel = Radio(shown.title) if shown.choosable else label(shown.title, "strong")
@@ -39,7 +39,7 @@ class DeviceRow(QWidget):
         self.diagnose = ActionButton("pulse", "Diagnose …", height=36)
         self.diagnose.setAccessibleName(f"Diagnose {shown.title}")
         self.diagnose.setVisible(shown.diagnosable)
-        self.diagnose.clicked.connect(lambda: ask("diagnose", self.name))
+        self.diagnose.clicked.connect(lambda: diagnose(self.name))
         inset = () if shown.choosable else (INSET,)
         head = hbox(*inset, self.title, STRETCH, self.chip, spacing=10)
         words = vbox(self.can, self.why, self.by, STRETCH, spacing=4)
@@ -67,6 +67,7 @@ def _words(ink: str, *, small: bool = False) -> QLabel:
 STACKED_BELOW = 1000
 COLUMN_PX = 340
 NONE = "No file chosen"
+PATIENCE_S = 5.0
 
 
 class OptionCard(Card):
@@ -99,26 +100,36 @@ class HelpCard(Card):
 
 
 class DevicesPlace(Place):
-    """Every device with its state.
+    """Every device with its state; it looks at the machine when it is asked, one look at a time.
 
-    ``asked(what, detail)``: to "look" at the machine again, to "choose" a device by its name, to "diagnose" one; of
-    an "option" its name and a path or None; "leave" where the place is left.
+    ``looked`` comes after that, ``changed`` with a setting and what it is to be, ``troubled`` with a title and a
+    sentence where one could not look.
     """
 
-    asked = Signal(str, object)
+    looked = Signal()
+    changed = Signal(dict)
+    troubled = Signal(str, str)
 
-    def __init__(self) -> None:
+    def __init__(self, settings: MachineSettings = DEFAULTS, look: Callable[[], Sequence[Backend]] = backends) -> None:
         super().__init__()
+        self._settings, self.backends = settings, look
+        self.looking = Background(self)
+        self.looking.done.connect(self._show_found)
+        self.looking.failed.connect(self._show_unexamined)
+        self._ended = False
+        self.shown: tuple[DeviceShown, ...] = ()
+        self.dialog: DiagnosisDialog | None = None
         self._group = QButtonGroup(self)
         self.lists = {False: Card("Input devices", gap=6), True: Card("Simulated devices", gap=6)}
         self.rows: dict[str, DeviceRow] = {}
         self.options = {option.name: OptionCard(option) for option in remembered_options()}
         self.help = HelpCard()
         self.refresh = ActionButton("repeat", "Refresh", key="F5")
-        self.refresh.clicked.connect(lambda: self.asked.emit("look", None))
+        self.refresh.clicked.connect(self.look)
         for card in self.options.values():
-            card.editor.changed.connect(lambda name, path: self.asked.emit("option", {name: path}))
+            card.editor.changed.connect(lambda name, path: self.changed.emit({name: path}))
         self._lay_out()
+        self.show_settings(settings)
 
     def _lay_out(self) -> None:
         about = label("New sessions use the selected device.", "body", "text2", wraps=True)
@@ -136,14 +147,52 @@ class DevicesPlace(Place):
 
     def enter(self) -> None:
         """Look at the machine again: something may have been plugged in."""
-        self.asked.emit("look", None)
+        self.look()
 
     def leave(self) -> None:
-        """Tell that the place is left, so that a running examination releases its device."""
-        self.asked.emit("leave", None)
+        """End an examination that is under way, so that it releases its device."""
+        self.end_diagnosis()
 
-    def show_devices(self, shown: tuple[DeviceShown, ...], preferred: str) -> None:
+    def look(self) -> None:
+        if not self.looking.busy and not self._ended:
+            self.show_looking(True)
+            self.looking.run(lambda: devices_shown(self.backends()))
+
+    def end(self, patience_s: float = PATIENCE_S) -> None:
+        """Look no more, wait for a look that is under way, and show nothing of it: the windows go."""
+        self._ended = True
+        self.looking.wait(min(patience_s, PATIENCE_S))
+
+    def diagnose(self, name: str) -> None:
+        """Open the diagnosis of a device over the window; the preferred serial number counts."""
+        preferred = self._settings.device
+        asked = preferred if preferred.partition(":")[0] == name else name
+        self.end_diagnosis()
+        self.dialog = diagnosis(self.window(), self.theme, asked, self._settings)
+        self.dialog.finished.connect(self._forget_dialog)
+        self.dialog.show()
+
+    def end_diagnosis(self) -> None:
+        if self.dialog is not None:
+            self.dialog.reject()
+
+    def _forget_dialog(self) -> None:
+        self.dialog = None
+
+    def _show_found(self, found: tuple[DeviceShown, ...]) -> None:
+        if not self._ended:
+            self.show_looking(False)
+            self.show_devices(found)
+            self.looked.emit()
+
+    def _show_unexamined(self, error: Exception) -> None:
+        if not self._ended:
+            self.show_looking(False)
+            self.troubled.emit("This machine could not be examined", f"{error}.")
+
+    def show_devices(self, shown: tuple[DeviceShown, ...]) -> None:
         """Show devices; rows of those that are there already stay, with the keyboard in them."""
+        self.shown = shown
         for device in shown:
             if device.name in self.rows:
                 self.rows[device.name].show_device(device)
@@ -152,20 +201,22 @@ class DevicesPlace(Place):
         self._group.setExclusive(False)  # or what is marked could not lose its mark
         for name, row in self.rows.items():
             if isinstance(row.title, Radio):
-                row.title.setChecked(name == preferred.partition(":")[0])
+                row.title.setChecked(name == self._settings.device.partition(":")[0])
         self._group.setExclusive(True)
 
     def _add(self, device: DeviceShown) -> None:
         card = self.lists[device.simulated]
-        row = self.rows[device.name] = DeviceRow(device, self.asked.emit)
+        row = self.rows[device.name] = DeviceRow(device, self.diagnose)
         add_parts(card.column, *([Rule()] if card.findChild(DeviceRow) else []), row)
         if isinstance(row.title, Radio):
             self._group.addButton(row.title)
-            row.title.clicked.connect(lambda: self.asked.emit("choose", device.name))
+            row.title.clicked.connect(lambda: self.changed.emit({"device": device.name}))
 
-    def show_options(self, values: Mapping[str, Path]) -> None:
+    def show_settings(self, settings: MachineSettings) -> None:
+        self._settings = settings
         for name, card in self.options.items():
-            card.editor.show_value(values.get(name, ""))
+            card.editor.show_value(settings.device_options.get(name, ""))
+        self.show_devices(self.shown)
 
     def show_looking(self, looking: bool) -> None:
         self.refresh.setEnabled(not looking)
