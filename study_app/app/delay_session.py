@@ -252,7 +252,7 @@ T = TypeVar("T")
 
 
 class WindowsThread(QObject):
-    """The calling thread and its event loop; with ``paints`` both windows of a session are open meanwhile.
+    """The calling thread and its event loop; with a load both windows of a session are open meanwhile.
 
     Raises
     ------
@@ -262,8 +262,9 @@ class WindowsThread(QObject):
 
     _asked = Signal(object)
 
-    def __init__(self, *, paints: bool) -> None:
+    def __init__(self, load: LoadName) -> None:
         super().__init__()
+        paints = load != "none"
         self._application = application_here() if paints else QCoreApplication.instance() or QCoreApplication([])
         self._painting = Painting() if paints else None
         self._asked.connect(self._do, Qt.ConnectionType.QueuedConnection)
@@ -403,8 +404,3 @@ class Painting(QObject):
     def _painted(self, _sample_ns: int) -> None:
         self.frames += 1
         self.health.frame(time.monotonic_ns())
-
-
-def lend(load_name: LoadName) -> WindowsThread:
-    """Return this thread with its event loop, painting unless there is to be no load."""
-    return WindowsThread(paints=load_name != "none")

@@ -37,10 +37,13 @@ from study_app.workspace import Workspace, chosen_workspace, offered_workspace, 
 if TYPE_CHECKING:
     from study_app.app.lab_controller import LabController
     from study_app.app.session.playing import Playing
+    from study_app.app.session.preflight_controller import ComputerCheck
     from study_app.designer.participant.playable import LabLiquids
     from study_app.designer.place.controller import DesignerController
     from study_app.designer.place.view import DesignerPlace
+    from study_app.gui.help.view import HelpPlace
     from study_app.gui.lab.view import LabPlace
+    from study_app.gui.results.view import ResultsPlace
     from study_app.gui.sessions.session_facts import SessionFacts
     from study_app.lab.ab_comparison import Setting, Side
 
@@ -138,12 +141,6 @@ def load_modules() -> None:
 
 LOOK_AFTER_MS = 300  # the window stands by then
 JOBS_PATIENCE_S = 5.0
-
-if TYPE_CHECKING:
-    from study_app.app.session.preflight_controller import ComputerCheck
-    from study_app.gui.help.view import HelpPlace
-    from study_app.gui.results.view import ResultsPlace
-    from study_app.gui.settings.view import MachinePlace
 
 
 def home(results: Path | None = None, *, then: Callable[[MainController], None] = lambda _visit: None) -> int:

@@ -455,12 +455,12 @@ def _choose_display() -> None:
 def windows_thread(load: LoadName) -> WindowsThread | None:
     """Return the windows' thread; None where there is no Qt and nothing is to be painted."""
     try:
-        from study_app.app.delay_session import lend
+        from study_app.app.delay_session import WindowsThread
     except DisplayError:
         if load != "none":
             raise
         return None
-    return lend(load)
+    return WindowsThread(load)
 
 
 @contextmanager

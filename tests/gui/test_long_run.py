@@ -5,7 +5,7 @@ import threading
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.delay_session import lend
+from study_app.app.delay_session import WindowsThread
 from study_app.evidence.soak.soak import soak
 from study_app.evidence.timing.measurement import LEAD_IN, PERIOD_NS
 from study_app.protocol.load import load_scenes
@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.slow, needs_servo]
 @pytest.mark.nightly
 @pytest.mark.usefixtures("qapp")
 def test_half_an_hour_under_load_drops_nothing_drifts_by_nothing_and_takes_no_memory() -> None:
-    windows = lend("gui")
+    windows = WindowsThread("gui")
     found = windows.during(lambda: soak(load_scenes("rek2024"), HALF_AN_HOUR, virtual=True))
     assert found.findings == ()
     assert found.ticks == found.planned == 1_800_000
@@ -33,7 +33,7 @@ def test_half_an_hour_under_load_drops_nothing_drifts_by_nothing_and_takes_no_me
 
 @pytest.mark.usefixtures("qapp")
 def test_windows_are_open_while_work_is_done_and_gone_after_it() -> None:
-    windows = lend("gui")
+    windows = WindowsThread("gui")
     seen: list[int] = []
 
     def work() -> str:
@@ -50,7 +50,7 @@ def test_windows_are_open_while_work_is_done_and_gone_after_it() -> None:
 
 @pytest.mark.usefixtures("qapp")
 def test_a_timer_of_qt_fires_as_often_as_asked_in_the_windows_thread() -> None:
-    windows = lend("none")
+    windows = WindowsThread("none")
     fired: list[threading.Thread] = []
     start_ns = windows.during(lambda: windows.timer(1, LEAD_IN, lambda: fired.append(threading.current_thread())))
     assert len(fired) == LEAD_IN
@@ -61,7 +61,7 @@ def test_a_timer_of_qt_fires_as_often_as_asked_in_the_windows_thread() -> None:
 
 @pytest.mark.usefixtures("qapp")
 def test_a_tick_that_fails_in_the_timer_is_told_to_who_asked() -> None:
-    windows = lend("none")
+    windows = WindowsThread("none")
 
     def fail() -> None:
         raise ZeroDivisionError

@@ -148,9 +148,9 @@ def _stop(servo: Servo, stand: Stand, found: Found, *, whole: bool) -> None:
 
 def under_windows(name: str, seconds: float) -> Found:
     """Return what was found while both windows of a session paint."""
-    from study_app.app.delay_session import lend
+    from study_app.app.delay_session import WindowsThread
 
-    windows = lend("gui")
+    windows = WindowsThread("gui")
     found = windows.during(lambda: stop_again_and_again(name, seconds))
     found.frames = windows.frames
     return found
