@@ -19,7 +19,7 @@ from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from study_app.protocol.trials.designs import Design, default_design
 from study_app.protocol.trials.methods import Method
 from study_app.protocol.trials.presentation import link_words
-from study_app.protocol.trials.stimuli import OF_LINK, Assumed, Stimulus, assumed_for, rises
+from study_app.protocol.trials.stimuli import DELAY, OF_LINK, Assumed, Stimulus, assumed_for, rises
 from study_app.protocol.trials.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
 from study_app.store.blinded.blinding import Key, whole_protocol
 
@@ -45,7 +45,8 @@ class Setting:
     """What was presented under a code; all but the code is None until the key is opened.
 
     ``label`` is the item that names what was felt, where one does, ``link`` how its force was sent if not promptly,
-    ``view`` what was seen, empty for the drawn tank. A track ("8/1") has neither liquid nor delay.
+    ``view`` what was seen, empty for the drawn tank. A track ("8/1") has neither liquid nor delay, but the condition
+    ``of`` which it varies a number.
     """
 
     code: str
@@ -55,6 +56,7 @@ class Setting:
     label: str | None = None
     link: str = ""
     view: str = ""
+    of: Self | None = None
 
     @property
     def standard(self) -> str | None:
@@ -122,14 +124,21 @@ def settings_of(key: Key) -> dict[tuple[str, str], Setting]:
 
 def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
     """Return what a code stands for: a condition, or a track of a design such as "8/1", with its standard."""
-    condition = key.tables["conditions"].get(presented)
-    if condition is None:
-        return Setting(code, presented)
-    liquids = " + ".join(key.liquids(block, code))
-    link = ", ".join(link_words(*(condition.get(name, 0.0) for name in OF_LINK)))
+    conditions = key.tables["conditions"]
+    if presented in conditions:
+        return _of_condition(conditions[presented], code, presented)
+    stimulus = key.tables["stimuli"][key.tables["blocks"][block]["stimulus"]]
+    name = stimulus["condition"] or next(iter(conditions))
+    of = _of_condition(conditions[name], name, name)
+    return Setting(code, presented, of=replace(of, delay_ms=None) if stimulus["vary"] == DELAY else of)
+
+
+def _of_condition(condition: Mapping[str, Any], code: str, name: str) -> Setting:
+    liquids = " + ".join(condition["liquids"] if condition["liquid"] is None else [condition["liquid"]])
+    link = ", ".join(link_words(*(condition.get(key, 0.0) for key in OF_LINK)))
     view = condition.get("view", "tank") + (" alone" if condition.get("overlay") == "hidden" else "")
     view = "" if view == "tank" else view
-    return Setting(code, presented, liquids, key.delay_ms(block, code), condition.get("label"), link, view)
+    return Setting(code, name, liquids, float(condition["delay_ms"]), condition.get("label"), link, view)
 
 
 def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:

@@ -70,8 +70,12 @@ def level_tables(study: Study) -> Iterator[Delivered]:
     yield delivered("intervals", (*intervals, *JUDGED), study.intervals)
     if not study.revealed:
         return
-    frame = tracks(study).rename(columns={"level": "level_asked"})
-    of_tracks = (*TRACKS, *_of_intervals(study))  # of an interval that no trial reached, the frame has no column
+    frame = _named(study, tracks(study)).rename(columns={"level": "level_asked"})
+    of_tracks = (
+        *TRACKS,
+        *_may_miss((*OPENED, ACHIEVED)),
+        *_of_intervals(study),
+    )  # of an interval that no trial reached, the frame has no column
     yield delivered("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
     found = level_results(study, frame.rename(columns={"level_asked": "level"}))
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
@@ -164,7 +168,7 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
 def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
     """Add what each code stood for: nothing of an answer in a form, and while the key is sealed."""
     pairs = zip(table["block"], table["code"], strict=True)
-    settings = [study.settings.get(pair, OF_A_FORM) for pair in pairs]
+    settings = [one.of or one for one in (study.settings.get(pair, OF_A_FORM) for pair in pairs)]
     delay_ms = np.array([np.nan if one.delay_ms is None else one.delay_ms for one in settings], np.float64)
     named = table.assign(
         condition=pd.array([one.condition for one in settings], dtype="string"),

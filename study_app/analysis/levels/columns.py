@@ -28,7 +28,7 @@ JUDGED: Final = (
 OPENED: Final = (
     Column("condition", "text", "Id of the condition that the code stands for."),
     Column("liquid", "text", "Id of the liquid that was presented."),
-    Column("delay_ms", "number", "Requested visual delay.", "ms", minimum=0),
+    Column("delay_ms", "number", "Requested visual delay; n/a where a stimulus varies it.", "ms", minimum=0),
 )
 ACHIEVED: Final = optional(
     "delay_achieved_ms", "number", "Visual delay that was achieved: asked for, plus the trial's mean error.", "ms"
@@ -212,7 +212,10 @@ RESULTS: Final = {
 def dictionary_markdown() -> str:
     """Return the columns of these tables as Markdown: a heading and a table for each."""
     added = "what `export` adds to responses, trials and intervals; the last four after unblinding"
-    of_tracks = "one row per trial with a design, after unblinding; what it has in addition to the columns of trials"
+    of_tracks = (
+        "one row per trial with a design, after unblinding; what it has besides IDs and condition of the trial, and "
+        "force_mean_n and mean_speed_mps of each interval (…_1, …_2)"
+    )
     tables = {"tracks": Results(of_tracks, OF_TRACKS), **RESULTS}
     return "\n".join(
         (

@@ -88,15 +88,6 @@ class Key:
                 f"the sealed key has no code {code!r} of block {block!r}: it belongs to another study"
             ) from None
 
-    def delay_ms(self, block: str, code: str) -> float:
-        """Return the requested visual delay [ms]."""
-        return float(self.tables["conditions"][self.condition(block, code)]["delay_ms"])
-
-    def liquids(self, block: str, code: str) -> tuple[str, ...]:
-        """Return the ids of the liquids presented."""
-        condition = self.tables["conditions"][self.condition(block, code)]
-        return tuple(condition["liquids"]) if condition["liquid"] is None else (str(condition["liquid"]),)
-
 
 def sealed_hash(folder: Path) -> str | None:
     """Return the SHA-256 of a study's sealed key, as in its receipts; None where there is none, or none readable."""

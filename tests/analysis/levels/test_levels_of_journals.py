@@ -75,6 +75,14 @@ def test_an_interval_that_no_trial_reached_has_empty_cells(opened_levels: Path, 
     assert [row["force_mean_n_2"] for row in tracks] == ["n/a"] * 3 * 54
 
 
+def test_trials_of_tracks_have_the_condition_whose_number_is_varied(opened_levels: Path, tmp_path: Path) -> None:
+    export(opened_levels, tmp_path)
+    for name in ("trials", "tracks"):
+        of = {(row["block"], row["condition"], row["liquid"], row["delay_ms"]) for row in rows(tmp_path, name)}
+        assert {("equal", "oil", "thin", "0.0"), ("pairs", "late", "thin", "100.0")} <= of, name
+        assert not any("/" in condition or delay == "n/a" for _, condition, _, delay in of), name
+
+
 def test_tracks_have_a_row_per_trial_with_what_it_presented(opened_levels: Path, tmp_path: Path) -> None:
     export(opened_levels, tmp_path)
     tracks, key = rows(tmp_path, "tracks"), read_key(opened_levels)
