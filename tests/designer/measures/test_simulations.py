@@ -140,7 +140,8 @@ def test_numbers_of_what_is_broken_stay_in_grey(qtbot: Any, designer: Any, worke
     worker.answer()
     shown(qtbot, designer, 2, "93")
     before = [part.number.text() for part in page.numbers.parts]
-    grey, ink = page.theme.text3, lambda part: part.number.palette().color(part.number.foregroundRole()).name().upper()
+    grey = page.grid.theme.text3
+    ink = lambda part: part.number.palette().color(part.number.foregroundRole()).name().upper()  # noqa: E731
     designer.editing.make("Break", Set(("tasks", "stir", "frequency_hz"), -1))
     qtbot.waitUntil(page.earlier.isVisible)
     assert [part.number.text() for part in page.numbers.parts] == before
