@@ -44,7 +44,7 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
             steps.append("asked")
             card = next(card for card in home.grid.cards if card.facts.source == "demo")
             card.new.click()
-            home.dialog.windowed.setChecked(True)
+            home.dialog.editors["windowed"].control.setChecked(True)
             home.dialog.begin.click()
         elif steps == ["asked"] and window(PreflightWindow) is not None:
             assert not (tmp_path / "results").exists()
