@@ -52,6 +52,8 @@ from study_app.store.blinded.unblinding import RULE
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import named
 
+WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
+
 
 def of_levels(results: Results) -> tuple[str, ...]:
     """Return what was found in blocks of levels, a sentence each."""
@@ -208,18 +210,19 @@ def _sample(study: Study) -> str:
 
 
 def _apparatus(study: Study) -> str:
-    """Return what exerted the force, how often, and how large ball and motion were, as receipts have it."""
+    """Return the devices, their force if any gives one, and how large ball and motion were, as receipts have it."""
     used = study.participants.loc[study.participants["counted"], "device"].dropna()
+    names = sorted({str(name).partition(":")[0] for name in used} - {"answers-only"})
     device, scene = study.protocol.get("device"), study.protocol.get("scene")
-    if not (device and scene and len(used)):
+    if not (device and scene and names):
         return ""
+    force = f"forces computed at {device['rate_hz']:g} Hz and limited to {device['force_limit_n']:g} N, "
     velocity = {None: "", "device": ", its velocity measured by the device"}.get(
         study.estimator, f", its velocity estimated by {study.estimator}"
     )
     return (
-        f"Apparatus: {listed(sorted(set(map(str, used))))}, forces computed at {device['rate_hz']:g} Hz and limited to "
-        f"{device['force_limit_n']:g} N, a ball of {1000 * scene['body']['diameter_m']:g} mm that moves "
-        f"{scene['scale']:g} times as far as the hand{velocity}."
+        f"Apparatus: {listed(names)}, {'without force, ' if WITHOUT_FORCE.issuperset(names) else force}a ball of "
+        f"{1000 * scene['body']['diameter_m']:g} mm that moves {scene['scale']:g} times as far as the hand{velocity}."
     )
 
 

@@ -193,7 +193,7 @@ class SessionBridge(QObject):
         self.runner = Runner(
             parts.session.protocol, parts.session.schedule, parts.key, ports, parts.language, parts.start, parts.secret
         )
-        self.reconnecting = Background(self)
+        self.reconnecting = Background(self, refusals=Exception)
         self._reconnection = ""  # what is being done to connect the device again, or why it failed
         self._hand: Hand | None = None
         self._gone = False

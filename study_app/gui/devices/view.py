@@ -113,7 +113,7 @@ class DevicesPlace(Place):
     def __init__(self, settings: MachineSettings = DEFAULTS, look: Callable[[], Sequence[Backend]] = backends) -> None:
         super().__init__()
         self._settings, self.backends = settings, look
-        self.looking = Background(self)
+        self.looking = Background(self, refusals=Exception)  # a bug of a driver is what the machine shows
         self.looking.done.connect(self._show_found)
         self.looking.failed.connect(self._show_unexamined)
         self._ended = False

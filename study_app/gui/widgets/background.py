@@ -64,14 +64,15 @@ class Background(QObject):
     """Runs one job at a time in a thread; ``done`` carries what the last job that was asked for returned.
 
     A job that was asked for while another runs begins after it, unless a newer one takes its place. What the job raises
-    comes by ``failed``; what is no refusal (`StudyError`) also goes to ``threading.excepthook``.
+    comes by ``failed``; what is none of ``refusals`` also goes to ``threading.excepthook``.
     """
 
     done = Signal(object)
     failed = Signal(object)
 
-    def __init__(self, parent: QObject) -> None:
+    def __init__(self, parent: QObject, refusals: type[Exception] = StudyError) -> None:
         super().__init__(parent)
+        self._refusals = refusals
         self._ends = _ends()  # made in the windows' thread
         self._wanted: Callable[[], Any] | None = None
         self._thread: threading.Thread | None = None
@@ -98,7 +99,7 @@ class Background(QObject):
             found, whole = None, False
             try:
                 found, whole = job(), True
-            except StudyError as error:
+            except self._refusals as error:
                 found = error
             except BaseException as error:
                 found = error

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude, include
-from tests.analysis.conftest import Results, make_results, twelve
+from tests.analysis.conftest import SAMPLE, Results, make_results, twelve
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("figures_of_the_page")]
@@ -37,6 +38,20 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     both = "p adjusted over 1 statement by Holm (primary) and over {} statements by Benjamini-Hochberg (exploratory)"
     assert both.format("eight") in told
     assert both.format("four") in told
+
+
+def test_methods_state_the_devices_and_their_force_if_they_give_one() -> None:
+    study = load_study(SAMPLE.path)
+    results = evaluate(study)
+    said = {}
+    for device in ("mouse", "falcon:12", "answers-only"):
+        told = methods(replace(study, participants=study.participants.assign(device=device)), results)
+        said[device] = told.partition("Apparatus: ")[2].partition(" a ball of 68 mm that moves 10 times")[0]
+    assert said == {
+        "mouse": "mouse, without force,",
+        "falcon:12": "falcon, forces computed at 1000 Hz and limited to 8 N,",
+        "answers-only": "",
+    }
 
 
 def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_stated(

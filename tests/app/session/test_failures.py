@@ -275,3 +275,16 @@ def test_a_session_that_ends_meanwhile_stays_ended(lost, device, world, qtbot):
     assert lost.view().over
     assert not world.force_is_on
     assert world.events()[-1] == "session_ended"
+
+
+def test_a_device_that_fails_to_open_is_no_failure_of_the_program(lost, device, world, qtbot, caplog):
+    device.error = OSError("the bus is gone")
+    lost.operator.ask("reconnect")
+    device.go_on.set()
+    settled(lost, qtbot)
+    assert lost.view().reconnection == "Not connected: OSError: the bus is gone."
+    assert not lost.view().over
+    assert not [entry for entry in world.done if entry[0] == "note"]
+    assert not world.force_is_on
+    assert [record.getMessage() for record in caplog.records] == ["the device was not reconnected: the bus is gone"]
+    caplog.clear()
