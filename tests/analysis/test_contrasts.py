@@ -188,7 +188,19 @@ D_PRIMES = [
     [
         ([], math.log(1.25), math.hypot(math.log(1.2), math.log(1.3), math.log(1.3))),
         ([*D_PRIMES, ('"threshold"', '"d_prime"'), ("1.25", "0.3")], 0.3, math.hypot(math.log(1.2), 0.2, 0.2)),
+        (
+            [
+                *D_PRIMES,
+                ('"threshold"', '"d_prime"'),
+                ("1.25", "0.3"),
+                ('"late_one"]', '"late_one", "later_one"]'),
+                ("tasks.stir", 'conditions.later_one = { liquid = "damper", delay_ms = 90 }\ntasks.stir'),
+            ],
+            0.3,
+            math.hypot(math.log(1.2), 0.2),
+        ),
     ],
+    ids=["thresholds", "one comparison", "mean over two comparisons"],
 )
 def test_power_plans_differences_and_equality_within_people(
     edits: list[tuple[str, str]], bound: float, spread: float
@@ -204,6 +216,8 @@ def test_power_plans_differences_and_equality_within_people(
     told = threshold_markdown(Precisions(parse(text.encode(), "delayed.toml"), (40,), 10, 10, 1, found))
     half, least = (spread * end for end in detectable(40, tail=0.05))
     ends = f"±{half:.2f} | ±{least:.2f}" if edits else f"×/÷ {math.exp(half):.2f} | ×/÷ {math.exp(least):.2f}"
+    assert ("SD, as a share of a mean d′ of 1: of one" if edits else "SD: of one") in told
+    assert "Equality: the interval of 0.9 lies within the bound.\n" in told
     assert "| smallest difference | shown within the bound if truly equal |" in told
     assert told.strip().endswith(f"| {spread:.0%} | {ends} | {shown_equal(bound / spread, 40, alpha=0.05):.0%} |")
 

@@ -373,7 +373,8 @@ def smallest_differences(
     both = "" if shares is None else f" Of the participants {shares[0]:.0%} and {shares[1]:.0%} are in the two groups."
     yield from ("", f"## Contrast: {one.described()}", "")
     at = f"at α = {strictest:.2g}{corrected}, {sides}"
-    yield f"{said}{both} Smallest difference: what {WANTED:.0%} of studies show {at}."
+    within = "" if bound is None else f" Equality: the interval of {1 - 2 * alpha:.3g} lies within the bound."
+    yield f"{said}{both} Smallest difference: what {WANTED:.0%} of studies show {at}.{within}"
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, words, spread in rows:
         for n in sizes:

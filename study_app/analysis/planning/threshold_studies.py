@@ -31,7 +31,7 @@ from study_app.protocol.checks.expected_precision import (
 )
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.table import text_in
-from study_app.protocol.trials.tracks import standards_of, stimulus_of
+from study_app.protocol.trials.tracks import stimulus_of, tracks_of
 from study_app.psychophysics.people import BETWEEN_PEOPLE, ESTIMATE_NOISE, Estimates, Person
 from study_app.store.tables.csv_files import Column, csv_bytes, optional
 
@@ -358,14 +358,15 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
         rows = [(name, words, mean * spread) for name, words, spread in _spreads(precisions, one)]
         if not rows:
             continue
-        what = one.measure.replace("_", " ")
-        whose = f"one participant's {what}: the estimate's, and that of people, who differ"
+        what = one.measure.replace("d_prime", "d′")
+        share = "" if isinstance(first, ThresholdPlan) else f", as a share of a mean {what} of {first.value:g}"
+        whose = f"one participant's {what}, from the error of the estimate and from people, who differ"
         if one.groups is None:
-            whose = "the difference of one participant: that of both estimates, and of people, whose differences vary"
+            whose = "one participant's difference, from the errors of both estimates and from people, who differ in it"
         yield from smallest_differences(
             one, precisions.sizes, decisions(precisions.protocol).alphas[-1], len(decided.contrasts), rows,
             f"trials{first.per}",
-            f"SD {first.words}of {whose} by a factor of {BETWEEN_PEOPLE:g}.",
+            f"SD{share}: of {whose} by a factor of {BETWEEN_PEOPLE:g}.",
             (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format,
             group_shares(precisions.protocol, one), log_bound(precisions.protocol, one) if ratio else one.bound,
         )  # fmt: skip
@@ -382,12 +383,11 @@ def log_bound(protocol: Protocol, one: Contrast) -> float | None:
 def _spreads(precisions: Precisions, one: Contrast) -> Iterator[tuple[str, str, float]]:
     """Yield numbers of trials, and the standard deviation of what is compared of a participant with them."""
     protocol = precisions.protocol
-    standards = [
-        len(standards_of(protocol, protocol.blocks[it])) if one.measure == "threshold" else 1 for it in one.blocks
-    ]
+    tracks = [() if one.measure == "exponent" else tracks_of(protocol, protocol.blocks[it]) for it in one.blocks]
+    averaged = [len({(track.standard, track.comparison) for track in of_block}) or 1 for of_block in tracks]
     for trials in (trials for block, trials in precisions.found if block == one.blocks[0]):
         held = [found for block in one.blocks if (found := precisions.found.get((block, trials))) is not None]
-        spreads = [found.spread / math.sqrt(count) for found, count in zip(held, standards, strict=False)]
+        spreads = [found.spread / math.sqrt(count) for found, count in zip(held, averaged, strict=False)]
         if len(held) == len(one.blocks) and all(map(math.isfinite, spreads)):
             spread = math.hypot(math.log(BETWEEN_PEOPLE), *spreads)
             yield str(trials), f"{spread:.0%}", spread
