@@ -532,8 +532,12 @@ class Questions(Themed, QWidget):
             made = Check(name)
             made.setFont(font("label", weight=400))
             made.setAccessibleName(f"Language {name}")
+            made.toggled.connect(self._show_first_texts)
             self.languages[code] = made
             checks.addWidget(made, at // 2, at % 2)
+        self.first_texts = label("", "label", "text2", wraps=True)
+        checks.addWidget(self.first_texts, checks.rowCount(), 0, 1, 2)
+        self._show_first_texts()
         self._grid.addWidget(label("Languages", "label"), 2, 0, 1, 2)
         self._grid.addWidget(box, 3, 0, 1, 2)
         self._own: list[QWidget] = []
@@ -582,6 +586,15 @@ class Questions(Themed, QWidget):
 
     def _propose(self) -> None:
         self.name.setPlaceholderText(self._proposed or NAME_HINT)
+
+    def _show_first_texts(self) -> None:
+        """Say in which language the texts begin where none of the template's is chosen."""
+        there = () if self._choice is None else self._choice.languages
+        chosen = [code for code, check in self.languages.items() if check.isChecked()]
+        without = bool(there and chosen) and set(there).isdisjoint(chosen)
+        if without:
+            self.first_texts.setText(f"The texts begin in {dict(languages_offered())[there[0]]}: translate them.")
+        self.first_texts.setVisible(without)
 
     @property
     def _proposed(self) -> str:

@@ -47,6 +47,11 @@ class ProblemRow:
     warning: bool = False  # whether ``check`` only warns of it
 
     @property
+    def identity(self) -> tuple[Path, str, bool]:
+        """What stays the same where lines are inserted above it."""
+        return self.fault.path, self.message, self.warning
+
+    @property
     def place(self) -> str:
         """Its place in the file, such as ``blocks.liquids.order · line 385``."""
         return place_words(self.fault.path, self.line)
@@ -204,10 +209,15 @@ class ProblemLine(Coloured, QWidget):
         self.go.setAccessibleName(f"{row.name}: {row.message}")
         elided = self.go.fontMetrics().elidedText(row.name, Qt.TextElideMode.ElideRight, self.go.width() - 4)
         self.go.setText(elided)
-        self._place.show_text(row.place)
+        self.show_row(row)
         hint.show_text(row.hint)
         hint.setVisible(bool(row.hint))
         self.setToolTip("\n".join(filter(None, (row.name, row.message, row.hint))))
+
+    def show_row(self, row: ProblemRow) -> None:
+        """Show the same problem at another line of the file."""
+        self.row = row
+        self._place.show_text(row.place)
 
     def show_repairs(self, repairs: tuple[str, ...]) -> None:
         for button, words in zip(self.repairs, repairs, strict=False):
@@ -310,8 +320,12 @@ class ProblemsCard(Card):
         if listed == self._listed:
             return
         if self.under_pointer and self.lines:  # no line moves: others are disabled or come when it leaves
+            still = {row.identity: row for row in listed}
             for line in self.lines:
-                line.setEnabled(line.row in listed)
+                row = still.get(line.row.identity)
+                line.setEnabled(row is not None)
+                if row is not None:
+                    line.show_row(row)
             return
         self._listed = listed
         inside = QWidget()

@@ -1,6 +1,7 @@
 """Jobs outside the window's thread: neither a slow disk nor a long computation freezes a window."""
 
 import atexit
+import logging
 import threading
 import time
 import weakref
@@ -8,10 +9,12 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QMetaMethod, QObject, Qt, QTimer, Signal
 from shiboken6 import isValid
 
 from study_app.errors import StudyError
+
+log = logging.getLogger(__name__)
 
 _threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
 _telling, _program_ends = threading.Lock(), threading.Event()
@@ -64,7 +67,8 @@ class Background(QObject):
     """Runs one job at a time in a thread; ``done`` carries what the last job that was asked for returned.
 
     A job that was asked for while another runs begins after it, unless a newer one takes its place. What the job raises
-    comes by ``failed``; what is none of ``refusals`` also goes to ``threading.excepthook``.
+    comes by ``failed``; what is none of ``refusals`` also goes to ``threading.excepthook``. A refusal is logged where
+    nothing is connected to ``failed``.
     """
 
     done = Signal(object)
@@ -120,4 +124,7 @@ class Background(QObject):
             self._begin(self._wanted)
             return
         self._wanted = None
+        refused = not whole and isinstance(found, self._refusals)
+        if refused and not self.isSignalConnected(QMetaMethod.fromSignal(self.failed)):
+            log.warning("%s", found)
         (self.done if whole else self.failed).emit(found)

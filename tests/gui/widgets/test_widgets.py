@@ -11,6 +11,7 @@ from PySide6.QtGui import QAccessible
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.errors import StudyError
 from study_app.gui.widgets.background import Background, wait_for_jobs
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.live_plots import TracePlot
@@ -49,6 +50,24 @@ def test_only_the_newest_of_what_was_asked_for_comes(qtbot: Any) -> None:
     go_on.set()
     qtbot.waitUntil(lambda: not background.busy)
     assert came == ["third"]
+
+
+@pytest.mark.parametrize("listened", [False, True])
+def test_a_refusal_that_nothing_listens_to_is_logged(
+    qtbot: Any, caplog: pytest.LogCaptureFixture, *, listened: bool
+) -> None:
+    def refuse() -> None:
+        raise StudyError("no such folder")
+
+    parent, came = QObject(), []
+    background = Background(parent)
+    if listened:
+        background.failed.connect(came.append)
+    background.run(refuse)
+    qtbot.waitUntil(lambda: not background.busy)
+    assert ("no such folder" in caplog.messages) is not listened
+    assert len(came) == listened
+    caplog.clear()
 
 
 def test_the_end_of_the_program_waits_for_jobs_but_not_for_ever() -> None:

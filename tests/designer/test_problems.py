@@ -1,0 +1,36 @@
+"""Repairs that are pressed one after another while the pointer stays over the list of problems."""
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QPointF
+from PySide6.QtGui import QEnterEvent
+from PySide6.QtWidgets import QApplication
+
+from study_app.designer.document.steps import RetypeFile
+from tests.designer.support.designer import DEMO
+
+pytestmark = pytest.mark.slow
+
+
+def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer: Any, qtbot: Any) -> None:
+    text = "\n".join(line for line in DEMO.split("\n") if not line.startswith(("density_kg_m3", "min_s", "dwell_s")))
+    designer.open()
+    designer.editing.ask(RetypeFile(text))
+    problems = designer.place.problems
+    qtbot.waitUntil(lambda: len(problems.problems) == 4)
+    problems.show()
+    at = QPointF(5, 5)
+    QApplication.sendEvent(problems, QEnterEvent(at, at, at))
+    lines = tuple(problems.lines)
+    qtbot.waitUntil(lambda: all(line.repairs for line in lines))
+    for number, line in enumerate(lines, start=1):
+        assert line.isEnabled()
+        before = line.row
+        designer.click_on(line.repairs[0])
+        qtbot.waitUntil(lambda number=number: len(problems.problems) == len(lines) - number)
+        assert before.identity not in {row.identity for row in problems.problems}
+        assert tuple(problems.lines) == lines
+        assert [one.isEnabled() for one in lines] == [False] * number + [True] * (len(lines) - number)
+        assert [one.row for one in lines[number:]] == list(problems.problems)
+    assert designer.study.faults == ()
