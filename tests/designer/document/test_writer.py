@@ -16,7 +16,7 @@ from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move
 from study_app.errors import StudyError
 from study_app.protocol.source.document import value_at
 from tests.designer.document.grown import texts
-from tests.designer.document.random_edits import check_edit, edit_of, holds_nothing
+from tests.designer.document.random_edits import check_edit, edit_of
 
 EDITS = int(os.environ.get("LIQUID_STUDY_EDITS", "0"))
 """How many random edits are tried; without it about 400."""
@@ -68,18 +68,6 @@ class Edited(RuleBasedStateMachine):
         self.texts.append(self.document.study.text)
         self.undone.clear()
         assert self.document.study.document == Study(text).document
-
-    @rule(seed=st.integers(0, 2**32))
-    def try_edit(self, seed: int) -> None:
-        """A trial has the document and the faults of the edited text, and changes nothing."""
-        study, edit = self.document.study, edit_of(Random(seed), self.texts[-1])  # noqa: S311
-        document = repr(study.document)
-        try:
-            written, tried = study.edited(edit)[0], study.trial.edited(edit)[0]
-        except StudyError:
-            return
-        assert tried.document == written.document or holds_nothing(edit)
-        assert repr(study.document) == document
 
     def teardown(self) -> None:
         """Undo everything."""

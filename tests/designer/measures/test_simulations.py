@@ -180,10 +180,11 @@ def test_the_share_of_studies_is_that_of_the_command_power() -> None:
     assert done == group.studies
     assert group.share == found["viscosity", 20].within(0, 0.5)
     assert 0.0 < group.share < ENOUGH
-    sizes = range(7, 13)
-    ((_, found),) = list(sweep(planned, sizes, THRESHOLD_STUDIES, 1, Serial()))[-1:]
-    within = [found["viscosity", 20].within(at, 0.5) for at in range(len(sizes))]
-    assert group.enough == next(size for size, share in zip(sizes, within, strict=True) if share >= ENOUGH)
+    enough = []
+    for sizes in (range(7, 13), range(13, 25)):
+        ((_, found),) = list(sweep(planned, sizes, THRESHOLD_STUDIES, 1, Serial()))[-1:]
+        enough += [size for at, size in enumerate(sizes) if found["viscosity", 20].within(at, 0.5) >= ENOUGH]
+    assert group.enough == enough[0]
 
 
 @pytest.mark.nightly
