@@ -71,11 +71,8 @@ def level_tables(study: Study) -> Iterator[Delivered]:
     if not study.revealed:
         return
     frame = _named(study, tracks(study)).rename(columns={"level": "level_asked"})
-    of_tracks = (
-        *TRACKS,
-        *_may_miss((*OPENED, ACHIEVED)),
-        *_of_intervals(study),
-    )  # of an interval that no trial reached, the frame has no column
+    # of an interval that no trial reached, the frame has no column
+    of_tracks = (*TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_of_intervals(study))
     yield delivered("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
     found = level_results(study, frame.rename(columns={"level_asked": "level"}))
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}

@@ -53,6 +53,7 @@ from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import named
 
 WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
+"""The devices without force: reading results must not load their descriptors."""
 
 
 def of_levels(results: Results) -> tuple[str, ...]:

@@ -7,7 +7,6 @@ be resumed. Nothing is created on the disk before device and servo are ready.
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import logging
 import threading
@@ -473,7 +472,7 @@ def run(
     )
     check(chosen, study)
     if Path(protocol).is_file():
-        with contextlib.suppress(StoreError):  # a session does not depend on it
+        with suppress(StoreError):  # a session does not depend on it
             remember_protocol(Path(protocol))
     return run_session(chosen, progress)
 
