@@ -214,7 +214,7 @@ def read(results: str | Path) -> dict[str, pd.DataFrame]:
 
 def unblind(results: str | Path, *, by: str, reason: str) -> None:
     """Open the sealed key of a study folder: `read` and `report` name conditions then; name and reason are recorded."""
-    from study_app.store.blinded.unblinding import unblind_folder
+    from study_app.store.unblinding import unblind_folder
 
     unblind_folder(Path(results), by=by, reason=reason)
 

@@ -4,7 +4,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from study_app import figure_style as style
-from study_app.analysis.figures.page_layout import Sheet
+from study_app.analysis.page_layout import Sheet
 from tests.analysis.colours import EYES, smallest
 
 # Pairs of colours in CIELAB and their difference (Sharma, Wu & Dalal 2005, table 1).

@@ -54,7 +54,7 @@ class OpenKey:
 
 @dataclass(frozen=True, slots=True)
 class WriteTables:
-    """Write the tables that ``analysis.export.export`` writes, with its ``extras``."""
+    """Write the tables that ``analysis.export_study`` writes, with its ``extras``."""
 
     folder: Path
     to: Path

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from study_app.app.session.playing import Playing
     from study_app.app.session.preflight_controller import ComputerCheck
     from study_app.designer.participant.playable import LabLiquids
-    from study_app.designer.place.controller import DesignerController
-    from study_app.designer.place.view import DesignerPlace
+    from study_app.designer.controller import DesignerController
+    from study_app.designer.window import DesignerPlace
     from study_app.gui.help.view import HelpPlace
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.results.view import ResultsPlace
@@ -132,7 +132,7 @@ def load_modules() -> None:
     import study_app.gui.watch.window  # noqa: PLC0415
     import study_app.lab.live  # noqa: F401, PLC0415
     from study_app.gui.participant.tank.glass import brightness  # noqa: PLC0415
-    from study_app.protocol.source.json_schema import schema  # noqa: PLC0415
+    from study_app.protocol.json_schema import schema  # noqa: PLC0415
 
     brightness()
     schema()
@@ -292,7 +292,7 @@ class MainController(QObject):
     def _designer(self) -> DesignerPlace:
         self._loading.wait()
         from study_app.app.session.playing import Playing  # noqa: PLC0415 - only once they are needed
-        from study_app.designer.place.controller import DesignerController  # noqa: PLC0415
+        from study_app.designer.controller import DesignerController  # noqa: PLC0415
 
         self.designer = DesignerController(self.results)
         self.playing = Playing(self.designer)

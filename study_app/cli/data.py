@@ -54,7 +54,7 @@ def export(
     """
     if validator is not None and not psych_ds:
         raise click.UsageError("--validator checks the folder that --psych-ds writes: give both")
-    from study_app.analysis.export.export import export as export_study
+    from study_app.analysis.export_study import export as export_study
     from study_app.analysis.export.table_files import Extra
 
     asked: dict[Extra, bool] = {"wide": wide, "parquet": parquet, "sav": sav, "psych-ds": psych_ds}
@@ -93,7 +93,7 @@ def _validate(validator: Path, to: Path) -> None:
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def plot(results: Path, to: Path) -> None:
     """Draw the responses, with codes for conditions until the study is unblinded, then with names."""
-    from study_app.analysis.figures.study_figures import plot as plot_study
+    from study_app.analysis.report.study_figures import plot as plot_study
 
     with progress() as show:
         show("drawing the responses")
@@ -128,7 +128,7 @@ def unblind(results: Path, by: str, reason: str) -> None:
 
     In a merged study the key of each site is opened; for one site name its folder, such as pooled/sites/A.
     """
-    from study_app.store.blinded.unblinding import unblind_folder
+    from study_app.store.unblinding import unblind_folder
     from study_app.store.exclusions import named
 
     for prefix, found in unblind_folder(results, by=by, reason=reason).items():
@@ -154,7 +154,7 @@ def exclude(results: Path, participant: str, session: int, trial: int | None, by
     """Exclude a session or a trial from the analysis, with a reason; nothing is deleted."""
     from study_app.store.exclusions import exclude as exclude_from
     from study_app.store.exclusions import named
-    from study_app.store.sites.merged import own_place
+    from study_app.store.merged import own_place
 
     new = exclude_from(*own_place(results, participant), session, trial=trial, by=by, reason=reason)
     click.echo(named(replace(new, participant=participant)))
@@ -162,7 +162,7 @@ def exclude(results: Path, participant: str, session: int, trial: int | None, by
 
 
 def _warn_if_opened(results: Path) -> None:
-    from study_app.store.blinded.unblinding import all_opened
+    from study_app.store.unblinding import all_opened
 
     if all_opened(results):
         click.echo("warning: the key is open; the report states that this was decided afterwards", err=True)
@@ -179,7 +179,7 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
     """Reverse an exclusion: the session or trial counts again; name, time and reason are recorded."""
     from study_app.store.exclusions import include as include_in
     from study_app.store.exclusions import named
-    from study_app.store.sites.merged import own_place
+    from study_app.store.merged import own_place
 
     taken = include_in(*own_place(results, participant), session, trial=trial, by=by, reason=reason)
     click.echo(f"counts again: {named(replace(taken, participant=participant))}")
@@ -201,7 +201,7 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
     """Erase the data of a participant; date, operator, reason and checksums remain."""
     from study_app.store.checksums import checked_line
-    from study_app.store.sites.merged import own_place
+    from study_app.store.merged import own_place
     from study_app.store.withdrawals import proof_of_withdrawal
     from study_app.store.withdrawals import withdraw as withdraw_from
 

@@ -36,7 +36,7 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
     Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz differs).
     """
     from study_app import api
-    from study_app.store.tables import csv_files
+    from study_app.store import csv_files
 
     table = api.simulate_force(scene, liquid, path, **_values(changes))
     csv_files.write_columns(to, table)

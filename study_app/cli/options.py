@@ -170,7 +170,7 @@ def session_at(named: str, results: Path | None) -> Path:
 
     With ``results``, a study's folder, the name is PARTICIPANT/NUMBER.
     """
-    from study_app.store.sites.merged import session_in
+    from study_app.store.merged import session_in
     from study_app.workspace import workspace
 
     path = Path(named)

@@ -53,7 +53,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
     if schema:
         import json
 
-        from study_app.protocol.source.json_schema import editor_schema
+        from study_app.protocol.json_schema import editor_schema
         from study_app.store.journals.journal_events import journal_schema
 
         printed = editor_schema() if schema == "protocol" else journal_schema()
@@ -244,7 +244,7 @@ def studies() -> None:
     """List the known protocols and the studies in the workspace."""
     from study_app.errors import ProtocolError, StoreError
     from study_app.protocol.load import at_hand, is_scene_file, load
-    from study_app.store.sites.merged import folders_of, sessions_in
+    from study_app.store.merged import folders_of, sessions_in
     from study_app.store.workstation import recent_protocols
     from study_app.workspace import workspace as workspace_here
 
@@ -277,7 +277,7 @@ def studies() -> None:
 def sessions(named: str | None, results: Path | None) -> None:
     """List the sessions of a study, or of every study in the workspace, with the names that commands accept."""
     from study_app.errors import StoreError
-    from study_app.store.sites.merged import all_exclusions, session_in
+    from study_app.store.merged import all_exclusions, session_in
     from study_app.store.tables.study_files import participants_of
     from study_app.workspace import workspace as workspace_here
 

@@ -48,7 +48,7 @@ from study_app.designer.document.elements import (
 from study_app.designer.document.fields import label_of, languages_of, node_at, rows, singular, tags
 from study_app.designer.document.steps import AddElement, AddInstrument
 from study_app.designer.document.study import Study
-from study_app.designer.place.segments import dense
+from study_app.designer.parts import dense
 from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key
 from study_app.gui.theme.icons import draw_icon, icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font

@@ -15,7 +15,7 @@ from study_app.designer.document.elements import FIRST, element_of, kind_and_tit
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.study import Study
 from study_app.designer.outline import icon_of
-from study_app.designer.place.segments import Segments, small_button
+from study_app.designer.parts import Segments, small_button
 from study_app.gui.kit.commands import key_cap, tip
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Coloured, replace_inside

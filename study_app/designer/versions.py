@@ -17,11 +17,11 @@ from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget
 from study_app.designer.document.document import Document, Standing
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import shown
-from study_app.designer.place.editing import Editing
-from study_app.designer.place.file import Colours
-from study_app.designer.place.prompts import ConfirmCard, Prompt
-from study_app.designer.place.segments import dense, small_button
-from study_app.designer.place.view import DesignerPlace, PanePage
+from study_app.designer.editing import Editing
+from study_app.designer.file import Colours
+from study_app.designer.prompts import ConfirmCard, Prompt
+from study_app.designer.parts import dense, small_button
+from study_app.designer.window import DesignerPlace, PanePage
 from study_app.designer.version_rows import FILE, Comparison, VersionChip, counts, version_chip, version_choices
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Theme, font

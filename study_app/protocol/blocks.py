@@ -6,7 +6,7 @@ from pydantic import Field, StringConstraints, model_validator
 
 from study_app.haptics.model.ranges import later, within
 from study_app.ids import MAX_ID
-from study_app.protocol.orders.sequences import Constraint
+from study_app.protocol.sequences import Constraint
 from study_app.protocol.table import Id, Localised, Table, invalid
 
 Phase: TypeAlias = Literal["main", "practice", "baseline"]

@@ -27,7 +27,7 @@ from study_app.protocol.source.files import (
     shipped,
     source_bytes,
 )
-from study_app.protocol.source.json_schema import schema
+from study_app.protocol.json_schema import schema
 from study_app.protocol.source.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
 

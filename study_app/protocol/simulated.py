@@ -33,9 +33,9 @@ from study_app.protocol.questions import POINTS
 from study_app.protocol.streams import Draw, Key, draw_secret, stream
 from study_app.protocol.trials.designs import Design, ForcedChoice, Rated
 from study_app.protocol.trials.methods import TrialResult
-from study_app.protocol.trials.presentation import arrangement_text, next_level, trial_result
+from study_app.protocol.presented.presentation import arrangement_text, next_level, trial_result
 from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK, Stimulated
-from study_app.protocol.trials.tracks import design_of, stimulus_of
+from study_app.protocol.tracks import design_of, stimulus_of
 from study_app.psychophysics.families import Floats
 from study_app.psychophysics.people import ASSUMED, UNIFORM, Person, drawn, normal
 

@@ -18,7 +18,7 @@ from study_app.outlets.session_outlets import Outlets, OutletStatus
 from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, stream
-from study_app.protocol.orders.sequences import enrolment
+from study_app.protocol.sequences import enrolment
 from study_app.protocol.source.files import find
 from study_app.session.preflight import Masking, Measurements, Screen
 from study_app.session.resume import find_protocol, source_to_resume

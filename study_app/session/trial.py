@@ -299,7 +299,7 @@ class RunningTrial:
         return self._servo.now_ns() if self._tracker.end_ns is None else self._tracker.end_ns
 
     def summary(self) -> dict[str, Any]:
-        """Return what its row records until now (``store.tables.columns``)."""
+        """Return what its row records until now (``store.columns``)."""
         dropped = 0 if self._serial is None else self._reader.dropped - self._dropped_before
         measured = {
             **sample_columns(self._samples, self._servo.rate_hz, dropped, self._servo.worst_gap_s),

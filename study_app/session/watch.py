@@ -19,7 +19,7 @@ from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.streams import group_of
-from study_app.protocol.trials.tracks import design_of
+from study_app.protocol.tracks import design_of
 from study_app.session.pages import Interval, TaskPage
 from study_app.session.tasks import TankView, Tracker, track
 from study_app.session.transitions.page_builder import task_page

@@ -13,7 +13,7 @@ import numpy as np
 
 from study_app.haptics.model.layout import FORCE_STEP_N, LIMITER_GLITCH, LIMITER_NORM, LIMITER_SATURATED, SAMPLE
 from study_app.protocol.model import Limits, Protocol
-from study_app.protocol.trials.presentation import Presentation, presented_condition
+from study_app.protocol.presented.presentation import Presentation, presented_condition
 from study_app.protocol.trials.stimuli import DELAY, DELAYS, FORCE_DELAY, OF_CONDITION, Stimulated
 from study_app.protocol.trials.tasks import AnyTask, Follow
 from study_app.psychophysics.delivery import Times, Vectors, at, damping, difference, lag, motion, share

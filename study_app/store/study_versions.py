@@ -11,7 +11,7 @@ from typing import Final, Literal, TypeAlias
 
 from study_app.errors import StoreError
 from study_app.store.atomic import append_line, make_folder, parse_json, read_if_there, sweep_old, write_file
-from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.folder_lock import open_alone
 from study_app.user_folder import data_folder
 
 Origin: TypeAlias = Literal["saved", "found", "draft"]

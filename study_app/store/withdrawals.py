@@ -37,8 +37,8 @@ from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, read
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import holds
 from study_app.store.output_files import Output, erase_outputs
-from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
-from study_app.store.sites.merged import merged_above
+from study_app.store.folder_lock import open_alone, refuse_if_open
+from study_app.store.merged import merged_above
 from study_app.store.tables.study_files import described_study, write_participants
 from study_app.workspace import workspace
 

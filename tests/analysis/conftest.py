@@ -17,8 +17,8 @@ from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
 from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.tables.columns import RESPONSES, TRIALS
-from study_app.store.tables.csv_files import Column, csv_bytes
+from study_app.store.columns import RESPONSES, TRIALS
+from study_app.store.csv_files import Column, csv_bytes
 
 SMALL = (Path(__file__).parent / "small.toml").read_text(encoding="utf-8")
 """A study with repetitions, an optional item, an answer off the scale and questions in practice."""
@@ -212,6 +212,6 @@ HIDDEN = ("zembla", "quorn", "1013.7", "877.3")
 @pytest.fixture
 def figures_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw PNG alone, which the page holds: every form is drawn anew, by the same code."""
-    from study_app.analysis.figures.study_figures import pictures
+    from study_app.analysis.report.study_figures import pictures
 
     monkeypatch.setattr("study_app.analysis.report.write_report.pictures", partial(pictures, forms=("png",)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.figures.study_figures import pictures
+from study_app.analysis.report.study_figures import pictures
 from study_app.analysis.findings import all_findings
 from study_app.analysis.report import sections
 from study_app.analysis.report.sections import answers, block, first_page, methods

@@ -21,7 +21,7 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from tests.analysis.made_up import ITEMS, everybody, liquids, study
 from tests.analysis.power.test_power import felt_in
 from tests.studies import quick_pdfs

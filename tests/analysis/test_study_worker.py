@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.export.export import export
+from study_app.analysis.export_study import export
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_messages import (
     AnalysisClient,

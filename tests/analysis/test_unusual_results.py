@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis.data.study_tables import load_study
-from study_app.analysis.export.export import export
+from study_app.analysis.export_study import export
 from study_app.protocol.load import load, parse
 from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.blinded.unblinding import unblind, unblind_folder
+from study_app.store.unblinding import unblind, unblind_folder
 from study_app.store.sites.merge import merge
 from tests.analysis.conftest import CANNOT_JUDGE, SMALL, Results, make_results
 from tests.analysis.levels.level_studies import ADAPTIVE, matching_file

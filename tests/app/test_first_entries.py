@@ -30,7 +30,7 @@ def test_a_study_that_was_asked_for_opens_at_the_first_visit(visit: MainControll
 
 
 @pytest.mark.parametrize(
-    ("name", "controller"), [("lab", "app.lab_controller.Lab"), ("designer", "designer.place.controller.Designer")]
+    ("name", "controller"), [("lab", "app.lab_controller.Lab"), ("designer", "designer.controller.Designer")]
 )
 def test_a_place_that_cannot_be_made_is_said_and_a_second_visit_tries_again(
     visit: MainController, qtbot: Any, monkeypatch: pytest.MonkeyPatch, name: str, controller: str

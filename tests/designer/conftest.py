@@ -27,20 +27,20 @@ def designer(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
 @pytest.fixture
 def record(designer: Designer, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Record]:
     """Return what begins a record: the participant's page stands still, typing is one step, and drafts are due."""
-    for module in ("document.document", "place.editing", "participant.preview"):
+    for module in ("document.document", "editing", "participant.preview"):
         monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
-    monkeypatch.setattr("study_app.designer.place.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
+    monkeypatch.setattr("study_app.designer.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
     for timer in (
-        "place.saving.DRAFT",
+        "saving.DRAFT",
         "form.fields.HAND_ON",
         "form.fields.CLICK",
-        "place.file.HAND_ON",
+        "file.HAND_ON",
         "problems.REST",
     ):
         monkeypatch.setattr(f"study_app.designer.{timer}_MS", NEVER_MS)  # each is let go by the record, after an act
     spoken: list[str] = []
-    for module in ("header", "view"):
-        monkeypatch.setattr(f"study_app.designer.place.{module}.say", lambda _by, words: spoken.append(words))
+    for module in ("header", "window"):
+        monkeypatch.setattr(f"study_app.designer.{module}.say", lambda _by, words: spoken.append(words))
     return partial(Record, designer, spoken)
 
 

@@ -44,7 +44,7 @@ import sys, time
 from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from study_app.designer.place.controller import DesignerController
+from study_app.designer.controller import DesignerController
 from study_app.gui.application import application_here
 
 application = application_here()

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.main_controller import MainController
 from study_app.designer.document.steps import SetValue
-from study_app.designer.place.controller import DesignerController
+from study_app.designer.controller import DesignerController
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.study_versions import kept_content, kept_versions
@@ -77,7 +77,7 @@ OTHER = """
 import sys
 from pathlib import Path
 from PySide6.QtTest import QTest
-from study_app.designer.place.controller import DesignerController
+from study_app.designer.controller import DesignerController
 from study_app.gui.application import application_here
 from study_app.designer.document.steps import SetText
 application = application_here()

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from study_app.analysis.export.export import export
+from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
 from study_app.protocol.model import Protocol
@@ -17,7 +17,7 @@ from study_app.session.simulated.answers_only import DEVICE, Answering, Kept, Si
 from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.session.transitions.table import open_session
 from study_app.store.blinded.allocation import session_protocol
-from study_app.store.blinded.unblinding import unblind_folder
+from study_app.store.unblinding import unblind_folder
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock

@@ -28,7 +28,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.source.files import source_bytes
 from study_app.protocol.trials.tasks import Explore
-from study_app.protocol.wording.without_force import without_force
+from study_app.protocol.without_force import without_force
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.transitions.events import (
     Begin,

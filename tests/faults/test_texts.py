@@ -11,7 +11,7 @@ from study_app.session.transitions.events import EndRequested, Note, RepeatReque
 from study_app.session.transitions.state import Phase
 from study_app.store.exclusions import exclude, exclusions
 from study_app.store.journals import journal
-from study_app.store.tables.csv_files import unguarded
+from study_app.store.csv_files import unguarded
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.worlds import StoredWorld
 from tests.journal_lines import raw

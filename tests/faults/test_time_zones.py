@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QLocale
 
-from study_app.analysis.export.export import export
+from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify
 from tests.studies import rehearsed
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from study_app.store.exclusions import exclude, include
 from study_app.store.progress import Progress
 from study_app.store.verification.verify_study import verify

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 
 from study_app import __version__
-from study_app.analysis.export.export import export
+from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.session.replay import replay
 from study_app.session.simulated import rehearsal
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.recovery import rebuild

@@ -55,13 +55,13 @@ from study_app.protocol.model import Contrast
 from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.unblinding import all_opened, decided_late
+from study_app.store.unblinding import all_opened, decided_late
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.sessions.folder_lock import never_begun
+from study_app.store.folder_lock import never_begun
 from study_app.store.sessions.open_session import Place
-from study_app.store.sites.merged import DASH, Merged, read_merged
-from study_app.store.tables.columns import INTERVALS, SEALED
+from study_app.store.merged import DASH, Merged, read_merged
+from study_app.store.columns import INTERVALS, SEALED
 from study_app.store.tables.study_files import has_intervals
 from study_app.store.verification.verify_session import Discrepancy, doubts
 from study_app.store.withdrawals import tombstones
@@ -149,7 +149,7 @@ _TRIAL: Final = ["participant", "session", "trial"]
 class Study:
     """All sessions of one study.
 
-    ``responses`` and ``trials`` have the columns of ``store.tables.columns``, with ``session_status``, ``excluded``,
+    ``responses`` and ``trials`` have the columns of ``store.columns``, with ``session_status``, ``excluded``,
     ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three. ``blocks``
     are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
     the key is sealed; ``exclusions`` is what was decided to leave out, ``late`` what of it a person decided or
@@ -304,7 +304,7 @@ class Study:
 def load_study(folder: Path) -> Study:
     """Read the results of a study.
 
-    A merged study (see `store.sites.merged`) is sealed until the key of every site was opened.
+    A merged study (see `store.merged`) is sealed until the key of every site was opened.
 
     Raises
     ------

@@ -17,8 +17,8 @@ from study_app.protocol.table import text_in
 from study_app.store.atomic import cause, open_regular
 from study_app.store.blinded.blinding import revealed_key
 from study_app.store.output_files import FileCopy
-from study_app.store.sites.merged import read_merged
-from study_app.store.tables.csv_files import Column
+from study_app.store.merged import read_merged
+from study_app.store.csv_files import Column
 
 
 class Materials(NamedTuple):

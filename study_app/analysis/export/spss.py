@@ -21,7 +21,7 @@ from study_app.analysis.data.blocks import PlacedScore
 from study_app.analysis.data.measures import LEVELS
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.tables import Cells, Delivered, QuestionCells
-from study_app.store.tables.csv_files import Column
+from study_app.store.csv_files import Column
 
 EXCLUDED: Final = 97
 CANNOT_JUDGE: Final = 98

@@ -24,7 +24,7 @@ from study_app import figure_style as style
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import COUNT_COLUMNS, LEVELS, NEUTRAL, QUARTILES, Array, by_participant, quartiles
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, Style, picture_of
+from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, Style, picture_of
 from study_app.analysis.statistics.thresholds import Threshold
 from study_app.errors import AnalysisError
 from study_app.number_text import counted

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import published_words
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.page_layout import (
+from study_app.analysis.page_layout import (
     MARGIN_PT,
     SMALL,
     Look,

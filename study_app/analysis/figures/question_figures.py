@@ -12,7 +12,7 @@ from matplotlib.colors import LinearSegmentedColormap, to_hex
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import PlacedQuestion
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.page_layout import (
+from study_app.analysis.page_layout import (
     MARGIN_PT,
     SMALL,
     Look,

@@ -13,13 +13,13 @@ import pandas as pd
 from study_app.analysis.data.blocks import KINDS, Block, Decided, Kind
 from study_app.analysis.data.measures import Array, medians, presentations
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.page_layout import Drawing, Picture
-from study_app.analysis.report.html_page import drawn
+from study_app.analysis.page_layout import Drawing, Picture
+from study_app.analysis.html_page import drawn
 from study_app.analysis.results import BlockResult, Failure, Failures, NotTested, Results, Tested, Verdict
 from study_app.analysis.statistics.outcome import DRAWS, Outcome, draws_for, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import DRAWN_UP_TO
 from study_app.errors import StudyError
-from study_app.store.tables.csv_files import Column, optional
+from study_app.store.csv_files import Column, optional
 
 T = TypeVar("T")
 U = TypeVar("U")
@@ -425,7 +425,7 @@ class Finding(Generic[R]):
         return ()
 
     def section(self) -> Iterable[str]:
-        """Return its part of the report's section of the block, of `analysis.report.html_page`; text is escaped."""
+        """Return its part of the report's section of the block, of `analysis.html_page`; text is escaped."""
         return ()
 
     def limits(self) -> Iterable[str]:

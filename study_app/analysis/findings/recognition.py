@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.figures.page_layout import Drawing, Picture
+from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.findings.finding import (
     FOUND,
     NO_EVIDENCE,
@@ -21,7 +21,7 @@ from study_app.analysis.findings.finding import (
     test_row,
 )
 from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer
-from study_app.analysis.report.html_page import heading, paragraph, table_of
+from study_app.analysis.html_page import heading, paragraph, table_of
 from study_app.analysis.results import (
     BlockResult,
     NotTested,

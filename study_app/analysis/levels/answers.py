@@ -30,7 +30,7 @@ from study_app.analysis.levels.statistic import (
     unit,
     with_unit,
 )
-from study_app.analysis.report.html_page import drawn, paragraph, table, table_of
+from study_app.analysis.html_page import drawn, paragraph, table, table_of
 from study_app.analysis.results import LevelsResult, Summary, listed
 from study_app.analysis.statistics.outcome import Array, clopper_pearson, student_interval
 from study_app.protocol.trials.designs import Reply

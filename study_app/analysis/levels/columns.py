@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 from study_app.store.tables.column_dictionary import table_markdown
-from study_app.store.tables.columns import INTERVALS, PARTICIPANTS
-from study_app.store.tables.csv_files import Column, optional
+from study_app.store.columns import INTERVALS, PARTICIPANTS
+from study_app.store.csv_files import Column, optional
 
 _STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
 

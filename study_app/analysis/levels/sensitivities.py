@@ -24,7 +24,7 @@ from study_app.analysis.levels.statistic import (
 )
 from study_app.analysis.levels.thresholds import Exponents, Thresholds
 from study_app.analysis.results import LevelsResult, listed, number
-from study_app.protocol.trials.presentation import arrangement_of
+from study_app.protocol.presented.presentation import arrangement_of
 from study_app.psychophysics.detection import Sensitivity, rating
 from study_app.psychophysics.grid import Z_95
 

@@ -23,7 +23,7 @@ from study_app import __version__
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import TRENDS
 from study_app.analysis.data.measures import Array
-from study_app.analysis.figures.page_layout import SMALL, Style
+from study_app.analysis.page_layout import SMALL, Style
 from study_app.analysis.planning.simulated_studies import (
     EFFECTS,
     FULL,
@@ -40,7 +40,7 @@ from study_app.analysis.results import enough
 from study_app.protocol.model import Contrast
 from study_app.psychophysics.grid import Z_95
 from study_app.store.output_files import write_files
-from study_app.store.tables.csv_files import Column, csv_bytes, optional
+from study_app.store.csv_files import Column, csv_bytes, optional
 
 Question: TypeAlias = Literal["settings differ", "trend", "lowest delay", "equivalence", "contrast"]
 

@@ -31,9 +31,9 @@ from study_app.protocol.checks.expected_precision import (
 )
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.table import text_in
-from study_app.protocol.trials.tracks import stimulus_of, tracks_of
+from study_app.protocol.tracks import stimulus_of, tracks_of
 from study_app.psychophysics.people import BETWEEN_PEOPLE, ESTIMATE_NOISE, Estimates, Person
-from study_app.store.tables.csv_files import Column, csv_bytes, optional
+from study_app.store.csv_files import Column, csv_bytes, optional
 
 BATCH: Final = 10
 """Studies of one case; which studies these are does not depend on how many are asked for."""

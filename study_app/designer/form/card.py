@@ -43,7 +43,7 @@ from study_app.designer.form.special import (
     Panel,
     QuestionRows,
 )
-from study_app.designer.place.segments import FIELD_PX, Segments, cut_text, small_button
+from study_app.designer.parts import FIELD_PX, Segments, cut_text, small_button
 from study_app.designer.problems import ProblemRow, RepairButton
 from study_app.gui.kit.commands import tip, with_key
 from study_app.gui.theme.icons import draw_icon

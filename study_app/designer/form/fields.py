@@ -20,7 +20,7 @@ from study_app.designer.document.fields import Row
 from study_app.designer.document.steps import AddNamed, Do, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
 from study_app.designer.document.study import Study
 from study_app.designer.form.rows import STATEMENT, FormRow, choice_words, is_right_to_left, new_words
-from study_app.designer.place.segments import FIELD_PX, Segments, cut_text, dense, small_button
+from study_app.designer.parts import FIELD_PX, Segments, cut_text, dense, small_button
 from study_app.gui.kit.commands import keys_of, with_key
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed

@@ -27,7 +27,7 @@ from study_app.designer.form.fields import Field, SpecialEditor, TypedLine, add_
 from study_app.designer.form.rows import FormRow, new_words
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.study_facts import valid_part
-from study_app.designer.place.segments import FIELD_PX, cut_text, dense
+from study_app.designer.parts import FIELD_PX, cut_text, dense
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.themed import name_bars
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox

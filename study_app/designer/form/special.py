@@ -29,7 +29,7 @@ from study_app.designer.form.fields import (
 from study_app.designer.form.rows import FormRow, QuestionLine, is_right_to_left, question_lines
 from study_app.designer.measures.cards import Verdict
 from study_app.designer.measures.study_facts import valid_part
-from study_app.designer.place.segments import FIELD_PX, dense, small_button
+from study_app.designer.parts import FIELD_PX, dense, small_button
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed, remove_widget
@@ -41,7 +41,7 @@ from study_app.number_text import capitalised, number_of
 from study_app.protocol import questions
 from study_app.protocol.model import OF_LEVELS
 from study_app.protocol.orders.balance import block_order_words
-from study_app.protocol.orders.sequences import borders_even, row_count
+from study_app.protocol.sequences import borders_even, row_count
 from study_app.protocol.source.document import entries, names, value_at
 from study_app.protocol.trials import designs, tasks
 from study_app.protocol.wording.languages import language_name

@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
-from study_app.designer.place.segments import cut_text
+from study_app.designer.parts import cut_text
 from study_app.gui.theme.theme import Tone, font
 from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox

@@ -12,7 +12,7 @@ from study_app.designer.measures.cards import UNKNOWN, CardGrid, NumbersRow, Ver
 from study_app.designer.measures.levels import LevelBlock, LevelWords, rounded
 from study_app.designer.measures.measures_view import FAILED, NO_FORCES, MeasuresView
 from study_app.designer.measures.simulation import Controls
-from study_app.designer.place.segments import cut_text, small_button
+from study_app.designer.parts import cut_text, small_button
 from study_app.designer.problems import ProblemRow
 from study_app.gui.theme.theme import Tone
 from study_app.gui.theme.themed import Themed

@@ -23,7 +23,7 @@ from study_app.designer.measures.simulation import Observed
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.live_plots import Floats, Plot, pen
-from study_app.protocol.trials.presented_levels import Level, standard_of
+from study_app.protocol.presented.presented_levels import Level, standard_of
 
 BARS = 0.14  # of the height, for how often each level is asked
 SYMBOLS = ("o", "t1", "s", "d")

@@ -52,9 +52,9 @@ from study_app.designer.participant.playable import (
     step_name,
     step_words,
 )
-from study_app.designer.place.editing import Editing
-from study_app.designer.place.segments import Segments, dense
-from study_app.designer.place.view import DesignerPlace, PanePage
+from study_app.designer.editing import Editing
+from study_app.designer.parts import Segments, dense
+from study_app.designer.window import DesignerPlace, PanePage
 from study_app.gui.display.screens import choose_screens
 from study_app.gui.kit.commands import add_commands, tip
 from study_app.gui.kit.devices import screen_number, settings_here, text_scale_on

@@ -58,7 +58,7 @@ from study_app.gui.widgets.main_view import Place
 from study_app.number_text import counted
 from study_app.store.exclusions import Exclusion
 from study_app.store.folders import StudyFolder
-from study_app.store.sites.merged import FOLDER, folders_of
+from study_app.store.merged import FOLDER, folders_of
 from study_app.workers.server import Crashed, Refused
 
 WIDTH, QUESTION_PX = 600, 560

@@ -20,9 +20,9 @@ from study_app.protocol.source.problems import Fault, unknown
 from study_app.protocol.table import Table
 from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from study_app.protocol.trials.methods import KINDS as METHOD_KINDS
-from study_app.protocol.trials.presentation import scene_of
+from study_app.protocol.presented.presentation import scene_of
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated, Stimulus, rises
-from study_app.protocol.trials.tracks import (
+from study_app.protocol.tracks import (
     condition_of,
     design_of,
     has_correct_answer,

@@ -22,9 +22,9 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.designs import Design, Rated
 from study_app.protocol.trials.methods import Method, TrackSetting
-from study_app.protocol.trials.presented_levels import Clipping, clipping
+from study_app.protocol.presented.presented_levels import Clipping, clipping
 from study_app.protocol.trials.stimuli import Stimulus, analysis_grid, guesses_of, rises
-from study_app.protocol.trials.tracks import (
+from study_app.protocol.tracks import (
     design_of,
     has_correct_answer,
     method_of,

@@ -24,8 +24,8 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol, Reach
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.problems import Fault
-from study_app.protocol.trials.presentation import scene_of
-from study_app.protocol.trials.presented_levels import (
+from study_app.protocol.presented.presentation import scene_of
+from study_app.protocol.presented.presented_levels import (
     FASTER,
     UNPACED_MPS,
     Level,
@@ -37,7 +37,7 @@ from study_app.protocol.trials.presented_levels import (
 )
 from study_app.protocol.trials.stimuli import OF_LINK, Stimulated, Stimulus
 from study_app.protocol.trials.tasks import Stroke
-from study_app.protocol.trials.tracks import condition_of, standards_of, stimulus_of
+from study_app.protocol.tracks import condition_of, standards_of, stimulus_of
 
 LEAST_SHARE: Final = 0.99
 """Of a damper, that the velocity estimator must pass."""

@@ -18,7 +18,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import CodeOrder, Orders, orders_of
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import blocks_in_order, codes_of
-from study_app.protocol.orders.sequences import borders_even, enrolment, longest_run, row_count, shortest_distance
+from study_app.protocol.sequences import borders_even, enrolment, longest_run, row_count, shortest_distance
 from study_app.protocol.streams import draw_secret, group_of, stream
 
 Table: TypeAlias = tuple[tuple[int, ...], ...]

@@ -10,7 +10,7 @@ from study_app.protocol.blocks import Block, Order, OrderOfBlocks, Phase
 from study_app.protocol.groups import Group, every_step, follows
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.trials.methods import TrackOrder
-from study_app.protocol.trials.tracks import method_of, tracks_of
+from study_app.protocol.tracks import method_of, tracks_of
 
 CodeOrder: TypeAlias = Literal[Order, TrackOrder]
 """How the codes of a block are ordered: conditions, or the tracks of a design."""

@@ -31,9 +31,9 @@ from typing import TypeAlias
 from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, FormOrder, Orders, block_codes, orders_of
-from study_app.protocol.orders.sequences import Constraint, arrange, assigned_row, row, row_count
+from study_app.protocol.sequences import Constraint, arrange, assigned_row, row, row_count
 from study_app.protocol.streams import Draw, shuffle, stream
-from study_app.protocol.trials.tracks import tracks_of
+from study_app.protocol.tracks import tracks_of
 
 __all__ = [
     "FormStep",

@@ -14,7 +14,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, stream
 from study_app.protocol.questions import Value, plain_number
 from study_app.protocol.simulated import Comparison, Course, Observer, TrialFeatures, courses_of, observer_of, rater
-from study_app.protocol.trials.tracks import design_of
+from study_app.protocol.tracks import design_of
 from study_app.session.pages import ChoicePage, DesignPage, Page, QuestionnairePage
 from study_app.session.simulated.observers import Choice, Draw, choices, filled_in, newly_shown
 from study_app.session.transitions.events import Chosen, Event, ItemShown, Submitted

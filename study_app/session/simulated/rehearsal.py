@@ -35,7 +35,7 @@ from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, 
 from study_app.protocol.questions import Value, shown
 from study_app.protocol.simulated import NO_FEATURES, Comparison, Observer, TrialFeatures
 from study_app.protocol.streams import Key as LevelKey
-from study_app.protocol.trials.presentation import delays_force, next_level
+from study_app.protocol.presented.presentation import delays_force, next_level
 from study_app.session.pages import (
     DesignPage,
     FeedbackPage,

@@ -146,7 +146,7 @@ class LanguageChosen(Event):
 
 @dataclass(frozen=True, slots=True)
 class TaskDone(Event):
-    """The task of the running trial is over; ``summary`` is what its row records (see ``store.tables.columns``).
+    """The task of the running trial is over; ``summary`` is what its row records (see ``store.columns``).
 
     ``invalid`` names the limits that an interval breaks, so that it was not delivered as requested.
     """

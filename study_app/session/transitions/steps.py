@@ -6,7 +6,7 @@ from typing import Any, Final, TypeAlias
 from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
 from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial
-from study_app.protocol.trials.presentation import (
+from study_app.protocol.presented.presentation import (
     Presentation,
     arrangement_text,
     criterion_met,

@@ -40,7 +40,7 @@ from study_app.store.blinded.sealing import open_text, seal
 from study_app.store.folders import SessionFolder, StudyFolder, readable
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
-from study_app.store.tables.columns import SEALED
+from study_app.store.columns import SEALED
 
 Codes: TypeAlias = dict[str, dict[str, str]]
 NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})

@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar, TypeAlias, dataclass_transform, get
 
 from study_app.errors import StoreError
 from study_app.store.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
-from study_app.store.tables.columns import DELIVERED, TRIALS, VIDEO
+from study_app.store.columns import DELIVERED, TRIALS, VIDEO
 
 SHOWN = 200  # characters of a bad value shown in messages
 

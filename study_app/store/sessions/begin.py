@@ -25,7 +25,7 @@ from study_app.store.journals import journal
 from study_app.store.journals.journal import FORMAT, Journal, SessionClock
 from study_app.store.journals.journal_events import Allocated, SessionStarted, start_of
 from study_app.store.recorder import Recorder
-from study_app.store.sessions.folder_lock import Opening, abandoned, create_opened, sweep_claims, take_over
+from study_app.store.folder_lock import Opening, abandoned, create_opened, sweep_claims, take_over
 from study_app.store.sessions.open_session import Place, SessionStore
 from study_app.store.tables.study_files import check_study, write_description, write_participants
 from study_app.store.withdrawals import tombstones

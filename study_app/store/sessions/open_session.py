@@ -26,8 +26,9 @@ from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Journal
 from study_app.store.recorder import LEAVING_S, Kept, Recorder
-from study_app.store.sessions.folder_lock import Opening
-from study_app.store.tables import csv_files, session_tables
+from study_app.store.folder_lock import Opening
+from study_app.store import csv_files
+from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import write_participants
 
 

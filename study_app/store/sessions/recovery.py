@@ -40,9 +40,9 @@ from study_app.store.journals.journal import Contents, Journal, SessionClock
 from study_app.store.progress import Progress, progress_of, recordable
 from study_app.store.recorder import lost, recorded, recording_files
 from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, surroundings
-from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
+from study_app.store.folder_lock import open_alone, refuse_if_open
 from study_app.store.sessions.open_session import Place, SessionStore, table_files
-from study_app.store.sites.merged import refuse_merged
+from study_app.store.merged import refuse_merged
 from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import write_description, write_participants
 

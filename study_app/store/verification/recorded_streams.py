@@ -21,7 +21,7 @@ from study_app.outlets.markers import marker_of
 from study_app.outlets.streams import MARKERS, SAMPLES, TICKS
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sites.merged import read_merged
+from study_app.store.merged import read_merged
 from study_app.store.verification.verify_session import Finding, Findings
 
 RESET_S: Final = 1.0

@@ -30,11 +30,11 @@ from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Contents
 from study_app.store.progress import Progress, named, progress_of, recordable
 from study_app.store.recorder import recording_files
-from study_app.store.sessions.folder_lock import is_open, never_begun
+from study_app.store.folder_lock import is_open, never_begun
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.sessions.recovery import RESTORE, beyond
-from study_app.store.tables import csv_files
-from study_app.store.tables.csv_files import Column
+from study_app.store import csv_files
+from study_app.store.csv_files import Column
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import opened_or_none, row_from
 

@@ -28,13 +28,13 @@ from study_app.store.blinded.blinding import Key, opened, sealed_hash, whole_pro
 from study_app.store.checksums import Proofs, checked_line, listed, place_of, unreadable
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.sessions.folder_lock import is_open
+from study_app.store.folder_lock import is_open
 from study_app.store.sessions.open_session import Place
 from study_app.store.sites.merge import unlisted
-from study_app.store.sites.merged import Merged, Site, read_merged
+from study_app.store.merged import Merged, Site, read_merged
 from study_app.store.study_runs import run_of
-from study_app.store.tables import csv_files
-from study_app.store.tables.columns import EXCLUSIONS
+from study_app.store import csv_files
+from study_app.store.columns import EXCLUSIONS
 from study_app.store.tables.study_files import (
     columns_of,
     described_study,

@@ -16,7 +16,7 @@ from study_app.analysis.report.sections import answers
 from study_app.analysis.report.write_report import report
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from tests.analysis.conftest import HIDDEN, SAMPLE, Results, twelve
 from tests.analysis.made_up import delays, everybody, liquids, study
 from tests.analysis.random_studies import drawn, keeps_contract

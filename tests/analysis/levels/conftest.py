@@ -7,7 +7,7 @@ import pytest
 
 from study_app.analysis.report.write_report import report
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from tests.analysis.levels.level_studies import ADAPTIVE, levels_file
 from tests.protocol.trials.level_studies import text_of_damper
 from tests.studies import made_up, once, quick_pdfs

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis.data.study_tables import load_study
-from study_app.analysis.export.export import export
+from study_app.analysis.export_study import export
 from study_app.analysis.planning.preregistration import FILE, Commitment, deviations, written
 from study_app.analysis.report.write_report import report
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.blinded.unblinding import unblind, unblind_folder
+from study_app.store.unblinding import unblind, unblind_folder
 from study_app.store.exclusions import exclude
 from study_app.store.sites.merge import merge
 from study_app.store.withdrawals import withdraw

@@ -12,8 +12,8 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.errors import StoreError
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
-from study_app.store.tables.columns import RESPONSES, TRIALS
-from study_app.store.tables.csv_files import csv_bytes, problems, read_table
+from study_app.store.columns import RESPONSES, TRIALS
+from study_app.store.csv_files import csv_bytes, problems, read_table
 from tests.analysis.conftest import Results, make_results
 from tests.analysis.tables.differing_answers import by_condition, refusal
 from tests.store.earlier import TRIALS_HEADER

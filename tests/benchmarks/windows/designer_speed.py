@@ -20,7 +20,7 @@ from PySide6.QtCore import QEventLoop, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit
 
-from study_app.designer.place.controller import DesignerController
+from study_app.designer.controller import DesignerController
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.widgets.main_view import Place
 from study_app.protocol.source.files import shipped_file

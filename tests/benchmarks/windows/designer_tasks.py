@@ -22,7 +22,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QPlainTextEdit
 
 from study_app.designer.document.study import read
-from study_app.designer.place.header import DesignerHeader
+from study_app.designer.header import DesignerHeader
 from study_app.designer.problems import ProblemsCard
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import shipped_file

@@ -19,7 +19,7 @@ from study_app.designer.measures.simulation import Controls, Simulated
 from study_app.designer.measures.study_facts import facts, restored_part
 from study_app.designer.outline import outline_rows
 from study_app.designer.participant.playable import NotPlayableError, playable, showing
-from study_app.designer.place.file import file_text
+from study_app.designer.file import file_text
 from study_app.designer.problems import problem_rows
 from study_app.designer.templates import FOLDER, templates
 from study_app.protocol.source.document import Path, entries, value_at

@@ -28,7 +28,7 @@ from study_app.designer.measures.simulation import (
 )
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import addable, outline_rows
-from study_app.designer.place.file import file_text
+from study_app.designer.file import file_text
 from study_app.designer.problems import problem_rows
 from study_app.protocol.source.document import Path
 from tests.designer.document.test_study_transcripts import elements, generic, studies

@@ -199,7 +199,7 @@ SCRIPT = """
 import sys
 from pathlib import Path
 from PySide6.QtWidgets import QApplication
-from study_app.designer.place.controller import DesignerController
+from study_app.designer.controller import DesignerController
 from study_app.gui.application import application_here
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.widgets.main_view import Place

@@ -14,10 +14,10 @@ import time
 from functools import partial
 from pathlib import Path
 
-from study_app.analysis.export.export import export
+from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.session.simulated import rehearsal
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from study_app.store.sessions.recovery import rebuild
 from tests.faults.support.killer import SEED, forked
 

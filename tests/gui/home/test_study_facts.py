@@ -35,7 +35,7 @@ from study_app.session.resume import REHEARSED_SCREENS
 from study_app.store.drafts import Draft, draft_files, keep
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal_events
-from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.folder_lock import open_alone
 from study_app.store.study_settings import keep_original
 from tests import studies
 from tests.golden import compare

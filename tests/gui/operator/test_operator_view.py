@@ -14,8 +14,8 @@ from study_app.protocol.load import load
 from study_app.protocol.model import Limits
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.delivered import beyond_limits
-from study_app.store.tables.columns import TRIALS
-from study_app.store.tables.csv_files import header
+from study_app.store.columns import TRIALS
+from study_app.store.csv_files import header
 from tests.golden import compare
 from tests.golden_values import changed, value_lines
 from tests.gui.operator.session import ticks

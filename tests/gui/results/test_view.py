@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel
 
 from study_app import figure_style as style
 from study_app.analysis.data.study_tables import load_study
-from study_app.analysis.figures.study_figures import plot
+from study_app.analysis.report.study_figures import plot
 from study_app.analysis.worker_messages import FigureDrawn, LeaveOut, OpenKey, TakeBack
 from study_app.gui.results.view import NO_SAV
 from study_app.gui.widgets.controls import ActionButton

@@ -16,7 +16,7 @@ from study_app.gui.theme.theme import DARK
 from study_app.protocol.load import load
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store import recordings
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from tests.compiled import needs_servo
 from tests.gui.walk import cut, dead, settle, unnamed, unreached
 from tests.protocol.trials import level_studies

@@ -8,7 +8,7 @@ from study_app.protocol.checks.force_limits import longest_ms, returned_j
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.presentation import delays_force, link_seed, scene_of
+from study_app.protocol.presented.presentation import delays_force, link_seed, scene_of
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import Stroke
 from study_app.store.verification.leaks import telltales

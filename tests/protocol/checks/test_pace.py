@@ -13,7 +13,7 @@ from study_app.haptics.runtime.offline import simulate
 from study_app.protocol.checks.force_limits import fastest_hz, passed_share
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.presented_levels import FASTER
+from study_app.protocol.presented.presented_levels import FASTER
 from study_app.protocol.trials.tasks import Follow
 from tests.haptics.scenes import UNBENT, scene
 from tests.protocol.edited_studies import text_of

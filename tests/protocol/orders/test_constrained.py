@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.orders.sequences import PROPOSALS, Constraint, arrange, longest_run, propose, shortest_distance
+from study_app.protocol.sequences import PROPOSALS, Constraint, arrange, longest_run, propose, shortest_distance
 from study_app.protocol.streams import stream
 
 Order = tuple[int, ...]

@@ -6,8 +6,8 @@ import pytest
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.methods import TrialResult
-from study_app.protocol.trials.presentation import next_level
-from study_app.protocol.trials.tracks import design_of
+from study_app.protocol.presented.presentation import next_level
+from study_app.protocol.tracks import design_of
 from tests.protocol.trials.level_studies import key_of, study
 
 CONSTANT = 'kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 8'

@@ -9,7 +9,7 @@ from study_app.errors import StudyError
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.wording.languages import LANGUAGES, words
-from study_app.protocol.wording.without_force import SENTENCES, without_force
+from study_app.protocol.without_force import SENTENCES, without_force
 
 
 def slots(text: str) -> set[str]:

@@ -10,12 +10,12 @@ from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.levels.evaluate import level_results, level_section
 from study_app.analysis.levels.tracks import tracks
 from study_app.protocol.load import parse
-from study_app.protocol.trials.presentation import presented_by
+from study_app.protocol.presented.presentation import presented_by
 from study_app.session import replay as replay_module
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import opened, read_key
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.compiled import needs_servo

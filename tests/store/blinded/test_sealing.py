@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from study_app.errors import StoreError
 from study_app.store.blinded.blinding import Key, opened, sealed
-from study_app.store.tables.columns import SEALED, TRIALS_2
+from study_app.store.columns import SEALED, TRIALS_2
 from tests.journal_lines import event_of
 
 START = event_of("session_started", n=1, participant="P007", session=1, measures_sealed=True)

@@ -17,7 +17,7 @@ from study_app.store.blinded.blinding import opened
 from study_app.store.journals import journal, journal_events
 from study_app.store.recorder import recording_files
 from study_app.store.recordings import read_samples, write_frames
-from study_app.store.sessions.folder_lock import is_open
+from study_app.store.folder_lock import is_open
 from study_app.store.sessions.open_session import SessionStore
 from tests.journal_lines import event_of
 from tests.platforms import files_up_to

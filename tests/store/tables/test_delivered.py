@@ -11,7 +11,7 @@ import pytest
 from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NORM, SAMPLE
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.presentation import Presentation
+from study_app.protocol.presented.presentation import Presentation
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store.delivered import delivered, delivered_error, judged, missed, undelivered
 from tests.golden import compare

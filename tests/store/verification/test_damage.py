@@ -15,7 +15,7 @@ from study_app.gui.sessions.session_facts import sessions
 from study_app.protocol.model import Protocol
 from study_app.store import recordings
 from study_app.store.blinded import blinding
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal import scan

@@ -13,7 +13,7 @@ from study_app.cli import commands
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.output_files import write_files

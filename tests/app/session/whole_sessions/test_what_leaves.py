@@ -22,7 +22,7 @@ from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import EndPage, QuestionnairePage, TaskPage
 from study_app.store import workstation
-from study_app.store.blinded.unblinding import unblind
+from study_app.store.unblinding import unblind
 from study_app.store.exclusions import exclude, include
 from study_app.store.folders import StudyFolder
 from study_app.store.program_log import keep_log, log_file

@@ -6,7 +6,7 @@ from types import MappingProxyType
 import numpy as np
 
 from study_app.analysis.findings.finding import Absent, BlockAnswers, Finding
-from study_app.analysis.report.html_page import heading, paragraph
+from study_app.analysis.html_page import heading, paragraph
 from study_app.analysis.results import BlockResult
 
 

@@ -1,6 +1,6 @@
 """The statistic of a grid question: the mean place, column and row."""
 
-from study_app.analysis.data.questions import Measure, counts_of_missing, given
+from study_app.analysis.questions import Measure, counts_of_missing, given
 
 
 def places(_asked, answers):

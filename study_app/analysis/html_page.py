@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from study_app.analysis.figures.page_layout import Picture
+from study_app.analysis.page_layout import Picture
 from study_app.analysis.results import Failure, Failures
 
 T = TypeVar("T")

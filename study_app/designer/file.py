@@ -26,7 +26,7 @@ from PySide6.QtWidgets import QFrame, QPlainTextEdit, QWidget
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import common_ends, shown, spans_of
 from study_app.designer.form.fields import HAND_ON_MS, KEYS_OF_PLACE
-from study_app.designer.place.segments import cut_text
+from study_app.designer.parts import cut_text
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import Coloured

@@ -26,8 +26,8 @@ from study_app.designer.measures.simulation import (
     threshold_of,
 )
 from study_app.designer.measures.study_facts import facts, valid_part
-from study_app.designer.place.editing import Editing
-from study_app.designer.place.view import DesignerPlace
+from study_app.designer.editing import Editing
+from study_app.designer.window import DesignerPlace
 from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows
 from study_app.gui.widgets.background import delayed
 from study_app.number_text import capitalised

@@ -11,7 +11,7 @@ from study_app.designer.document.fields import Row, label_of, left_without, refe
 from study_app.designer.document.steps import DeleteElement, MakeSeries, Situation, index_of
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.place.segments import dense
+from study_app.designer.parts import dense
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice

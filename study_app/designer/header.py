@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QMenu, QSizePolicy, QWidget
 
 from study_app.designer.form.rows import Form
 from study_app.designer.measures.cards import INKS
-from study_app.designer.place.file import FileText
+from study_app.designer.file import FileText
 from study_app.designer.problems import ProblemRow
 from study_app.designer.version_rows import VersionChip
 from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key

@@ -24,10 +24,10 @@ from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Event, Recorded, TrialStarted, start_of
 from study_app.store.progress import trial_results
-from study_app.store.sessions.folder_lock import is_open, open_alone
+from study_app.store.folder_lock import is_open, open_alone
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.sites.merged import folders_of
-from study_app.store.tables.csv_files import in_columns_of
+from study_app.store.merged import folders_of
+from study_app.store.csv_files import in_columns_of
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import described_study, has_intervals, write_description, write_participants
 

@@ -15,7 +15,7 @@ from study_app.protocol.streams import Draw, Key, secret_stream, shuffle, stream
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.methods import TrackSetting, TrialResult
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated
-from study_app.protocol.trials.tracks import (
+from study_app.protocol.tracks import (
     Track,
     condition_of,
     design_of,

@@ -1,1 +1,0 @@
-"""The window of the designer: header, arrangement, file, and the controller of the open study."""
