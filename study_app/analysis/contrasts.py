@@ -14,11 +14,11 @@ from scipy.stats import ttest_1samp, ttest_ind
 
 from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.findings.finding import HOLM, TESTS, BlockAnswers, verdict
+from study_app.analysis.html_page import heading, paragraph, table_of
 from study_app.analysis.levels.answers import Settings
 from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic
 from study_app.analysis.levels.thresholds import Exponents, Thresholds
-from study_app.analysis.html_page import heading, paragraph, table_of
 from study_app.analysis.results import ContrastResult, LevelsResult, Results, interval, number, p_equals, p_value
 from study_app.analysis.statistics.outcome import SIDES, Interval, holm
 from study_app.protocol.model import Contrast

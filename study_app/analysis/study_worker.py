@@ -29,10 +29,10 @@ from study_app.analysis.worker_messages import (
 from study_app.errors import StoreError
 from study_app.store import receipt
 from study_app.store.atomic import cannot_read
-from study_app.store.unblinding import all_opened, reveals_of, unblind_folder
 from study_app.store.exclusions import exclude, include
 from study_app.store.merged import all_exclusions, folders_of, own_place, sessions_in
 from study_app.store.tables.study_files import participants_of, study_folders
+from study_app.store.unblinding import all_opened, reveals_of, unblind_folder
 from study_app.workers.server import Stopped
 
 if TYPE_CHECKING:
@@ -119,8 +119,8 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
 
 def _draw_questions(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     """Draw the figures of questions that no block of statements holds."""
-    from study_app.analysis.questions import question_results  # noqa: PLC0415
     from study_app.analysis.figures.question_figures import question_pictures  # noqa: PLC0415
+    from study_app.analysis.questions import question_results  # noqa: PLC0415
 
     found = question_results(study)
     titles = {(one.where, one.item): f"{one.title}: {one.short}" for one in found}
@@ -170,8 +170,8 @@ def _evaluate(study: Study, send: Send, stop: Callable[[], bool]) -> None:
     """Test everything, then draw again what that adds to, and what only then can be drawn."""
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
     from study_app.analysis.figures import answer_figures  # noqa: PLC0415
-    from study_app.analysis.report.study_figures import block_name, pictures  # noqa: PLC0415
     from study_app.analysis.findings import all_findings  # noqa: PLC0415
+    from study_app.analysis.report.study_figures import block_name, pictures  # noqa: PLC0415
 
     going = partial(_going, send, stop)
     going("testing", 0.0)

@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from study_app.app.lab_controller import LabController
     from study_app.app.session.playing import Playing
     from study_app.app.session.preflight_controller import ComputerCheck
-    from study_app.designer.participant.playable import LabLiquids
     from study_app.designer.controller import DesignerController
+    from study_app.designer.participant.playable import LabLiquids
     from study_app.designer.window import DesignerPlace
     from study_app.gui.help.view import HelpPlace
     from study_app.gui.lab.view import LabPlace

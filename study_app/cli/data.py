@@ -54,8 +54,8 @@ def export(
     """
     if validator is not None and not psych_ds:
         raise click.UsageError("--validator checks the folder that --psych-ds writes: give both")
-    from study_app.analysis.export_study import export as export_study
     from study_app.analysis.export.table_files import Extra
+    from study_app.analysis.export_study import export as export_study
 
     asked: dict[Extra, bool] = {"wide": wide, "parquet": parquet, "sav": sav, "psych-ds": psych_ds}
     extras = [name for name, wanted in asked.items() if wanted]
@@ -128,8 +128,8 @@ def unblind(results: Path, by: str, reason: str) -> None:
 
     In a merged study the key of each site is opened; for one site name its folder, such as pooled/sites/A.
     """
-    from study_app.store.unblinding import unblind_folder
     from study_app.store.exclusions import named
+    from study_app.store.unblinding import unblind_folder
 
     for prefix, found in unblind_folder(results, by=by, reason=reason).items():
         for block, codes in found.codes.items():

@@ -24,21 +24,21 @@ from study_app.designer.document.fields import renamed
 from study_app.designer.document.steps import DeleteElement, Do, RenameElement, Request, Step, Task
 from study_app.designer.document.study import read
 from study_app.designer.document.toml_text import Refused
+from study_app.designer.editing import Editing
+from study_app.designer.file import file_text
 from study_app.designer.form.form import form
-from study_app.designer.measures_controller import MeasuresController
+from study_app.designer.header import DesignerView, HeaderState, StudyChoice
 from study_app.designer.measures.study_facts import facts
+from study_app.designer.measures_controller import MeasuresController
 from study_app.designer.new_study_page import header_state, new_choices, source_of, studies
 from study_app.designer.outline import addable, outline_rows
 from study_app.designer.participant.playable import Feeling
 from study_app.designer.participant.preview import ParticipantPreview
-from study_app.designer.editing import Editing
-from study_app.designer.file import file_text
-from study_app.designer.header import DesignerView, HeaderState, StudyChoice
+from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
 from study_app.designer.prompts import DeleteCard, SeriesCard, naming
 from study_app.designer.saving import Saving
-from study_app.designer.window import DesignerPlace
-from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
 from study_app.designer.versions import Changes, KnownRuns, Renaming
+from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.files import find

@@ -9,9 +9,9 @@ from PySide6.QtCore import QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QActionGroup, QColor, QFocusEvent, QKeyEvent, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QMenu, QSizePolicy, QWidget
 
+from study_app.designer.file import FileText
 from study_app.designer.form.rows import Form
 from study_app.designer.measures.cards import INKS
-from study_app.designer.file import FileText
 from study_app.designer.problems import ProblemRow
 from study_app.designer.version_rows import VersionChip
 from study_app.gui.kit.commands import key_cap, keys_of, tip, with_key

@@ -7,6 +7,7 @@ from typing import Final
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.designer.document.study import Study
+from study_app.designer.editing import Editing
 from study_app.designer.measures.levels import LevelWords
 from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.simulation import (
@@ -26,9 +27,8 @@ from study_app.designer.measures.simulation import (
     threshold_of,
 )
 from study_app.designer.measures.study_facts import facts, valid_part
-from study_app.designer.editing import Editing
-from study_app.designer.window import DesignerPlace
 from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows
+from study_app.designer.window import DesignerPlace
 from study_app.gui.widgets.background import delayed
 from study_app.number_text import capitalised
 from study_app.protocol.model import Protocol

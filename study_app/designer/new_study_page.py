@@ -37,8 +37,8 @@ from study_app.designer.document.document import Answers, Document, taken_names,
 from study_app.designer.document.elements import study_title, title_of
 from study_app.designer.document.fields import languages_of, row_at, unit_of
 from study_app.designer.document.study import Study, read
-from study_app.designer.outline import icon_of
 from study_app.designer.header import HeaderState, StudyChoice, problems_chip
+from study_app.designer.outline import icon_of
 from study_app.designer.parts import cut_text, dense
 from study_app.designer.templates import FOLDER, QUESTIONS, templates
 from study_app.designer.version_rows import VersionChip

@@ -10,13 +10,13 @@ from PySide6.QtGui import QGuiApplication
 from study_app.designer.document.document import Document, Standing, check_version
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.new_study_page import source_of
 from study_app.designer.editing import Editing
 from study_app.designer.header import Notice
+from study_app.designer.new_study_page import source_of
 from study_app.designer.prompts import ConfirmCard
-from study_app.designer.window import DesignerPlace
 from study_app.designer.version_rows import FILE, Comparison
 from study_app.designer.versions import KnownRuns, SaveCard, compare, newest, version_of
+from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
 from study_app.gui.home.study_facts import time_words
 from study_app.number_text import counted

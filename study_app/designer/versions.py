@@ -19,10 +19,10 @@ from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import shown
 from study_app.designer.editing import Editing
 from study_app.designer.file import Colours
-from study_app.designer.prompts import ConfirmCard, Prompt
 from study_app.designer.parts import dense, small_button
-from study_app.designer.window import DesignerPlace, PanePage
+from study_app.designer.prompts import ConfirmCard, Prompt
 from study_app.designer.version_rows import FILE, Comparison, VersionChip, counts, version_chip, version_choices
+from study_app.designer.window import DesignerPlace, PanePage
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Coloured

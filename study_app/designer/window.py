@@ -24,17 +24,17 @@ from study_app.designer.document.steps import (
     index_of,
     with_path,
 )
+from study_app.designer.file import FileCard
 from study_app.designer.form.card import FormCard
 from study_app.designer.form.fields import TypedLine, TypedText
 from study_app.designer.form.rows import Form
+from study_app.designer.header import DesignerHeader, DesignerView, NoticeCard
 from study_app.designer.measures.measures_page import FactsRow, MeasuresPage
 from study_app.designer.new_study_page import NewStudyPage, NoStudyCard, TemplateChoice
 from study_app.designer.outline import Addable, AddList, ElementPath, OutlineCard
-from study_app.designer.file import FileCard
-from study_app.designer.header import DesignerHeader, DesignerView, NoticeCard
-from study_app.designer.prompts import Prompt
 from study_app.designer.parts import Segments, small_button
 from study_app.designer.problems import ProblemRow, ProblemsCard
+from study_app.designer.prompts import Prompt
 from study_app.gui.kit.commands import COMMANDS, add_commands, key_cap, press, tip
 from study_app.gui.theme.theme import SHADOW, font
 from study_app.gui.theme.themed import name_bars, remove_widget

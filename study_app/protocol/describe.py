@@ -19,15 +19,12 @@ from study_app.protocol.model import Block, Condition, Limits, Protocol
 from study_app.protocol.orders.balance import block_order_words
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
-from study_app.protocol.sequences import row_count
+from study_app.protocol.presented.presentation import link_words
+from study_app.protocol.presented.presented_levels import FASTER, highest_damping
 from study_app.protocol.quantities import quantity
 from study_app.protocol.questionnaires import instrument
 from study_app.protocol.questions import Context, Question
-from study_app.protocol.trials.methods import Adjustment
-from study_app.protocol.presented.presentation import link_words
-from study_app.protocol.presented.presented_levels import FASTER, highest_damping
-from study_app.protocol.trials.stimuli import DELAY, OF_LINK
-from study_app.protocol.trials.tasks import Follow
+from study_app.protocol.sequences import row_count
 from study_app.protocol.tracks import (
     condition_of,
     design_of,
@@ -38,6 +35,9 @@ from study_app.protocol.tracks import (
     success_name,
     tracks_of,
 )
+from study_app.protocol.trials.methods import Adjustment
+from study_app.protocol.trials.stimuli import DELAY, OF_LINK
+from study_app.protocol.trials.tasks import Follow
 
 LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
 BLINDINGS = {

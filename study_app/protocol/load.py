@@ -15,6 +15,7 @@ from study_app.protocol import formats
 from study_app.protocol.checks.consistency import check
 from study_app.protocol.checks.designs import designs
 from study_app.protocol.checks.force_limits import paced, returned
+from study_app.protocol.json_schema import schema
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults
 from study_app.protocol.questionnaires import with_instruments
 from study_app.protocol.source.document import Path, Places, entries, frozen
@@ -27,7 +28,6 @@ from study_app.protocol.source.files import (
     shipped,
     source_bytes,
 )
-from study_app.protocol.json_schema import schema
 from study_app.protocol.source.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
 

@@ -32,8 +32,8 @@ from study_app.haptics.runtime.offline import law_along, recompute_scenes
 from study_app.haptics.runtime.pack import adjust_into, pack
 from study_app.protocol.model import Protocol
 from study_app.protocol.presented.presentation import link_seed, presented_by, scene_of
-from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.tracks import adjusting_of, design_of
+from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store import receipt, recordings
 from study_app.store.atomic import is_there
 from study_app.store.blinded import blinding

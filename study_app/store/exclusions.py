@@ -11,12 +11,12 @@ from pathlib import Path
 
 from study_app.errors import StoreError
 from study_app.store.atomic import append_line, parse_json, read_if_there, write_file
+from study_app.store.columns import EXCLUSIONS
+from study_app.store.csv_files import MISSING, csv_bytes, header, unguarded
+from study_app.store.folder_lock import open_alone
 from study_app.store.folders import StudyFolder, readable
 from study_app.store.journals import journal
 from study_app.store.progress import progress_of
-from study_app.store.folder_lock import open_alone
-from study_app.store.columns import EXCLUSIONS
-from study_app.store.csv_files import MISSING, csv_bytes, header, unguarded
 
 NAMED_IDS = 6
 

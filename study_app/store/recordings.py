@@ -29,8 +29,8 @@ from study_app.errors import StoreError
 from study_app.haptics.model.layout import SAMPLE, SAMPLE_FIELDS, SampleField, records
 from study_app.store.atomic import cannot_read, parse_json, read_regular, write_file
 from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, MARK, SAMPLE_BYTES, open_file, seal_file, sealed_bytes
-from study_app.store.journals.journal_events import plain
 from study_app.store.csv_files import Column, Kind
+from study_app.store.journals.journal_events import plain
 
 FRAMES: tuple[Column, ...] = (
     Column("painted_ns", "integer", "Time when the frame was shown, on the servo's clock.", "ns"),

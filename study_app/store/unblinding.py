@@ -19,15 +19,15 @@ from study_app.store import receipt
 from study_app.store.atomic import is_there, read_if_there, read_own, study_root, sweep, sweep_old, write_file
 from study_app.store.blinded.blinding import Codes, Key, opened, read_key, reveal, reveals, verified_key, whole_protocol
 from study_app.store.checksums import replace_checksums
+from study_app.store.csv_files import in_columns_of
 from study_app.store.exclusions import Exclusion, dated_reversals, exclude, exclusions, reversals
+from study_app.store.folder_lock import is_open, open_alone
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Event, Recorded, TrialStarted, start_of
-from study_app.store.progress import trial_results
-from study_app.store.folder_lock import is_open, open_alone
-from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.merged import folders_of
-from study_app.store.csv_files import in_columns_of
+from study_app.store.progress import trial_results
+from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import described_study, has_intervals, write_description, write_participants
 

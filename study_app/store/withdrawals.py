@@ -33,12 +33,12 @@ from study_app.store.atomic import (
 )
 from study_app.store.checksums import fingerprint, place_of, proof_of, read_checksums, sha256
 from study_app.store.exclusions import exclusion_bytes, exclusions
+from study_app.store.folder_lock import open_alone, refuse_if_open
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, readable
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import holds
-from study_app.store.output_files import Output, erase_outputs
-from study_app.store.folder_lock import open_alone, refuse_if_open
 from study_app.store.merged import merged_above
+from study_app.store.output_files import Output, erase_outputs
 from study_app.store.tables.study_files import described_study, write_participants
 from study_app.workspace import workspace
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.report.study_figures import pictures
 from study_app.analysis.findings import all_findings
 from study_app.analysis.report import sections
 from study_app.analysis.report.sections import answers, block, first_page, methods
+from study_app.analysis.report.study_figures import pictures
 from study_app.analysis.report.write_report import plain, tests_csv
 from study_app.analysis.results import Failures, Results
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study

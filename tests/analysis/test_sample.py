@@ -9,9 +9,9 @@ import pytest
 
 from study_app.store import receipt
 from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.columns import LATER
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.columns import LATER
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.analysis.conftest import SAMPLE

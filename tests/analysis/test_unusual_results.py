@@ -10,8 +10,8 @@ from study_app.analysis.export_study import export
 from study_app.protocol.load import load, parse
 from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.unblinding import unblind, unblind_folder
 from study_app.store.sites.merge import merge
+from study_app.store.unblinding import unblind, unblind_folder
 from tests.analysis.conftest import CANNOT_JUDGE, SMALL, Results, make_results
 from tests.analysis.levels.level_studies import ADAPTIVE, matching_file
 from tests.analysis.outputs import ELSEWHERE, GOLDEN, figures_as_lines, report_lines, sav_lines

@@ -30,13 +30,7 @@ def record(designer: Designer, monkeypatch: pytest.MonkeyPatch) -> Callable[...,
     for module in ("document.document", "editing", "participant.preview"):
         monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
     monkeypatch.setattr("study_app.designer.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
-    for timer in (
-        "saving.DRAFT",
-        "form.fields.HAND_ON",
-        "form.fields.CLICK",
-        "file.HAND_ON",
-        "problems.REST",
-    ):
+    for timer in ("saving.DRAFT", "form.fields.HAND_ON", "form.fields.CLICK", "file.HAND_ON", "problems.REST"):
         monkeypatch.setattr(f"study_app.designer.{timer}_MS", NEVER_MS)  # each is let go by the record, after an act
     spoken: list[str] = []
     for module in ("header", "window"):

@@ -13,8 +13,8 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.main_controller import MainController
-from study_app.designer.document.steps import SetValue
 from study_app.designer.controller import DesignerController
+from study_app.designer.document.steps import SetValue
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.study_versions import kept_content, kept_versions

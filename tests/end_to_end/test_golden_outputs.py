@@ -12,8 +12,8 @@ import pytest
 from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.unblinding import unblind_folder
 from study_app.store.csv_files import unguarded
+from study_app.store.unblinding import unblind_folder
 from tests.analysis.levels.level_studies import levels_file
 from tests.analysis.outputs import figures_as_lines, sav_lines
 from tests.golden import CHANGING, compare

@@ -15,10 +15,10 @@ from study_app.session.runner import RETRY_S
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.transitions.events import Note
 from study_app.session.transitions.state import Phase
-from study_app.store.unblinding import unblind
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal
 from study_app.store.sessions.recovery import rebuild
+from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals import withdraw
 from tests.benchmarks.sessions import disk

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from study_app.store.blinded.blinding import opened, read_key
+from study_app.store.columns import DELIVERED, TRIALS
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.columns import DELIVERED, TRIALS
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo

@@ -18,9 +18,9 @@ from study_app.session.pages import TroublePage
 from study_app.session.runner import RETRY_S
 from study_app.session.transitions.events import Note
 from study_app.session.transitions.state import Phase
+from study_app.store import folder_lock
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
-from study_app.store.sessions import folder_lock
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen
 from study_app.store.verification.verify_study import verify

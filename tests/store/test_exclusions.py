@@ -7,8 +7,8 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store import unblinding
-from study_app.store.unblinding import unblind
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
+from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify
 from tests.platforms import files_up_to
 from tests.store.conftest import Start

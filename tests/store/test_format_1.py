@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from study_app.store.blinded.blinding import Key, opened, read_key, sealed
-from study_app.store.folders import StudyFolder
 from study_app.store.columns import TABLES
+from study_app.store.folders import StudyFolder
 from tests.journal_lines import event_from, raw
 
 RECORDED: dict[str, dict[str, Any]] = json.loads((Path(__file__).parent / "format_1.json").read_text())

@@ -9,9 +9,9 @@ from jsonschema import Draft7Validator
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
+from study_app.store.csv_files import Column, guarded, header, problems, read_table
 from study_app.store.journals.journal_events import journal_schema, problem
 from study_app.store.sessions.begin import check_participant
-from study_app.store.csv_files import Column, guarded, header, problems, read_table
 from study_app.store.verification.leaks import telltales
 from study_app.store.workstation import ASIDE, DEFAULTS, MachineSettings, load, load_or_default, save
 from study_app.user_folder import settings_file

@@ -8,9 +8,9 @@ from study_app.protocol.load import load, source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded import blinding
-from study_app.store.unblinding import unblind
 from study_app.store.journals.journal_events import PageShown
 from study_app.store.sessions.begin import SessionStart, begin
+from study_app.store.unblinding import unblind
 
 STUDY: Final = "rek2024"
 WATCHED: Final = "watched"

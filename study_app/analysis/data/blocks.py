@@ -12,15 +12,15 @@ from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase
 from study_app.protocol.model import Analysis, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import every_step_of, follows_in
+from study_app.protocol.presented.presentation import link_words
 from study_app.protocol.questionnaires import Score
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
 from study_app.protocol.table import text_in
+from study_app.protocol.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
 from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
 from study_app.protocol.trials.designs import Design, default_design
 from study_app.protocol.trials.methods import Method
-from study_app.protocol.presented.presentation import link_words
 from study_app.protocol.trials.stimuli import DELAY, OF_LINK, Assumed, Stimulus, assumed_for, rises
-from study_app.protocol.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
 from study_app.store.blinded.blinding import Key, whole_protocol
 
 Kind: TypeAlias = Compared

@@ -21,8 +21,8 @@ from study_app.analysis.data.measures import Array, quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_GLITCH
-from study_app.store.recordings import SealedRecording, read_samples
 from study_app.store.merged import session_in
+from study_app.store.recordings import SealedRecording, read_samples
 
 CUTOFF_HZ: Final = 10.0
 """Below this lies what a hand does on purpose; speeds are low-passed here (Butterworth, both ways, order 4 in all)."""

@@ -24,10 +24,10 @@ from study_app.errors import AnalysisError
 from study_app.protocol.table import text_in
 from study_app.store.atomic import parse_json, read_regular
 from study_app.store.blinded.blinding import Key
-from study_app.store.exclusions import Exclusion, named
-from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
 from study_app.store.columns import tables_of
 from study_app.store.csv_files import MISSING, Column, cells, header
+from study_app.store.exclusions import Exclusion, named
+from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
 
 DTYPES: Final[dict[str, Any]] = {
     "text": "string",

@@ -55,14 +55,14 @@ from study_app.protocol.model import Contrast
 from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
-from study_app.store.unblinding import all_opened, decided_late
-from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.folders import SessionFolder, StudyFolder
-from study_app.store.folder_lock import never_begun
-from study_app.store.sessions.open_session import Place
-from study_app.store.merged import DASH, Merged, read_merged
 from study_app.store.columns import INTERVALS, SEALED
+from study_app.store.exclusions import Exclusion, exclusions
+from study_app.store.folder_lock import never_begun
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.merged import DASH, Merged, read_merged
+from study_app.store.sessions.open_session import Place
 from study_app.store.tables.study_files import has_intervals
+from study_app.store.unblinding import all_opened, decided_late
 from study_app.store.verification.verify_session import Discrepancy, doubts
 from study_app.store.withdrawals import tombstones
 

@@ -16,9 +16,9 @@ from study_app.protocol.source.files import at_hand, bundled, file_hash, find, p
 from study_app.protocol.table import text_in
 from study_app.store.atomic import cause, open_regular
 from study_app.store.blinded.blinding import revealed_key
-from study_app.store.output_files import FileCopy
-from study_app.store.merged import read_merged
 from study_app.store.csv_files import Column
+from study_app.store.merged import read_merged
+from study_app.store.output_files import FileCopy
 
 
 class Materials(NamedTuple):

@@ -14,12 +14,12 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import Block, Item, PlacedQuestion, PlacedScore, Setting
 from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES
-from study_app.analysis.questions import scored
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.levels.columns import ACHIEVED, JUDGED, OF_TRACKS, OPENED, RESULTS
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS, tracks
+from study_app.analysis.questions import scored
 from study_app.store.columns import INTERVALS, RESPONSES, TRIALS_2, tables_of
 from study_app.store.csv_files import Column, Kind, header, optional, unsealed
 

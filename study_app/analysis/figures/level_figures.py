@@ -11,16 +11,6 @@ from matplotlib.axes import Axes
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import published_words
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.page_layout import (
-    MARGIN_PT,
-    SMALL,
-    Look,
-    Picture,
-    Sheet,
-    attempted,
-    picture_of,
-    sample_words,
-)
 from study_app.analysis.levels.answers import (
     Answers,
     LevelAnswers,
@@ -41,6 +31,7 @@ from study_app.analysis.levels.thresholds import (
     psychometric_bands,
 )
 from study_app.analysis.levels.tracks import tracks
+from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, attempted, picture_of, sample_words
 from study_app.analysis.results import Failures, LevelsResult, counted
 from study_app.analysis.statistics.outcome import Array
 from study_app.psychophysics.families import Family, success

@@ -8,7 +8,6 @@ from typing import Any, Final
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.motion import OF_REACHES
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.findings.finding import (
     FOUND,
     MANY,
@@ -24,6 +23,7 @@ from study_app.analysis.findings.finding import (
 )
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
 from study_app.analysis.html_page import heading, paragraph, table, table_of
+from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.results import (
     BlockResult,
     NotTested,

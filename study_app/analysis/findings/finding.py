@@ -13,8 +13,8 @@ import pandas as pd
 from study_app.analysis.data.blocks import KINDS, Block, Decided, Kind
 from study_app.analysis.data.measures import Array, medians, presentations
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.html_page import drawn
+from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.results import BlockResult, Failure, Failures, NotTested, Results, Tested, Verdict
 from study_app.analysis.statistics.outcome import DRAWS, Outcome, draws_for, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import DRAWN_UP_TO

@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.findings.finding import (
     FOUND,
     NO_EVIDENCE,
@@ -22,6 +21,7 @@ from study_app.analysis.findings.finding import (
 )
 from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer
 from study_app.analysis.html_page import heading, paragraph, table_of
+from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.results import (
     BlockResult,
     NotTested,

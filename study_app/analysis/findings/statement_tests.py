@@ -13,7 +13,6 @@ from study_app import number_text
 from study_app.analysis.data.blocks import KINDS, TRENDS
 from study_app.analysis.data.measures import medians
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.findings.finding import (
     FDR,
     HOLM,
@@ -28,6 +27,7 @@ from study_app.analysis.findings.finding import (
     test_row,
 )
 from study_app.analysis.html_page import heading, paragraph, table_of
+from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.results import (
     BlockResult,
     Failure,

@@ -12,6 +12,7 @@ import pandas as pd
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.study_tables import Study
+from study_app.analysis.html_page import drawn, paragraph, table, table_of
 from study_app.analysis.levels.statistic import (
     INTERVAL,
     KINDS,
@@ -30,7 +31,6 @@ from study_app.analysis.levels.statistic import (
     unit,
     with_unit,
 )
-from study_app.analysis.html_page import drawn, paragraph, table, table_of
 from study_app.analysis.results import LevelsResult, Summary, listed
 from study_app.analysis.statistics.outcome import Array, clopper_pearson, student_interval
 from study_app.protocol.trials.designs import Reply

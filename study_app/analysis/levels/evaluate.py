@@ -9,11 +9,11 @@ import pandas as pd
 from study_app.analysis.data.blocks import LevelBlock, Setting, published_words, setting_name
 from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.page_layout import Picture
+from study_app.analysis.html_page import heading, paragraph, table_of
 from study_app.analysis.levels.answers import SUMMARIES, Answers, Settings, chooses_units
 from study_app.analysis.levels.statistic import between, statistics
 from study_app.analysis.levels.tracks import answers_timed, tracks
-from study_app.analysis.html_page import heading, paragraph, table_of
+from study_app.analysis.page_layout import Picture
 from study_app.analysis.results import GroupAnswers, LevelsResult, number
 from study_app.protocol.quantities import quantity, quantity_words
 

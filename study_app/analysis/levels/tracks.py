@@ -9,8 +9,8 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.study_tables import Study
-from study_app.protocol.trials.methods import Answer, TrackSetting
 from study_app.protocol.presented.presentation import arrangement_of
+from study_app.protocol.trials.methods import Answer, TrackSetting
 from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus
 
 TRACK: Final = ["participant", "session", "block", "code"]

@@ -39,8 +39,8 @@ from study_app.analysis.planning.simulated_studies import (
 from study_app.analysis.results import enough
 from study_app.protocol.model import Contrast
 from study_app.psychophysics.grid import Z_95
-from study_app.store.output_files import write_files
 from study_app.store.csv_files import Column, csv_bytes, optional
+from study_app.store.output_files import write_files
 
 Question: TypeAlias = Literal["settings differ", "trend", "lowest delay", "equivalence", "contrast"]
 

@@ -13,9 +13,9 @@ from study_app import __version__
 from study_app.analysis.contrasts import RATIOS
 from study_app.analysis.data.blocks import SPENDINGS, TRENDS, decisions, spoken
 from study_app.analysis.data.study_tables import Study
+from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
 from study_app.analysis.planning.simulated_studies import compares_statements
-from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.results import counted, least, listed
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
@@ -27,8 +27,8 @@ from study_app.protocol.model import Analysis, Protocol
 from study_app.protocol.orders.balance import block_order_words
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
-from study_app.protocol.trials.stimuli import assumed_for
 from study_app.protocol.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
+from study_app.protocol.trials.stimuli import assumed_for
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.store.exclusions import named
 from study_app.store.merged import DASH, folders_of

@@ -17,15 +17,15 @@ from study_app.analysis.data.motion import (
     Moved,
     Performance,
 )
-from study_app.analysis.questions import MEASURES
 from study_app.analysis.data.study_tables import By, Study, group_counts, group_means
 from study_app.analysis.figures.answer_figures import people_a_setting
-from study_app.analysis.page_layout import Picture
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import Answer, Finding
-from study_app.analysis.levels.evaluate import level_findings, level_limits, level_methods, level_section
-from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.html_page import attempted, bullets, drawn, heading, paragraph, render, table, table_of
+from study_app.analysis.levels.evaluate import level_findings, level_limits, level_methods, level_section
+from study_app.analysis.page_layout import Picture
+from study_app.analysis.planning.power_curves import interval as share_interval
+from study_app.analysis.questions import MEASURES
 from study_app.analysis.results import (
     VERDICTS_MEAN,
     BlockResult,
@@ -48,9 +48,9 @@ from study_app.analysis.results import (
 from study_app.analysis.statistics.outcome import FEW
 from study_app.discovery import by_name
 from study_app.protocol.orders.balance import Evenness
-from study_app.store.unblinding import RULE
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import named
+from study_app.store.unblinding import RULE
 
 WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
 """The devices without force: reading results must not load their descriptors."""

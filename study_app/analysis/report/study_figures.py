@@ -6,15 +6,15 @@ from pathlib import Path
 
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import KINDS, Block
-from study_app.analysis.questions import question_results
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.page_layout import Drawing, Picture, attempted
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import LowestDelay
 from study_app.analysis.levels.evaluate import level_results
+from study_app.analysis.page_layout import Drawing, Picture, attempted
+from study_app.analysis.questions import question_results
 from study_app.analysis.results import Failures, Results
 from study_app.errors import AnalysisError
 from study_app.store.output_files import write_output

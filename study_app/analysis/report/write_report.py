@@ -22,18 +22,18 @@ from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import credit_lines, study_head, table_files
 from study_app.analysis.export.tables import deliver
 from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.page_layout import Picture
 from study_app.analysis.figures.question_figures import question_pictures
-from study_app.analysis.report.study_figures import pictures
 from study_app.analysis.findings import FINDINGS, all_findings
 from study_app.analysis.findings.finding import TESTS
+from study_app.analysis.html_page import attempted, box, bullets, heading, paragraph, render, table
 from study_app.analysis.levels.evaluate import level_entries
+from study_app.analysis.page_layout import Picture
 from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
 from study_app.analysis.planning.preregistration import deviations
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
 from study_app.analysis.report import sections
-from study_app.analysis.html_page import attempted, box, bullets, heading, paragraph, render, table
 from study_app.analysis.report.sections import methods, version_words
+from study_app.analysis.report.study_figures import pictures
 from study_app.analysis.results import (
     BlockResult,
     Failure,
@@ -47,13 +47,13 @@ from study_app.analysis.results import (
 )
 from study_app.errors import AnalysisError
 from study_app.protocol.model import Contrast, Published
-from study_app.store.unblinding import reveals_of
 from study_app.store.checksums import sha256
+from study_app.store.csv_files import Column, csv_bytes, optional
 from study_app.store.folders import StudyFolder
+from study_app.store.merged import MANIFEST, folders_of
 from study_app.store.output_files import write_output
 from study_app.store.receipt import recorded_plug_ins
-from study_app.store.merged import MANIFEST, folders_of
-from study_app.store.csv_files import Column, csv_bytes, optional
+from study_app.store.unblinding import reveals_of
 
 OF_FORMAT_2: Final = {
     Results: frozenset({"questions", "scores", "levels", "contrasts"}),

@@ -35,8 +35,8 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s
 from study_app.protocol.orders.schedule import PageStep, Schedule, stream
-from study_app.protocol.wording.languages import words
 from study_app.protocol.without_force import without_force
+from study_app.protocol.wording.languages import words
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import JournalPort, Ports
 from study_app.session.resume import FIRST, Start, resume_at

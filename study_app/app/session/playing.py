@@ -21,10 +21,10 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.failures import Patience
 from study_app.app.session.live_session import BUG, LiveSession
-from study_app.designer.participant.playable import NotPlayableError, Playable, StepPosition, playable
 from study_app.designer import header as shown
 from study_app.designer.controller import DesignerController
 from study_app.designer.header import Notice, PlayDevices
+from study_app.designer.participant.playable import NotPlayableError, Playable, StepPosition, playable
 from study_app.designer.problems import problem_rows
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError, StudyError

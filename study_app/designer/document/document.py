@@ -28,8 +28,8 @@ from study_app.protocol.source.files import file_hash, hashes_in, shipped, shipp
 from study_app.protocol.source.problems import did_you_mean
 from study_app.store.atomic import cannot_write
 from study_app.store.drafts import Draft, Keeper, draft_of, unsaved_files
-from study_app.store.folders import StudyFolder
 from study_app.store.folder_lock import is_open
+from study_app.store.folders import StudyFolder
 from study_app.store.study_runs import Run
 from study_app.store.study_versions import content_hash, keep_content, save, write_whole
 from study_app.workspace import workspace

@@ -15,9 +15,9 @@ from study_app.haptics.model.ranges import REASON
 from study_app.ids import MAX_FROM_TEXT, MAX_ID, free_id, id_of
 from study_app.number_text import counted
 from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
+from study_app.protocol.json_schema import schema
 from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
-from study_app.protocol.json_schema import schema
 from study_app.protocol.source.problems import rule_of, shown
 from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
 

@@ -7,11 +7,11 @@ from typing import Final, Literal, TypeAlias
 from study_app.gui.theme.theme import Theme
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.quantities import quantity
-from study_app.protocol.trials.designs import Design
 from study_app.protocol.presented.presented_levels import Clipping, Level, LevelLimits, clipping, level_limits, levels
-from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.quantities import quantity
 from study_app.protocol.tracks import design_of, stimulus_of, success_name
+from study_app.protocol.trials.designs import Design
+from study_app.protocol.trials.stimuli import Stimulus
 
 Limit: TypeAlias = Literal["norm", "slope"]
 Ticks: TypeAlias = tuple[tuple[float, str], ...]

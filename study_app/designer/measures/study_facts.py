@@ -15,12 +15,12 @@ from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady
 from study_app.number_text import counted
 from study_app.protocol.checks.warnings import warnings
+from study_app.protocol.json_schema import schema
 from study_app.protocol.load import examined
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
 from study_app.protocol.source.document import Path, frozen, has, value_at
-from study_app.protocol.json_schema import schema
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.wording.languages import language_name
 from study_app.store.verification.leaks import Telltales

@@ -15,8 +15,8 @@ from study_app.designer.document.fields import languages_of, named_places
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.document.toml_text import Refused
-from study_app.designer.measures.study_facts import valid_part
 from study_app.designer.editing import Editing
+from study_app.designer.measures.study_facts import valid_part
 from study_app.designer.window import DesignerPlace
 from study_app.errors import Problem, StudyError
 from study_app.haptics.model.scene import Liquid

@@ -36,6 +36,7 @@ from shiboken6 import isValid
 
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.study import Study
+from study_app.designer.editing import Editing
 from study_app.designer.measures.study_facts import restored_part
 from study_app.designer.participant.playable import (
     SIZES,
@@ -52,7 +53,6 @@ from study_app.designer.participant.playable import (
     step_name,
     step_words,
 )
-from study_app.designer.editing import Editing
 from study_app.designer.parts import Segments, dense
 from study_app.designer.window import DesignerPlace, PanePage
 from study_app.gui.display.screens import choose_screens

@@ -34,8 +34,8 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.simulated import OBSERVER, Observer, as_requested, simulate_study
 from study_app.protocol.streams import Draw, stream
-from study_app.protocol.trials.stimuli import DELAYS, SESSION_SD
 from study_app.protocol.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
+from study_app.protocol.trials.stimuli import DELAYS, SESSION_SD
 from study_app.psychophysics.people import (
     BETWEEN_PEOPLE,
     ESTIMATE_NOISE,
@@ -48,8 +48,8 @@ from study_app.psychophysics.people import (
 )
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.unblinding import unblind
 from study_app.store.folders import StudyFolder
+from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 

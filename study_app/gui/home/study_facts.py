@@ -30,10 +30,10 @@ from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal
 from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.drafts import draft_files, draft_of, unsaved_files
+from study_app.store.folder_lock import is_open
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
-from study_app.store.folder_lock import is_open
 from study_app.store.study_settings import kept_original
 from study_app.store.workstation import recent_protocols
 from study_app.workspace import workspace

@@ -18,10 +18,10 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import FormStep, Schedule, Step, Trial
 from study_app.protocol.tracks import design_of
 from study_app.protocol.wording.languages import words
+from study_app.store.columns import SEALED
 from study_app.store.delivered import Broken
 from study_app.store.journals.journal_events import Note
 from study_app.store.progress import Progress, TrialAnswer
-from study_app.store.columns import SEALED
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
 StepState = Literal["done", "now", "open"]

@@ -17,9 +17,9 @@ from study_app.protocol.orders.durations import expected_duration_s, variants
 from study_app.protocol.orders.schedule import FormStep, PageStep
 from study_app.store import receipt
 from study_app.store.exclusions import Exclusion, exclusions
+from study_app.store.folder_lock import is_open
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.folder_lock import is_open
 from study_app.store.merged import session_in
 from study_app.store.study_runs import run_of
 from study_app.store.tables.study_files import participants

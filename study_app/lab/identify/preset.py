@@ -12,8 +12,8 @@ from study_app.lab.identify.measured_force import FLOW_CURVE
 from study_app.lab.identify.parameters import Parameter
 from study_app.protocol.scene_file import for_new_file, scene_text
 from study_app.store.atomic import make_folder
-from study_app.store.output_files import write_files
 from study_app.store.csv_files import csv_text_of
+from study_app.store.output_files import write_files
 
 COLUMNS: Final = ("t_s", *(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz"))
 CURVE_COLUMNS: Final[tuple[str, ...]] = (*FLOW_CURVE, "fitted_pa", "residual_pa")

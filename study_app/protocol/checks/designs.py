@@ -14,14 +14,11 @@ from study_app.haptics.model.overrides import number_names, override
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import OF_LEVELS, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
+from study_app.protocol.presented.presentation import scene_of
 from study_app.protocol.quantities import can_vary
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, unknown
 from study_app.protocol.table import Table
-from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
-from study_app.protocol.trials.methods import KINDS as METHOD_KINDS
-from study_app.protocol.presented.presentation import scene_of
-from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated, Stimulus, rises
 from study_app.protocol.tracks import (
     condition_of,
     design_of,
@@ -32,6 +29,9 @@ from study_app.protocol.tracks import (
     stimulus_of,
     tracks_of,
 )
+from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
+from study_app.protocol.trials.methods import KINDS as METHOD_KINDS
+from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated, Stimulus, rises
 
 LEAST_MS: Final = 1e-3
 """The least difference between two times that is presented [ms]: a thousandth of a tick. [choice]"""

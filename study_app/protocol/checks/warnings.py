@@ -17,11 +17,11 @@ from study_app.protocol.checks.expected_precision import imprecise
 from study_app.protocol.checks.force_limits import PACED, clipped_unpaced, fastest_hz
 from study_app.protocol.model import Follow, Protocol, Published, Reach
 from study_app.protocol.orders.durations import variants
+from study_app.protocol.presented.presented_levels import highest_damping
 from study_app.protocol.questionnaires import instrument
 from study_app.protocol.questions import POINTS
-from study_app.protocol.presented.presented_levels import highest_damping
-from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK
 from study_app.protocol.tracks import design_of, has_correct_answer, method_of, stimulus_of, tracks_of
+from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK
 
 TELLING = 0.39
 """Twice the difference of viscosity that people just tell, 19 % (Jones, Hunter & Lafontaine 1997): what two liquids

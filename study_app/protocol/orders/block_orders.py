@@ -9,8 +9,8 @@ from pydantic import BaseModel, ConfigDict
 from study_app.protocol.blocks import Block, Order, OrderOfBlocks, Phase
 from study_app.protocol.groups import Group, every_step, follows
 from study_app.protocol.model import Protocol, Questionnaire
-from study_app.protocol.trials.methods import TrackOrder
 from study_app.protocol.tracks import method_of, tracks_of
+from study_app.protocol.trials.methods import TrackOrder
 
 CodeOrder: TypeAlias = Literal[Order, TrackOrder]
 """How the codes of a block are ordered: conditions, or the tracks of a design."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from study_app.protocol.groups import numbered_parts, session_count, sessions_differ, steps_of
 from study_app.protocol.model import Block, Protocol, Questionnaire
 from study_app.protocol.orders.block_orders import order_of
+from study_app.protocol.tracks import design_of, method_of
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.tasks import AnyTask
-from study_app.protocol.tracks import design_of, method_of
 
 
 def own_protocol(protocol: Protocol, group: str | None, session: int) -> Protocol:

@@ -12,9 +12,6 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Condition, Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.protocol.streams import Draw, Key, secret_stream, shuffle, stream
-from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.methods import TrackSetting, TrialResult
-from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated
 from study_app.protocol.tracks import (
     Track,
     condition_of,
@@ -25,6 +22,9 @@ from study_app.protocol.tracks import (
     stimulus_of,
     track_of,
 )
+from study_app.protocol.trials.designs import Design
+from study_app.protocol.trials.methods import TrackSetting, TrialResult
+from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated
 
 
 def scene_of(protocol: Protocol, presented: Stimulated, link_seed: int = 0) -> Scene:

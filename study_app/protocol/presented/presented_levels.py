@@ -17,8 +17,8 @@ from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import steady
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulus
 from study_app.protocol.tracks import condition_of, method_of, standards_of, stimulus_of
+from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulus
 from study_app.psychophysics.families import Floats
 
 FASTER: Final = 1.2

@@ -14,8 +14,8 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.presented.presented_levels import ends
-from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulated
 from study_app.protocol.tracks import condition_of, stimulus_of
+from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulated
 from study_app.store.delivered import delivered, judged, undelivered
 
 INERTIAL = {effect.name for effect in EFFECTS if effect.damping_nspm is not None}

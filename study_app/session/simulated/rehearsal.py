@@ -32,10 +32,10 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
+from study_app.protocol.presented.presentation import delays_force, next_level
 from study_app.protocol.questions import Value, shown
 from study_app.protocol.simulated import NO_FEATURES, Comparison, Observer, TrialFeatures
 from study_app.protocol.streams import Key as LevelKey
-from study_app.protocol.presented.presentation import delays_force, next_level
 from study_app.session.pages import (
     DesignPage,
     FeedbackPage,

@@ -15,8 +15,8 @@ from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Trial, build_schedule, draw_key, stream
 from study_app.protocol.questions import ChoiceView, Context, NumberView, Question, Value
 from study_app.protocol.streams import draw_secret, group_of
-from study_app.protocol.trials.designs import ORDINALS
 from study_app.protocol.tracks import design_of
+from study_app.protocol.trials.designs import ORDINALS
 from study_app.protocol.wording.languages import Words, words
 from study_app.session import pages
 from study_app.session.transitions.state import Phase, Plan, SessionState

@@ -37,10 +37,10 @@ from study_app.protocol.table import RECORDED
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
 from study_app.store.blinded.sealing import open_text, seal
+from study_app.store.columns import SEALED
 from study_app.store.folders import SessionFolder, StudyFolder, readable
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
-from study_app.store.columns import SEALED
 
 Codes: TypeAlias = dict[str, dict[str, str]]
 NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})

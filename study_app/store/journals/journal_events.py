@@ -15,8 +15,8 @@ from datetime import datetime
 from typing import Annotated, Any, ClassVar, TypeAlias, dataclass_transform, get_args, get_type_hints
 
 from study_app.errors import StoreError
-from study_app.store.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
 from study_app.store.columns import DELIVERED, TRIALS, VIDEO
+from study_app.store.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
 
 SHOWN = 200  # characters of a bad value shown in messages
 

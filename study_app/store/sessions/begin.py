@@ -20,12 +20,12 @@ from study_app.store import receipt
 from study_app.store.atomic import cannot_write, is_there, make_folder, sweep_old, sync_folder, temporary_path
 from study_app.store.blinded.allocation import Allocation, allocate, check_session
 from study_app.store.blinded.blinding import Key, open_or_draw_key, reveals, sealed_model
+from study_app.store.folder_lock import Opening, abandoned, create_opened, sweep_claims, take_over
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import FORMAT, Journal, SessionClock
 from study_app.store.journals.journal_events import Allocated, SessionStarted, start_of
 from study_app.store.recorder import Recorder
-from study_app.store.folder_lock import Opening, abandoned, create_opened, sweep_claims, take_over
 from study_app.store.sessions.open_session import Place, SessionStore
 from study_app.store.tables.study_files import check_study, write_description, write_participants
 from study_app.store.withdrawals import tombstones

@@ -18,16 +18,15 @@ from study_app.errors import StoreError
 from study_app.outlets.markers import Marker, marker_of
 from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.model import Protocol
-from study_app.store import receipt
+from study_app.store import csv_files, receipt
 from study_app.store.atomic import write_file
 from study_app.store.blinded.blinding import Key, as_recorded, opened, opened_key, sealed
 from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
+from study_app.store.folder_lock import Opening
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Journal
 from study_app.store.recorder import LEAVING_S, Kept, Recorder
-from study_app.store.folder_lock import Opening
-from study_app.store import csv_files
 from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import write_participants
 

@@ -33,16 +33,16 @@ from study_app.store.checksums import (
     read_checksums,
     renew_checksums,
 )
+from study_app.store.folder_lock import open_alone, refuse_if_open
 from study_app.store.folders import RECORDING_NAME, SessionFolder, StudyFolder, locate
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Contents, Journal, SessionClock
+from study_app.store.merged import refuse_merged
 from study_app.store.progress import Progress, progress_of, recordable
 from study_app.store.recorder import lost, recorded, recording_files
 from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, surroundings
-from study_app.store.folder_lock import open_alone, refuse_if_open
 from study_app.store.sessions.open_session import Place, SessionStore, table_files
-from study_app.store.merged import refuse_merged
 from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import write_description, write_participants
 

@@ -24,11 +24,11 @@ from study_app.store.atomic import create_folder, make_folder
 from study_app.store.blinded.allocation import allocate
 from study_app.store.blinded.blinding import open_or_draw_key, opened_key, reveals, sealed
 from study_app.store.checksums import checksum_bytes, fingerprint, note_fingerprint
+from study_app.store.folder_lock import Opening, open_alone
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import SessionClock, line_bytes, line_of
 from study_app.store.journals.journal_events import Allocated, Event, SessionEnded, plain, read_event, start_of
 from study_app.store.sessions.begin import SessionStart, check_participant, first_records, used_ids
-from study_app.store.folder_lock import Opening, open_alone
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.study_files import check_study, write_description, write_participants
 

@@ -29,8 +29,8 @@ from study_app.store.atomic import (
     write_file,
 )
 from study_app.store.blinded.blinding import Key, verified_key
-from study_app.store.folders import ID_PATTERN, StudyFolder
 from study_app.store.folder_lock import create_opened, is_open, never_begun, open_alone, refuse_if_open
+from study_app.store.folders import ID_PATTERN, StudyFolder
 from study_app.store.merged import FOLDER, Merged, Site, merged_above, read_merged
 from study_app.store.tables.study_files import described_study
 from study_app.store.withdrawals import describe_session

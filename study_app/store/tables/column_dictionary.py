@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from study_app.store.journals.journal_events import EVENTS
-from study_app.store.recordings import FRAMES, SAMPLES
 from study_app.store.columns import EXCLUSIONS, INTERVALS, PARTICIPANTS, RESPONSES, RESPONSES_2, TRIALS, TRIALS_2
 from study_app.store.csv_files import Column
+from study_app.store.journals.journal_events import EVENTS
+from study_app.store.recordings import FRAMES, SAMPLES
 
 SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     ("Responses", "subject-…_description-responses_data.csv", "one row per response", RESPONSES),

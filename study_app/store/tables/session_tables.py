@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from study_app.errors import StoreError
+from study_app.store.columns import DELIVERED, INTERVALS, TRIALS, VIDEO, tables_of
+from study_app.store.csv_files import Column, Row, header, unsealed
 from study_app.store.delivered import within_limits
 from study_app.store.journals import journal_events as events
 from study_app.store.progress import progress_of
-from study_app.store.columns import DELIVERED, INTERVALS, TRIALS, VIDEO, tables_of
-from study_app.store.csv_files import Column, Row, header, unsealed
 
 _PRESENTED: Final = {"S": "standard", "C": "comparison"}
 _OF_TRIAL: Final = {column.name: column.of_trial for column in (*TRIALS, *VIDEO)}

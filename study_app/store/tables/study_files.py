@@ -14,17 +14,16 @@ from typing import Any, Final
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.table import text_in
-from study_app.store import receipt
+from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, write_file
 from study_app.store.blinded.blinding import Key, opened, opened_key, reveals
-from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
-from study_app.store.journals import journal
-from study_app.store.folder_lock import never_begun
-from study_app.store.merged import MANIFEST, folders_of, refuse_merged
-from study_app.store import csv_files
-from study_app.store.tables import session_tables
 from study_app.store.columns import LATER, PARTICIPANTS, PARTICIPANTS_2, SEALED, every_column
 from study_app.store.csv_files import Column, Row, header
+from study_app.store.folder_lock import never_begun
+from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
+from study_app.store.journals import journal
+from study_app.store.merged import MANIFEST, folders_of, refuse_merged
+from study_app.store.tables import session_tables
 
 _READ: Final[dict[Path, tuple[object, list[csv_files.Row]]]] = {}
 """Rows by the session's folder, with time and size of the journal. Reading a journal takes 5 ms, 200 take a second."""

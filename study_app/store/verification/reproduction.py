@@ -14,10 +14,10 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import RecordedTrial, Schedule, build_schedule, reproduce
-from study_app.protocol.streams import Key, group_of
 from study_app.protocol.presented.presentation import arrangement_text, next_level
-from study_app.protocol.trials.stimuli import LEVEL_RULES
+from study_app.protocol.streams import Key, group_of
 from study_app.protocol.tracks import adjusting_of, design_of
+from study_app.protocol.trials.stimuli import LEVEL_RULES
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import opened, read_key, whole_protocol

@@ -20,21 +20,20 @@ from typing import Any
 import study_app
 from study_app.errors import PlugInError, StoreError
 from study_app.number_text import counted
-from study_app.store import receipt
+from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporaries
 from study_app.store.blinded.blinding import Key, opened, opened_key, whole_protocol
 from study_app.store.checksums import files, fingerprint, hashed, read_checksums
+from study_app.store.csv_files import Column
+from study_app.store.folder_lock import is_open, never_begun
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Contents
 from study_app.store.progress import Progress, named, progress_of, recordable
 from study_app.store.recorder import recording_files
-from study_app.store.folder_lock import is_open, never_begun
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.sessions.recovery import RESTORE, beyond
-from study_app.store import csv_files
-from study_app.store.csv_files import Column
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import opened_or_none, row_from
 

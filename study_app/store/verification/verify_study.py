@@ -20,21 +20,20 @@ from study_app.discovery import registry
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.streams import group_of
-from study_app.store import exclusions, receipt
+from study_app.store import csv_files, exclusions, receipt
 from study_app.store.atomic import is_there, read_own, read_regular, temporaries
 from study_app.store.blinded import blinding
 from study_app.store.blinded.allocation import claims, entries_begun, group_in
 from study_app.store.blinded.blinding import Key, opened, sealed_hash, whole_protocol
 from study_app.store.checksums import Proofs, checked_line, listed, place_of, unreadable
+from study_app.store.columns import EXCLUSIONS
+from study_app.store.folder_lock import is_open
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.folder_lock import is_open
+from study_app.store.merged import Merged, Site, read_merged
 from study_app.store.sessions.open_session import Place
 from study_app.store.sites.merge import unlisted
-from study_app.store.merged import Merged, Site, read_merged
 from study_app.store.study_runs import run_of
-from study_app.store import csv_files
-from study_app.store.columns import EXCLUSIONS
 from study_app.store.tables.study_files import (
     columns_of,
     described_study,

@@ -6,13 +6,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from study_app.analysis.export_study import export
 from study_app.analysis.export.table_files import table_bytes
 from study_app.analysis.export.tables import Delivered
+from study_app.analysis.export_study import export
 from study_app.errors import AnalysisError
-from study_app.store.output_files import write_files
 from study_app.store.columns import SEALED
 from study_app.store.csv_files import Column, unguarded
+from study_app.store.output_files import write_files
 from tests.analysis.conftest import Results
 
 pytestmark = pytest.mark.slow

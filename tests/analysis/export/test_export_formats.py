@@ -9,9 +9,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from study_app.analysis.export_study import export
 from study_app.analysis.export.psychds_dataset import FOLDER
 from study_app.analysis.export.table_files import Extra
+from study_app.analysis.export_study import export
 from study_app.errors import AnalysisError, MissingExtra, naming_the_extra
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.simulated import NO_FEATURES

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.export_study import export
 from study_app.analysis.export.psychds_dataset import FOLDER, variables
+from study_app.analysis.export_study import export
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.source.files import shipped_file
 from study_app.store.blinded.blinding import reveal
-from study_app.store.output_files import FileCopy, write_files
 from study_app.store.csv_files import Column, optional
+from study_app.store.output_files import FileCopy, write_files
 from tests.analysis.export.described import undescribed
 from tests.studies import rehearsed
 

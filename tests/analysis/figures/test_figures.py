@@ -10,8 +10,9 @@ from matplotlib.text import Text
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.study_tables import Study, load_study
-from study_app.analysis.figures import answer_figures, study_figures
+from study_app.analysis.figures import answer_figures
 from study_app.analysis.page_layout import Look, study_marks
+from study_app.analysis.report import study_figures
 from study_app.errors import AnalysisError
 from tests.analysis.conftest import HIDDEN, Results, twelve
 

@@ -9,8 +9,8 @@ import pytest
 
 from study_app.analysis.data.blocks import LevelBlock, Setting
 from study_app.analysis.levels.evaluate import level_results
-from study_app.protocol.trials.designs import Rated
 from study_app.protocol.presented.presentation import arrangement_text
+from study_app.protocol.trials.designs import Rated
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.analysis.levels.level_studies import ONE, STIMULUS, block
 from tests.analysis.made_up import delays, everybody, study

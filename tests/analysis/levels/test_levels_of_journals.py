@@ -15,10 +15,10 @@ from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from study_app.store.blinded.blinding import opened, read_key, whole_protocol
+from study_app.store.columns import INTERVALS
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.receipt import read
-from study_app.store.columns import INTERVALS
 from study_app.store.verification.leaks import certain_telltales, presented_numbers
 from tests.journal_lines import raw
 

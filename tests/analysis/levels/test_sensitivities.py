@@ -11,8 +11,8 @@ from scipy.stats import norm
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.levels.sensitivities import Sensitivities, SensitivityEstimate, preferences, sensitivities
-from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.presented.presentation import arrangement_text
+from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.detection import different_rate, proportion_correct
 from tests.analysis.levels.level_studies import ONE, ROVING, block

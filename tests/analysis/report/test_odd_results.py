@@ -19,8 +19,8 @@ from study_app.protocol.simulated import NO_FEATURES
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
-from study_app.store.unblinding import unblind
 from study_app.store.exclusions import exclude, include
+from study_app.store.unblinding import unblind
 from tests.analysis.conftest import SAMPLE, Results, make_results, twelve
 from tests.protocol.groups.grouped import GROUPS, STUDY
 

@@ -12,9 +12,9 @@ from study_app.analysis.planning.preregistration import FILE, Commitment, deviat
 from study_app.analysis.report.write_report import report
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.unblinding import unblind, unblind_folder
 from study_app.store.exclusions import exclude
 from study_app.store.sites.merge import merge
+from study_app.store.unblinding import unblind, unblind_folder
 from study_app.store.withdrawals import withdraw
 from tests.analysis.levels.level_studies import ADAPTIVE
 from tests.analysis.report.read_report import read

@@ -16,8 +16,8 @@ from study_app.analysis.data.motion import Targets, performance, reaches, submov
 from study_app.analysis.data.study_tables import load_study, pooled
 from study_app.errors import AnalysisError
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.unblinding import unblind
 from study_app.store.folders import StudyFolder
+from study_app.store.unblinding import unblind
 from tests.analysis.conftest import SAMPLE, Results, twelve
 from tests.analysis.made_up import delays, study
 from tests.compiled import needs_servo

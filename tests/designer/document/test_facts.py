@@ -20,8 +20,8 @@ from study_app.protocol.describe import describe
 from study_app.protocol.load import load
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
-from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.presented.presented_levels import LevelLimits, clipping, level_limits, levels, standard_of
+from study_app.protocol.source.files import shipped, shipped_file
 from tests.designer.document.grown import PROTOCOLS
 from tests.protocol.edited_studies import FAULTY, Case
 

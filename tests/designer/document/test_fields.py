@@ -10,8 +10,8 @@ from study_app.designer.document.elements import element_of
 from study_app.designer.document.fields import Row, rows, unit_of
 from study_app.designer.document.study import Study, read
 from study_app.designer.form.form import form
-from study_app.protocol.source.document import Path
 from study_app.protocol.json_schema import schema
+from study_app.protocol.source.document import Path
 from study_app.protocol.source.problems import Fault, shown
 from tests.protocol.edited_studies import FAULTY, Case
 

@@ -13,13 +13,13 @@ from study_app.designer.document.elements import outline, used_by
 from study_app.designer.document.steps import RetypeFile, Situation
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Edit, Set, Unset
+from study_app.designer.file import file_text
 from study_app.designer.form.form import form
 from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.simulation import Controls, Simulated
 from study_app.designer.measures.study_facts import facts, restored_part
 from study_app.designer.outline import outline_rows
 from study_app.designer.participant.playable import NotPlayableError, playable, showing
-from study_app.designer.file import file_text
 from study_app.designer.problems import problem_rows
 from study_app.designer.templates import FOLDER, templates
 from study_app.protocol.source.document import Path, entries, value_at

@@ -11,6 +11,7 @@ from study_app.designer.document.document import template
 from study_app.designer.document.elements import brief, found_fields, outline, position_of, used_by
 from study_app.designer.document.study import Study, read
 from study_app.designer.document.toml_edits import Set
+from study_app.designer.file import file_text
 from study_app.designer.form.form import form
 from study_app.designer.measures.measures_page import clipped_sentence
 from study_app.designer.measures.measures_view import MeasuresView, measures_view
@@ -28,7 +29,6 @@ from study_app.designer.measures.simulation import (
 )
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import addable, outline_rows
-from study_app.designer.file import file_text
 from study_app.designer.problems import problem_rows
 from study_app.protocol.source.document import Path
 from tests.designer.document.test_study_transcripts import elements, generic, studies

@@ -8,8 +8,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.session.playing import Playing
-from study_app.designer.outline import ROW_ROLE
 from study_app.designer.controller import DesignerController
+from study_app.designer.outline import ROW_ROLE
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.widgets.main_view import Place
 from study_app.protocol.source.document import value_at

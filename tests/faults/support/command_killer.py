@@ -17,8 +17,8 @@ from pathlib import Path
 from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.session.simulated import rehearsal
-from study_app.store.unblinding import unblind
 from study_app.store.sessions.recovery import rebuild
+from study_app.store.unblinding import unblind
 from tests.faults.support.killer import SEED, forked
 
 COMMANDS = {"export": (6, 0.0), "rebuild": (12, 0.0), "unblind": (12, 0.0), "report": (1, 0.9)}

@@ -34,8 +34,8 @@ from study_app.protocol.source.files import source_bytes
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.store.drafts import Draft, draft_files, keep
 from study_app.store.exclusions import exclude
-from study_app.store.journals import journal_events
 from study_app.store.folder_lock import open_alone
+from study_app.store.journals import journal_events
 from study_app.store.study_settings import keep_original
 from tests import studies
 from tests.golden import compare

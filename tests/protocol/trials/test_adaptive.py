@@ -5,9 +5,9 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.trials.methods import TrialResult
 from study_app.protocol.presented.presentation import next_level
 from study_app.protocol.tracks import design_of
+from study_app.protocol.trials.methods import TrialResult
 from tests.protocol.trials.level_studies import key_of, study
 
 CONSTANT = 'kind = "constant"\nlevels = [0.2, 0.4, 0.8]\nrepetitions = 8'

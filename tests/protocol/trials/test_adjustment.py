@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from study_app.protocol.tracks import method_of
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.tracks import method_of
 from tests.protocol.trials.matching import matching
 
 LOW, HIGH = math.log10(2), math.log10(18)

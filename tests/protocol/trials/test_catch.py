@@ -6,8 +6,8 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.trials.methods import TrialResult
 from study_app.protocol.presented.presentation import next_level
+from study_app.protocol.trials.methods import TrialResult
 from tests.protocol.trials.level_studies import answered, key_of, study
 
 CATCH = ("task =", "catch = { share = 0.1 }\ntask =")

@@ -3,8 +3,8 @@ from collections import Counter
 import pytest
 
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.streams import Key, shuffle, stream
 from study_app.protocol.presented.presentation import longest_delay_s, next_level
+from study_app.protocol.streams import Key, shuffle, stream
 from study_app.protocol.tracks import design_of
 from tests.protocol.trials.level_studies import SECRET, answered, key_of, run, study
 

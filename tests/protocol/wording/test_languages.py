@@ -8,8 +8,8 @@ import pytest
 from study_app.errors import StudyError
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
-from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.protocol.without_force import SENTENCES, without_force
+from study_app.protocol.wording.languages import LANGUAGES, words
 
 
 def slots(text: str) -> set[str]:

@@ -18,12 +18,12 @@ from study_app.protocol.streams import stream
 from study_app.session.simulated.rehearsal import RehearsedSession, rehearse
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
-from study_app.store.unblinding import unblind
+from study_app.store.columns import SEALED
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import IntervalEnded, Recorded
 from study_app.store.progress import Progress
-from study_app.store.columns import SEALED
+from study_app.store.unblinding import unblind
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 from tests.outlets.collector import collecting

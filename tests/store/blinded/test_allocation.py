@@ -19,11 +19,11 @@ from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.store.blinded import allocation
 from study_app.store.blinded.allocation import allocate, allocated, claims, session_protocol
 from study_app.store.blinded.blinding import open_or_draw_key
-from study_app.store.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen
+from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests import studies

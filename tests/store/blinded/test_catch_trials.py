@@ -11,12 +11,12 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.unblinding import unblind
 from study_app.store.checksums import write_checksums
 from study_app.store.exclusions import exclusions, include
+from study_app.store.folder_lock import open_alone
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal_events import TrialStarted
-from study_app.store.folder_lock import open_alone
+from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.protocol.trials.level_studies import SHORT, text_of

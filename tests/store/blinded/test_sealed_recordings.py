@@ -11,8 +11,8 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store.blinded.blinding import read_key, reveal
-from study_app.store.unblinding import unblind
 from study_app.store.recordings import read_frames, read_samples
+from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals import withdraw
 from tests.journal_lines import event_of

@@ -9,15 +9,15 @@ import pytest
 from study_app.protocol.model import Protocol, StudyHead
 from study_app.store import unblinding as module
 from study_app.store.blinded.blinding import open_or_draw_key, opened, reveal
-from study_app.store.unblinding import unblind
 from study_app.store.checksums import replace_checksums
+from study_app.store.columns import SEALED, TRIALS
+from study_app.store.csv_files import csv_bytes, header, read_table, unsealed
 from study_app.store.folders import REBUILT, StudyFolder
 from study_app.store.journals import journal, journal_events
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import rebuild, reopen
-from study_app.store.columns import SEALED, TRIALS
-from study_app.store.csv_files import csv_bytes, header, read_table, unsealed
 from study_app.store.tables.study_files import description_bytes
+from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify
 from tests.journal_lines import event_of, raw
 from tests.store.conftest import SOURCE, Attend, Start, ticking_clock

@@ -13,9 +13,9 @@ import psutil
 import pytest
 
 from study_app.errors import StoreError
+from study_app.store.folder_lock import is_open, markers, open_alone, process_began
 from study_app.store.folders import StudyFolder, locate, study_folder
 from study_app.store.sessions.begin import used_ids
-from study_app.store.folder_lock import is_open, markers, open_alone, process_began
 from tests.faults.support.racers import race
 from tests.platforms import needs_fork
 

@@ -11,11 +11,11 @@ import pytest
 
 from study_app import app
 from study_app.errors import StoreError
+from study_app.store.folder_lock import abandoned, markers, never_begun, open_alone
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal, journal_events
 from study_app.store.sessions import begin, open_session
 from study_app.store.sessions.begin import used_ids
-from study_app.store.folder_lock import abandoned, markers, never_begun, open_alone
 from study_app.store.sessions.recovery import reopen
 from study_app.store.verification.verify_study import verify
 from tests.faults.support.killer import die, forked

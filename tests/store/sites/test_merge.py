@@ -13,10 +13,10 @@ import pytest
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.folder_lock import open_alone
+from study_app.store.merged import read_merged
 from study_app.store.sessions.recovery import rebuild
 from study_app.store.sites import merge as merging
 from study_app.store.sites.merge import merge
-from study_app.store.merged import read_merged
 from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import die, forked

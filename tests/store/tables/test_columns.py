@@ -7,9 +7,9 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions import KINDS
 from study_app.store.blinded.blinding import open_or_draw_key
+from study_app.store.columns import RESPONSES_2
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.column_dictionary import dictionary_markdown
-from study_app.store.columns import RESPONSES_2
 from study_app.store.tables.study_files import check_study, write_description
 
 

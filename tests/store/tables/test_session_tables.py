@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.store.journals.journal_events import Event
 from study_app.store.columns import TRIALS
 from study_app.store.csv_files import MISSING, Column, csv_bytes, guarded, header, in_columns_of, read_table
+from study_app.store.journals.journal_events import Event
 from study_app.store.tables.session_tables import SessionRows
 from tests.journal_lines import event_of
 

@@ -14,13 +14,13 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.unblinding import unblind
 from study_app.store.exclusions import exclude, exclusions
+from study_app.store.folder_lock import open_alone
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
-from study_app.store.folder_lock import open_alone
 from study_app.store.sessions.recovery import check_can_go_on, rebuild, reopen
 from study_app.store.tables.study_files import write_participants
+from study_app.store.unblinding import unblind
 from study_app.store.verification.proofs import proof_text
 from study_app.store.verification.verify_session import Findings
 from study_app.store.verification.verify_study import verify

@@ -15,11 +15,11 @@ from study_app.gui.sessions.session_facts import sessions
 from study_app.protocol.model import Protocol
 from study_app.store import recordings
 from study_app.store.blinded import blinding
-from study_app.store.unblinding import unblind
 from study_app.store.exclusions import exclude
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal import scan
 from study_app.store.sessions.recovery import check_can_go_on, rebuild
+from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting

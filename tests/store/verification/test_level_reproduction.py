@@ -10,8 +10,8 @@ import pytest
 
 from study_app.session.simulated.rehearsal import rehearse, resume
 from study_app.store.blinded.blinding import opened, read_key
-from study_app.store.unblinding import unblind
 from study_app.store.journals import journal
+from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
 from tests.journal_lines import raw

@@ -13,12 +13,12 @@ from study_app.cli import commands
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.output_files import write_files
 from study_app.store.sessions.open_session import Place, SessionStore
 from study_app.store.sessions.recovery import rebuild
+from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_session import doubts
 from study_app.store.verification.verify_study import verify
 from study_app.store.withdrawals import withdraw

@@ -14,10 +14,10 @@ from study_app.errors import StoreError
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.unblinding import unblind
-from study_app.store.journals import journal_events
 from study_app.store.columns import TABLES
 from study_app.store.csv_files import csv_bytes, read_table
+from study_app.store.journals import journal_events
+from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify
 from tests.faults.support import short
 from tests.platforms import needs_fork

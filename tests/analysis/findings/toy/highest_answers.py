@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 from scipy.stats import binomtest
 
-from study_app.analysis.page_layout import Drawing, Look, Picture, Sheet
 from study_app.analysis.findings.finding import ALONE, Absent, Answer, BlockAnswers, Finding, in_family, judged_row
 from study_app.analysis.findings.statement_tests import table_of_tests
+from study_app.analysis.page_layout import Drawing, Look, Picture, Sheet
 from study_app.analysis.results import BlockResult, NotTested, Tested, short
 from study_app.analysis.statistics.outcome import Outcome, clopper_pearson
 

@@ -19,9 +19,9 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import PausePage, TroublePage
 from study_app.store import workstation
 from study_app.store.blinded.blinding import read_key
-from study_app.store.unblinding import unblind
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
 from study_app.store.recordings import read_frames
+from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify
 from study_app.store.workstation import MachineSettings
 from study_app.video import sources
