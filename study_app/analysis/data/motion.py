@@ -143,7 +143,7 @@ TRIAL_DEFINITIONS: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Moved:
     """One measure under one setting: over ``n`` participants, each of whom counts by his or her median."""
 
@@ -296,4 +296,6 @@ def _quartiles(block: Block, rows: pd.DataFrame, measures: Sequence[str]) -> Ite
     for measure in measures:
         for code in block.codes:
             values = medians[measure][medians.index.get_level_values("code") == code].dropna().to_numpy(dtype=float)
-            yield Moved(block.id, code, measure, len(values), *quartiles_or_none(values))
+            yield Moved(
+                block=block.id, code=code, measure=measure, n=len(values), **quartiles_or_none(values)._asdict()
+            )
