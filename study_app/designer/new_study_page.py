@@ -686,8 +686,8 @@ class ChosenCard(Card):
             column.addWidget(Rule())
         if choice.recovery is not None:
             good = choice.recovery.recovered
-            state = ("ok", "check", "recovered") if good else ("warn", "warning", "not recovered")
-            chip = Chip(*state, small=True)  # type: ignore[arg-type]  # a tone
+            recovered = Chip("ok", "check", "recovered", small=True)
+            chip = recovered if good else Chip("warn", "warning", "not recovered", small=True)
             head = hbox(label("Known answer", "strong"), STRETCH, chip)
             add_parts(
                 column,

@@ -156,8 +156,17 @@ class FailureTable:
 
         def finding(number: int, mode: FailureMode) -> Finding:
             state: State = "found" if mode.id in found else "ok" if mode.id in passed else "not checked"
-            texts = mode.cause, mode.cure, mode.known_by, mode.paste
-            return Finding(number, mode.id, mode.tested, mode.symptom, state, *texts)
+            return Finding(
+                number=number,
+                id=mode.id,
+                tested=mode.tested,
+                symptom=mode.symptom,
+                state=state,
+                cause=mode.cause,
+                cure=mode.cure,
+                known_by=mode.known_by,
+                paste=mode.paste,
+            )
 
         return tuple(finding(number, mode) for number, mode in enumerate(self.modes, start=1))
 

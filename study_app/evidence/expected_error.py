@@ -73,7 +73,9 @@ class Expected(NamedTuple):
 
 def expected(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> Expected:
     """Measure a scene's cost and predict its error; of several liquids that with the greatest one."""
-    return Expected(measure(scene).scene_ns, *_errors(resolve(scene), delay_ticks))
+    share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
+    cost_ns = measure(scene).scene_ns
+    return Expected(cost_ns=cost_ns, error_share=share, error_n=error_n, causes=causes, against=against)
 
 
 def error_report(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> str:

@@ -184,12 +184,13 @@ def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], li
     resolved: dict[str, Any] = dict(liquids)
     faults: list[Fault] = []
     for name in named:
-        table, alone = liquids[name], ("belongs into the liquid file", "give file alone")
-        faults += [Fault(("liquids", name, key), *alone, kind="surplus") for key in table if key != "file"]
+        table, alone = liquids[name], Fault((), "belongs into the liquid file", "give file alone", kind="surplus")
+        faults += [alone._replace(path=("liquids", name, key)) for key in table if key != "file"]
         try:
             resolved[name] = _liquid_of_file(table["file"], texts)
         except _LiquidFileFault as fault:
-            faults.append(Fault(("liquids", name, "file"), *fault.args))
+            message, hint = fault.args
+            faults.append(Fault(("liquids", name, "file"), message, hint))
             resolved[name] = {"density_kg_m3": 1000.0}  # stands in, so that nothing but the file is reported
     return {key: value for key, value in document.items() if key != TABLE} | {"liquids": resolved}, faults
 
@@ -278,7 +279,8 @@ def _validated(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, l
     except ValidationError as error:
         return None, faults + faults_of(error, document, schema(model))
     if isinstance(velocity := getattr(getattr(found, "scene", None), "velocity", None), Withdrawn):
-        return None, [*faults, Fault(("scene", "velocity", "kind"), *velocity.refusal)]
+        message, hint = velocity.refusal
+        return None, [*faults, Fault(("scene", "velocity", "kind"), message, hint)]
     return found, faults
 
 

@@ -203,7 +203,8 @@ def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s
             if isinstance(line, events.TargetReached) and line.t_task_s is not None:
                 at_s = line.t_task_s
             if line is ended or not isinstance(line, _ENDS):
-                yield Mark(at_s, *told)
+                kind, words = told
+                yield Mark(at_s, kind, words)
 
 
 def _told(line: events.Event) -> tuple[Kind, str] | None:

@@ -59,7 +59,7 @@ class Worker:
 
 
 def figure(name: str, title: str = "Agreement") -> Any:
-    return of.FigureDrawn(name, title, "n = 1", b"")
+    return of.FigureDrawn(name=name, title=title, caption="n = 1", svg=b"")
 
 
 FOUND = of.StudiesFound((of.StudyAt(STUDY, True, False, 5.0), of.StudyAt(OTHER, False, True, 3.0)))

@@ -33,7 +33,9 @@ HASH = "0123456789abcdef" * 4
 LINE = json.dumps({"at": AT, "by": "AB", "reason": "x", "exclusion": asdict(Exclusion("P1", 1, None, "CD", "y", AT))})
 TOMBSTONE = Tombstone("P1", AT, "AB", "asked", (ErasedSession(1, HASH, HASH, "k3vq-7m2p-xw4d"),))
 MERGED = Merged(Path(), "demo", HASH, (Site("A", AT, HASH, 3), Site("B", AT, HASH, 4)))
-COMMITMENT = preregistration.Commitment("demo", "1", HASH, 24, 0.1, ("catch",))
+COMMITMENT = preregistration.Commitment(
+    study="demo", version="1", protocol_hash=HASH, participants=24, precision=0.1, rules=("catch",)
+)
 
 
 def read_workspace(_folder: Path) -> object:

@@ -407,7 +407,7 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
     return sheet
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Widths:
     """Of every panel alike [pt]: one answer, the sides of the line, the neutral column and the column of n."""
 
@@ -435,7 +435,7 @@ def _widths(tables: Sequence[pd.DataFrame], room: float) -> _Widths:
     ):
         answer *= 0.99
     left, right, neutral = sides
-    return _Widths(answer, left, right, neutral, n)
+    return _Widths(answer=answer, left=left, right=right, neutral=neutral, n=n)
 
 
 def _lacks_answers(counts: pd.DataFrame) -> pd.Series[bool]:

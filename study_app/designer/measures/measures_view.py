@@ -157,15 +157,13 @@ def number_cards(
 ) -> tuple[NumberCard, ...]:
     """Return the four numbers of a block whose tracks are simulated."""
     breaks = f", {counted(order.breaks, 'break')}" if order.breaks else ""
+    figure, unit = duration_figure(duration_s)
     return (
         _range(of, simulated, controls),
         _one_person(of, simulated),
         _people(of, simulated, controls),
-        NumberCard(
-            "Lasts", *duration_figure(duration_s),
-            ("neutral", "clock", f"{order.trials} trials{breaks}"), simulated=False,
-        ),
-    )  # fmt: skip
+        NumberCard("Lasts", figure, unit, ("neutral", "clock", f"{order.trials} trials{breaks}"), simulated=False),
+    )
 
 
 def _unknown(title: str, unit: str, simulated: Simulated) -> NumberCard:

@@ -72,7 +72,8 @@ class SocketLink(io.RawIOBase):
 
     def calls(self) -> TransferCalls:
         self._socket.setblocking(False)
-        return TransferCalls(self._socket.fileno(), *_addresses())
+        send, receive = _addresses()
+        return TransferCalls(handle=self._socket.fileno(), send=send, receive=receive)
 
     @contextmanager
     def _in_time(self) -> Iterator[None]:

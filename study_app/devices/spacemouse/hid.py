@@ -19,6 +19,7 @@ from typing import Any, Final
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
 from study_app.errors import DeviceError, DeviceNotFound
 from study_app.haptics.model.layout import BUTTON_STOP
+from study_app.haptics.model.ranges import Vector
 
 DISPLACEMENT, BUTTONS, LED = 1, 3, 4
 FULL_DEFLECTION: Final = 350
@@ -101,7 +102,7 @@ def program_buttons(held: int, model: Model) -> int:
     return buttons
 
 
-def velocity_mps(displacement: Displacement) -> tuple[float, float, float]:
+def velocity_mps(displacement: Displacement) -> Vector:
     """Return the velocity of the hand (x right, y up, z toward the user) that a displacement asks for [m/s]."""
     return _speed(displacement.right), -_speed(displacement.down), _speed(displacement.toward)
 

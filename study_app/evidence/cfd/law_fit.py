@@ -130,13 +130,13 @@ def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
     """Search in the logarithms, so that constants stay positive."""
 
     def residuals(logs: Floats) -> Floats:
-        constants = Constants(*np.exp(logs).tolist())
+        constants = Constants._make(np.exp(logs).tolist())
         return np.concatenate([it.residuals(constants) for it in solved])
 
     found = least_squares(residuals, np.log(begin), diff_step=1e-4, xtol=1e-6, ftol=1e-9)
     if not found.success:
         raise StudyError(f"no constants were found: {found.message}")
-    return Constants(*np.exp(found.x).tolist())
+    return Constants._make(np.exp(found.x).tolist())
 
 
 def evidence(found: Refit) -> Evidence:

@@ -100,7 +100,7 @@ def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
         header, *rows = csv.reader(file.read_text(encoding="utf-8").splitlines())
         if tuple(header) != LEFT_OUT:
             raise ValueError(f"its columns are {','.join(header)}, not {','.join(LEFT_OUT)}")  # noqa: TRY301
-        return {name: Constants(*map(float, values)) for name, *values in rows}
+        return {name: Constants._make(map(float, values)) for name, *values in rows}
     except (OSError, ValueError, TypeError) as error:
         raise StudyError(
             f"{file.name} cannot be used ({error}): make it again with liquid-study cfd --refit --to DIR"

@@ -472,13 +472,14 @@ def count_single(case: Case, seed: int, batch: int, studies: int) -> tuple[Rate,
     number = list(single_tests()).index(case)
     rng = np.random.default_rng([seed, number, batch])
     found = [one for _ in range(studies) if (one := trial(rng)) is not None]
+    rate = partial(Rate, cell=case[0], participants=case[1])
     if what != COVERS:
-        return (Rate(*case, what, limit, sum(map(bool, found)), len(found)),)
-    few = case[1] == SIZES[0]  # of five people intervals are wide by t
+        return (rate(what=what, limit=limit, hits=sum(map(bool, found)), studies=len(found)),)
+    half: Limit = "counted" if case[1] == SIZES[0] else "60 to 80 %"  # of five people intervals are wide by t
     return (
-        Rate(*case, PRINTED, "at least 93 %", len(found), studies),
-        Rate(*case, what, limit, sum(one <= 1.0 for one in found), len(found)),
-        Rate(*case, HALF, "counted" if few else "60 to 80 %", sum(one <= 0.5 for one in found), len(found)),
+        rate(what=PRINTED, limit="at least 93 %", hits=len(found), studies=studies),
+        rate(what=what, limit=limit, hits=sum(one <= 1.0 for one in found), studies=len(found)),
+        rate(what=HALF, limit=half, hits=sum(one <= 0.5 for one in found), studies=len(found)),
     )
 
 

@@ -91,7 +91,17 @@ class Verdict:
 
 def not_finite(case: Case, trace: Any, *, safe: bool) -> Verdict:
     """Return the verdict on a loop that blew up."""
-    return Verdict(case, safe, REASONS[:1], *(math.nan,) * 5, acted(trace))
+    return Verdict(
+        case=case,
+        safe=safe,
+        reasons=REASONS[:1],
+        balance_j=math.nan,
+        permitted_j=math.nan,
+        swing_mps=math.nan,
+        fast_n=math.nan,
+        played_n=math.nan,
+        acted=acted(trace),
+    )
 
 
 def reasons_of(*found: bool) -> tuple[str, ...]:

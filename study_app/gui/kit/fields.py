@@ -163,7 +163,8 @@ class Editor(QWidget):
             case "radio":
                 return Radios(self.field.options)
             case "count":
-                count = Number(*self.field.limits, self.field.limits[0])
+                lowest, highest = self.field.limits
+                count = Number(lowest, highest, lowest)
                 count.valueChanged.connect(lambda _value: self.edited.emit(self.field.name))
                 return count
             case "choice":

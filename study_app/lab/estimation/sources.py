@@ -46,7 +46,7 @@ class Rows:
         return len(self.t_s)
 
     def part(self, first: int, behind: int | None = None) -> Rows:
-        return Rows(*(getattr(self, name)[first:behind] for name in self.__slots__))
+        return Rows(**{name: getattr(self, name)[first:behind] for name in self.__slots__})
 
 
 def no_rows() -> Rows:
@@ -56,7 +56,7 @@ def no_rows() -> Rows:
 
 def joined(*parts: Rows) -> Rows:
     """Return successive rows joined."""
-    return Rows(*(np.concatenate([getattr(it, name) for it in parts]) for name in Rows.__slots__))
+    return Rows(**{name: np.concatenate([getattr(it, name) for it in parts]) for name in Rows.__slots__})
 
 
 class CentredVelocity:

@@ -40,7 +40,9 @@ def answered(small: Results) -> Results:
 
 
 def committed(results: Results, participants: int | None = 3, **changes: object) -> Path:
-    one = Commitment("small", "2", HASH, participants, None, (CATCH,))
+    one = Commitment(
+        study="small", version="2", protocol_hash=HASH, participants=participants, precision=None, rules=(CATCH,)
+    )
     path = results.folder / FILE
     path.write_text(f"# Preregistration\n\n{written(one)}", encoding="utf-8")
     return path

@@ -111,8 +111,9 @@ def test_another_estimator_of_noticed_delays_and_other_intervals_are_noticed(
         found = noticed(*given)
         if found.interval is None or found.effect is None:
             return found
-        ends = (factor * (found.effect + reach * (end - found.effect)) for end in (found.lower, found.upper) if end)
-        return replace(found, interval=Interval(*ends, 0.95, "other"))
+        ends = [factor * (found.effect + reach * (end - found.effect)) for end in (found.lower, found.upper) if end]
+        low, high = ends
+        return replace(found, interval=Interval(low=low, high=high, level=0.95, method="other"))
 
     monkeypatch.setattr(studies, "noticed", other)
     rates = count_single(("one threshold for all", 12), 1, 0, 600 if reach > 1 else 150)

@@ -51,7 +51,9 @@ RESULTS: Actions = {
     "doubts": of_results(doubts=("P001/journal.jsonl", "P002/trials.csv"), chosen=Path("results/demo")),
     "pilot": of_results(studies=(replace(view().studies[0], pilot=True),)),
     "empty figure": of_results(figures=(replace(FIGURES[1], svg=b"", caption="No completed session."),)),
-    "three figures": of_results(figures=(*FIGURES, FigureDrawn("third", "Third", "Caption.", SVG))),
+    "three figures": of_results(
+        figures=(*FIGURES, FigureDrawn(name="third", title="Third", caption="Caption.", svg=SVG))
+    ),
     "drawing": of_results(figures=(), drawing=Progress("drawing", 0.4)),
     "testing": of_results(testing=Progress("testing: Unusable", 0.7)),
     "untested": then("work.stop", untested=True),
