@@ -66,7 +66,7 @@ MODELS: Final = (
 _START: Final = {"length": 300, "scaling": 1000.0}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Fitted:
     """One model on one motion, at the scene's rate: its parameters, and its error against the solver.
 

@@ -153,7 +153,7 @@ ALLOWED: Final[dict[Limit, tuple[float, float, float, float]]] = {
 """Of each limit the range that the interval of a rate must touch, and the range that it must not leave."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Rate:
     """Number of ``hits`` among the simulated studies ``of`` one cell."""
 
@@ -280,7 +280,8 @@ def count_studies(simulation: Plan, cell: Cell, truth: Truth, seed: int, batch: 
         for event, happened in _study(simulation, cell, truth, seed, study).items():
             events[event] = events.get(event, 0) + happened
     return tuple(
-        Rate(cell.name, cell.participants, what, limit, hits, studies) for (what, limit), hits in events.items()
+        Rate(cell=cell.name, participants=cell.participants, what=what, limit=limit, hits=hits, studies=studies)
+        for (what, limit), hits in events.items()
     )
 
 

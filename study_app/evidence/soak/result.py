@@ -27,7 +27,7 @@ _SEEN: Final = {
 }
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class Rests:
     """What was left of wake [m/s] and force [N] after the hand had kept still, at most.
 
@@ -49,7 +49,7 @@ class InjectedFault(NamedTuple):
     seen: int | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SoakResult:
     """The numbers of a soak.
 

@@ -152,7 +152,7 @@ class Stretch(NamedTuple):
     end: int
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class _Due:
     """At which tick the host does something next; below 0: it does not."""
 

@@ -81,9 +81,9 @@ class Device(NamedTuple):
 
 
 DEVICES: Final[Mapping[str, Device]] = {
-    "falcon": Device(38.0, 0.2, 0.1),
-    "inverse3": Device(14.0, 0.2, 0.1),
-    "force-dimension": Device(10.0, 0.2, 0.2),
+    "falcon": Device(count_um=38.0, mass_kg=0.2, least_kg=0.1),
+    "inverse3": Device(count_um=14.0, mass_kg=0.2, least_kg=0.1),
+    "force-dimension": Device(count_um=10.0, mass_kg=0.2, least_kg=0.2),
 }
 """A count of the Inverse3 is not published: [choice]. All drivers permit 8 N."""
 ESTIMATORS: Final = ("kalman", "ewma")
@@ -158,7 +158,9 @@ def _measured(device: str, estimator: str, liquid: str, delay: int) -> Delivered
         plant=SECOND,
     )
     unstable = tuple(one for one in _strokes(case) if not judge(one, safe=True).stable)
-    return Delivered(liquid, estimator, delay, device, **errors(case)._asdict(), unstable=unstable)
+    return Delivered(
+        liquid=liquid, estimator=estimator, delay=delay, device=device, **errors(case)._asdict(), unstable=unstable
+    )
 
 
 class Errors(NamedTuple):

@@ -116,7 +116,17 @@ def judge_driven(case: Case) -> Verdict:
         swing_mps > SWING_MPS,
         fast_n - scripted_n > RESTLESS_N,
     )
-    return Verdict(case, True, reasons, balance_j, permitted_j, swing_mps, fast_n, scripted_n, acted(trace))
+    return Verdict(
+        case=case,
+        safe=True,
+        reasons=reasons,
+        balance_j=balance_j,
+        permitted_j=permitted_j,
+        swing_mps=swing_mps,
+        fast_n=fast_n,
+        played_n=scripted_n,
+        acted=acted(trace),
+    )
 
 
 def scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:

@@ -67,7 +67,7 @@ RESTLESS_N: Final = 0.05
 SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * FAST_HZ)  # a Gaussian mean that halves 40 Hz's power
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
     """What became of a case: ``reasons`` why it is unstable, none if it is not, and what was measured.
 
@@ -140,7 +140,17 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
         swing_mps > (LATE_SWING_MPS if linked else SWING_MPS),
         fast_n - played_n > (max(RESTLESS_N, LATE_SHARE * played_n) if linked else RESTLESS_N),
     )
-    return Verdict(case, safe, reasons, balance_j, permitted_j, swing_mps, fast_n, played_n, acted(trace))
+    return Verdict(
+        case=case,
+        safe=safe,
+        reasons=reasons,
+        balance_j=balance_j,
+        permitted_j=permitted_j,
+        swing_mps=swing_mps,
+        fast_n=fast_n,
+        played_n=played_n,
+        acted=acted(trace),
+    )
 
 
 def windows(case: Case) -> Iterator[tuple[float, float]]:

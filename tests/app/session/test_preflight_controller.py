@@ -220,9 +220,21 @@ def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
 @pytest.mark.parametrize(
     ("told", "largest"),
     [
-        ((Errors(0.0, 0.02, 0.0, ()), Errors(0.0, 0.04, 0.0, ())), 0.04),
-        ((Errors(0.0, 0.02, 0.0, ()), Errors(None, None, 0.0, ())), None),
-        (("it could not be measured", Errors(0.0, 0.02, 0.0, ())), None),
+        (
+            (
+                Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=()),
+                Errors(wake=0.0, force_n=0.04, lag_s=0.0, left_out=()),
+            ),
+            0.04,
+        ),
+        (
+            (
+                Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=()),
+                Errors(wake=None, force_n=None, lag_s=0.0, left_out=()),
+            ),
+            None,
+        ),
+        (("it could not be measured", Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=())), None),
     ],
 )
 def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: Any, largest: float | None) -> None:
@@ -243,7 +255,13 @@ def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its
     asked = preflight_controller.study_scenes(protocol)
     assert {one.liquid for one in asked} == set(protocol.liquids)
     assert {one.stroke for one in asked if one.liquid == "honey"} == {Stroke(5.0, 0.03)}  # it is explored
-    monkeypatch.setattr(Answering, "given", tuple(Errors(0.0, 0.0, 0.0, (), 0.01 * (n + 1)) for n in range(len(asked))))
+    monkeypatch.setattr(
+        Answering,
+        "given",
+        tuple(
+            Errors(wake=0.0, force_n=0.0, lag_s=0.0, left_out=(), withheld=0.01 * (n + 1)) for n in range(len(asked))
+        ),
+    )
     appraisal = Appraisal(asked, UNKNOWN)
     assert appraisal.withheld is None
     while not appraisal.over:

@@ -112,7 +112,9 @@ def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields
         "trace": shadow.trace(),
         "tail_a": shadow.tail("A"),
         "tail_b": shadow.tail("B"),
-        "now": Now(*(tuple(last[field].tolist()) for field in ("position_m", "device_force_n", "wake_mps"))),
+        "now": Now(
+            tuple(last["position_m"].tolist()), tuple(last["device_force_n"].tolist()), tuple(last["wake_mps"].tolist())
+        ),
         "limiters": counts.rows(8.0, 1.5),
     }
     return still_view(bench, **(moved | fields))

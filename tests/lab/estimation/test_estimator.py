@@ -138,7 +138,7 @@ def test_laws_without_the_coefficient_are_refused() -> None:
 def test_a_measurement_that_is_short_slow_or_interrupted_is_said() -> None:
     rows = measured(WATER, *stirring(4.0))
     assert fed(OnlineEstimator(WATER), rows.part(0, 300)).reason.startswith("0.3 s measured, ")
-    slow, gaps = (Rows(*(getattr(rows, it)[::step] for it in Rows.__slots__)) for step in (40, 100))
+    slow, gaps = (Rows(**{it: getattr(rows, it)[::step] for it in Rows.__slots__}) for step in (40, 100))
     with pytest.raises(StudyError, match="rows per second"):
         fed(OnlineEstimator(WATER), slow)
     interrupted = fed(OnlineEstimator(WATER), gaps)
