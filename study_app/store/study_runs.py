@@ -16,7 +16,7 @@ from study_app.store.study_versions import content_hash, keep_content, kept_cont
 _NAME: Final = re.compile(r"[a-z][a-z0-9]*")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
     """The sessions that were run with one content of a study's file, counted by what they were.
 

@@ -64,7 +64,14 @@ def figure(name: str, title: str = "Agreement") -> Any:
 
 FOUND = of.StudiesFound((of.StudyAt(STUDY, True, False, 5.0), of.StudyAt(OTHER, False, True, 3.0)))
 WHOLE = of.StudyFound("one", "One", 1, 2, False, {("P001", 1): ((1, "L1"),)}, ("a file",), {"L1": "#000000"})
-OUT = Exclusion("P001", 1, 2, "AK", "asleep", "2026-11-20T11:00:00+00:00")
+OUT = Exclusion(
+    participant="P001",
+    session=1,
+    trial=2,
+    rule_or_person="AK",
+    reason="asleep",
+    excluded_at="2026-11-20T11:00:00+00:00",
+)
 SESSIONS = of.SessionsFound(STUDY, (ROW, ROW | {"participant_id": "P002", "status": "unfinished"}), (OUT,), None)
 RESULTS: list[tuple[str, Any]] = [
     ("entered", ()), ("answer", of.Progress("looking", 0.5)), ("answer", FOUND), ("late", of.Done()),

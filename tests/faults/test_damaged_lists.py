@@ -30,9 +30,29 @@ SEED = int(os.environ.get("LIQUID_STUDY_DAMAGE_SEED", "5"))
 CASES = 4 * int(os.environ.get("LIQUID_STUDY_DAMAGE_CASES", "5"))
 AT = "2026-03-02T09:30:00.000+01:00"
 HASH = "0123456789abcdef" * 4
-LINE = json.dumps({"at": AT, "by": "AB", "reason": "x", "exclusion": asdict(Exclusion("P1", 1, None, "CD", "y", AT))})
-TOMBSTONE = Tombstone("P1", AT, "AB", "asked", (ErasedSession(1, HASH, HASH, "k3vq-7m2p-xw4d"),))
-MERGED = Merged(Path(), "demo", HASH, (Site("A", AT, HASH, 3), Site("B", AT, HASH, 4)))
+LINE = json.dumps(
+    {
+        "at": AT,
+        "by": "AB",
+        "reason": "x",
+        "exclusion": asdict(
+            Exclusion(participant="P1", session=1, trial=None, rule_or_person="CD", reason="y", excluded_at=AT)
+        ),
+    }
+)
+TOMBSTONE = Tombstone(
+    participant="P1",
+    at=AT,
+    by="AB",
+    reason="asked",
+    sessions=(ErasedSession(session=1, begun=HASH, checksums=HASH, fingerprint="k3vq-7m2p-xw4d"),),
+)
+MERGED = Merged(
+    Path(),
+    "demo",
+    HASH,
+    (Site(name="A", merged_at=AT, key_hash=HASH, sessions=3), Site(name="B", merged_at=AT, key_hash=HASH, sessions=4)),
+)
 COMMITMENT = preregistration.Commitment(
     study="demo", version="1", protocol_hash=HASH, participants=24, precision=0.1, rules=("catch",)
 )

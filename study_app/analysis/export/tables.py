@@ -129,7 +129,7 @@ MEASURED: Final = (
         "agree_percent",
         "number",
         f"Share of the valid answers that agree (levels {AGREEMENT[0]} to {AGREEMENT[-1]}).",
-        "%",
+        unit="%",
         minimum=0,
         maximum=100,
     ),

@@ -133,7 +133,7 @@ Which: TypeAlias = tuple[int, int, int | None]
 """Trial, attempt and interval, which is None for a trial."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
     """How a question was answered so far; times are seconds on the session's clock, None before the event.
 

@@ -64,4 +64,11 @@ def view(**changes: Any) -> ResultsView:
     return ResultsView(**(held | changes))
 
 
-LEFT_OUT = Exclusion("P003", 1, 4, "AK", "phone rang", "2026-11-19T00:00:00+00:00")
+LEFT_OUT = Exclusion(
+    participant="P003",
+    session=1,
+    trial=4,
+    rule_or_person="AK",
+    reason="phone rang",
+    excluded_at="2026-11-19T00:00:00+00:00",
+)

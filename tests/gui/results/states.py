@@ -109,7 +109,16 @@ RECORD = SessionRecord(
     ),
     notes=("09:31, trial 2: phone rang",),
     files=(("journal.jsonl", 1_234_567), ("receipt.json", 90), ("trials.csv", 5400)),
-    left_out=(Exclusion("P007", 1, 4, "AK", "phone rang", STARTED.isoformat()),),
+    left_out=(
+        Exclusion(
+            participant="P007",
+            session=1,
+            trial=4,
+            rule_or_person="AK",
+            reason="phone rang",
+            excluded_at=STARTED.isoformat(),
+        ),
+    ),
 )
 READ: dict[str, Any] = {}
 """What the page of a session reads: its record, or an error."""
@@ -145,7 +154,16 @@ PAGE: Actions = {
         record=replace(
             RECORD,
             facts=facts("P007", status="withdrawn", validity="invalid", excluded="asleep"),
-            left_out=(Exclusion("P007", 1, None, "AK", "asleep", STARTED.isoformat()),),
+            left_out=(
+                Exclusion(
+                    participant="P007",
+                    session=1,
+                    trial=None,
+                    rule_or_person="AK",
+                    reason="asleep",
+                    excluded_at=STARTED.isoformat(),
+                ),
+            ),
         )
     ),
     "empty": read_again(record=replace(RECORD, trials=(), files=())),
