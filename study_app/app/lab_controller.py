@@ -269,8 +269,8 @@ class LabSaving(QObject):
         self.liquids = tuple(dict.fromkeys((*self.liquids, *written)))
 
 
-INITIAL_A: Final = Choice("rek2024", "water", "Water")
-INITIAL_B: Final = Choice("rek2024", "light_oil", "Light oil")
+INITIAL_A: Final = Choice(source="rek2024", liquid="water", title="Water")
+INITIAL_B: Final = Choice(source="rek2024", liquid="light_oil", title="Light oil")
 FRAME_MS: Final = 33
 APPRAISE_AFTER_MS: Final = 300
 COMPILING: Final = "Compiling the force model, once after an installation or an update; this takes about a minute"
