@@ -58,7 +58,7 @@ def stir(scale: float, rate_hz: float) -> Motion:
     radius_m = scale * RADIUS_M
     position_m = radius_m * np.column_stack([np.cos(angle), 0.1 * np.cos(2 * angle), np.sin(angle)])
     along = radius_m * np.column_stack([-np.sin(angle), -0.2 * np.sin(2 * angle), np.cos(angle)])
-    return Motion(t_s, position_m, along * angular_per_s[:, np.newaxis])
+    return Motion(t_s, position_m, velocity_mps=along * angular_per_s[:, np.newaxis])
 
 
 def stroke(speed_mps: float, rate_per_s: float, cycles: int, rate_hz: float) -> Motion:
@@ -72,12 +72,12 @@ def with_velocity(motion: Motion) -> Motion:
     """Return the motion with its velocities; without any, with those of central differences."""
     if motion.velocity_mps is not None or len(motion.t_s) < 2:
         return motion
-    return Motion(motion.t_s, motion.position_m, np.gradient(motion.position_m, motion.t_s, axis=0))
+    return Motion(motion.t_s, motion.position_m, velocity_mps=np.gradient(motion.position_m, motion.t_s, axis=0))
 
 
 def along_x(t_s: Floats, way_m: Floats, velocity_mps: Floats) -> Motion:
     """Return a motion along x."""
-    return Motion(t_s, vectors_x(way_m), vectors_x(velocity_mps))
+    return Motion(t_s, vectors_x(way_m), velocity_mps=vectors_x(velocity_mps))
 
 
 COUNT_M: Final = 38e-6

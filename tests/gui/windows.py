@@ -52,7 +52,7 @@ SCREENS = (
 WELL = Measurements(
     device="mouse",
     fresh_share=1.0,
-    timing=Timing(2000, 1000.0, 6.2e-5, 2e-3, 0),
+    timing=Timing(ticks=2000, rate_hz=1000.0, lateness_p99_s=6.2e-5, worst_gap_s=2e-3, overruns=0),
     sample_age_s=0.001,
     screen=Screen(60.0, 1.0),
     probe_s=0.002,

@@ -54,7 +54,7 @@ def studies() -> dict[str, Protocol]:
 def timing(
     rate_hz: float, p99_s: float = 1e-4, gap_s: float = 2e-3, late: int = 0, ticks: int = 2000
 ) -> dict[str, Any]:
-    return {"timing": Timing(ticks, rate_hz, p99_s, gap_s, late)}
+    return {"timing": Timing(ticks=ticks, rate_hz=rate_hz, lateness_p99_s=p99_s, worst_gap_s=gap_s, overruns=late)}
 
 
 LIVE = OutletStatus("LSL markers", listens=True)

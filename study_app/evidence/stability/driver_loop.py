@@ -163,8 +163,8 @@ def _trace(case: Case, device: Driver, hand: Any, dynamics: Dynamics) -> Any:
         safety,
         Records(new_reading(), new_command()),
         Output(telemetry.ring, telemetry.written),
-        DeviceCalls(device.context, device.read.address, device.write.address),
-        ClockCalls(clock.context, clock.now.address, clock.sleep.address),
+        DeviceCalls(context=device.context, read=device.read.address, write=device.write.address),
+        ClockCalls(context=clock.context, now=clock.now.address, sleep=clock.sleep.address),
     )
     run(*arguments, round(_RESTS_S * case.rate_hz))
     rows = round(lasts_s(case) * case.rate_hz)

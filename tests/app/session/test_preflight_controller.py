@@ -29,7 +29,12 @@ from study_app.session.start import NewSession, Ready
 from tests.session import small
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
-FACTS = replace(small.WELL, timing=Timing(2000, 1000.0, 6e-5, 2e-3, 0), participant="P001", grant=NO_THREAD)
+FACTS = replace(
+    small.WELL,
+    timing=Timing(ticks=2000, rate_hz=1000.0, lateness_p99_s=6e-5, worst_gap_s=2e-3, overruns=0),
+    participant="P001",
+    grant=NO_THREAD,
+)
 COSTS = Costs(tick_ns=146.0, rest_ns=40.0, effects=())
 
 
@@ -190,16 +195,16 @@ def test_a_recording_program_that_is_connected_meanwhile_is_shown(ask: Callable[
 def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_changed(
     ask: Callable[..., Preflight], monkeypatch: Any, qtbot: Any
 ) -> None:
-    found = replace(FACTS, dynamics=Dynamics(0.0004, 20e-6, 0.3), delay_ticks=1)
+    found = replace(FACTS, dynamics=Dynamics(delay_s=0.0004, count_m=20e-6, mass_kg=0.3), delay_ticks=1)
     made = ask(found)
     first: Any = made.appraisal.appraiser
-    assert first.devices == [Dynamics(0.001, 20e-6, 0.3)]
+    assert first.devices == [Dynamics(delay_s=0.001, count_m=20e-6, mass_kg=0.3)]
     slower = replace(found, delay_ticks=3)
     monkeypatch.setattr(preflight_controller, "measured", lambda *_words, **_named: slower)
     made.window.again_asked.emit()
     qtbot.waitUntil(lambda: not made.measuring.busy)
     again: Any = made.appraisal.appraiser
-    assert again.devices == [Dynamics(0.003, 20e-6, 0.3)]
+    assert again.devices == [Dynamics(delay_s=0.003, count_m=20e-6, mass_kg=0.3)]
     assert not first.works
 
 

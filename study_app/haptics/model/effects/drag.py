@@ -180,7 +180,7 @@ EFFECT = Effect(
         Parameter(
             "drag.damping_nspm",
             "Damping at the hand",
-            "N·s/m",
+            unit="N·s/m",
             least=DAMPING_NSPM[0],
             most=DAMPING_NSPM[1],
             logarithmic=True,
