@@ -16,7 +16,7 @@ WIDTH: Final = 100
 NOTHING_WRONG: Final = "No problem was found."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
     """One failure mode: its ``number`` in the list, and whether it is present.
 
@@ -97,7 +97,7 @@ def _indented(words: str, by: int) -> str:
     return fill(words, WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FailureMode:
     """A failure mode: the state without it, its symptom for the user, cause, cure, and how it is detected.
 

@@ -176,7 +176,10 @@ def test_settings(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: py
     compare(GOLDEN / "settings.txt", lines, pytestconfig)
 
 
-MOUSE, FALCON = Backend("mouse", "the program", READY, "moves the ball"), Backend("falcon", "libusb", NONE, "no")
+MOUSE, FALCON = (
+    Backend("mouse", "the program", state=READY, can="moves the ball"),
+    Backend("falcon", "libusb", state=NONE, can="no"),
+)
 
 
 def test_devices(qtbot: Any, tmp_path: Path, monkeypatch: Any, pytestconfig: pytest.Config) -> None:

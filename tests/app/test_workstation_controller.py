@@ -18,7 +18,7 @@ from study_app.user_folder import settings_file
 
 pytestmark = pytest.mark.slow
 
-MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
+MOUSE = Backend("mouse", "the window", state=READY, can="seen, not felt")
 
 
 @pytest.fixture

@@ -101,7 +101,7 @@ KINDS: dict[str, tuple[Callable[[Path], Path], str, Callable[[Path], object]]] =
     ),
     "calibration": (
         lambda _: calibration.calibration_file("1"),
-        json.dumps(asdict(calibration.Calibration("libnifalcon", 6616.0))),
+        json.dumps(asdict(calibration.Calibration(geometry="libnifalcon", units_per_nm=6616.0))),
         lambda _: calibration.load("1"),
     ),
 }

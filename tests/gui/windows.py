@@ -39,11 +39,11 @@ from tests.gui.lab.sample import still_view
 from tests.gui.results.sample import LEFT_OUT, view
 
 FOUND = [
-    Backend("mouse", "the window", READY, "seen, not felt"),
-    Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug it in"),
-    Backend("falcon", "ftd2xx", NOT_AVAILABLE, "the same", "for Windows alone"),
-    Backend("falcon-emulated", "the program", READY, "moves by itself"),
-    Backend("falcon-emulated", "the program", READY, "another program's"),
+    Backend("mouse", "the window", state=READY, can="seen, not felt"),
+    Backend("falcon", "libusb 1.0", state=NONE, can="felt, up to 8 N", why="plug it in"),
+    Backend("falcon", "ftd2xx", state=NOT_AVAILABLE, can="the same", why="for Windows alone"),
+    Backend("falcon-emulated", "the program", state=READY, can="moves by itself"),
+    Backend("falcon-emulated", "the program", state=READY, can="another program's"),
 ]
 SCREENS = (
     ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0),

@@ -152,12 +152,12 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
     mass_kg, damping_nspm, friction_n, *_ = np.linalg.solve(triangle, force_n(delay_s) @ orthogonal)
     left, variance = residual_n2(delay_s), float(force_n(delay_s).var())
     return Motion(
-        float(mass_kg),
-        float(damping_nspm),
-        float(friction_n),
-        1e3 * delay_s,
-        1.0 - left / variance if variance > 0.0 else 0.0,
-        count_um(stretches, axis),
+        mass_kg=float(mass_kg),
+        damping_nspm=float(damping_nspm),
+        friction_n=float(friction_n),
+        delay_ms=1e3 * delay_s,
+        explained=1.0 - left / variance if variance > 0.0 else 0.0,
+        count_um=count_um(stretches, axis),
     )
 
 
@@ -214,7 +214,9 @@ def _prepared(samples: Any, axis: int, step_s: float) -> _Prepared:
     terms = np.column_stack([a_mps2[whole], v_mps[whole], friction, smooth[whole], np.ones_like(friction)])
     sent_s = (samples.time_ns - samples.time_ns[0]) * 1e-9
     # A force acts from its write to the next: its middle is half a tick later.
-    return _Prepared(terms, sent_s + 0.5 * step_s, samples.device_force_n[:, axis], grid_s, bell)
+    return _Prepared(
+        terms=terms, sent_s=sent_s + 0.5 * step_s, sent_n=samples.device_force_n[:, axis], grid_s=grid_s, bell=bell
+    )
 
 
 def gain_of(sent_n: Sequence[float], shown_g: Sequence[float]) -> Gain:
@@ -223,7 +225,9 @@ def gain_of(sent_n: Sequence[float], shown_g: Sequence[float]) -> Gain:
     line = np.column_stack([asked, np.ones_like(asked)])
     (slope, offset_n), *_ = np.linalg.lstsq(line, shown_n, rcond=None)
     left_n = shown_n - line @ (slope, offset_n)
-    return Gain(float(slope), float(offset_n), float(np.abs(left_n).max()), len(asked))
+    return Gain(
+        gain=float(slope), offset_n=float(offset_n), residual_n=float(np.abs(left_n).max()), readings=len(asked)
+    )
 
 
 def _new(samples: Any) -> tuple[Floats, Floats]:
