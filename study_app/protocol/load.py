@@ -250,14 +250,14 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
         text = source.decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
-        raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, "save it as UTF-8"),)) from error
+        raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, hint="save it as UTF-8"),)) from error
     try:
         document: dict[str, Any] = frozen(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:  # which names the place in its message
         sentence = re.sub(r" \(at .*\)$", "", str(error))
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
-        broken = Problem("file", f"not TOML at column {column}: {sentence}", line, "see toml.io for the notation")
+        broken = Problem("file", f"not TOML at column {column}: {sentence}", line, hint="see toml.io for the notation")
         raise ProtocolError(name, (broken,)) from error
     except RecursionError as error:
         broken = Problem("file", "is nested too deeply", hint="use fewer brackets within brackets")
@@ -291,7 +291,7 @@ def located(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:
         return _LONG.sub(lambda found: f"{found[0][:SHOWN]}…", words)
 
     problems = (fault.located(places) for fault in faults)
-    short = [Problem(shortened(it.place), shortened(it.message), it.line, shortened(it.hint)) for it in problems]
+    short = [Problem(shortened(it.place), shortened(it.message), it.line, hint=shortened(it.hint)) for it in problems]
     return tuple(sorted(short, key=lambda problem: problem.line or 0))
 
 

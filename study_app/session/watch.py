@@ -242,7 +242,7 @@ def _page(
         named = key.condition(started.block, started.code) if interval is None else None
         body = protocol.scene_for(named or protocol.conditions_in(started.block)[0]).body
     about = {name: getattr(started, name) for name in ("block", "phase", "part", "index", "of", "code")}
-    trial = Trial(started.trial, **about, items=())
+    trial = Trial(number=started.trial, **about, items=())
     page = task_page(protocol, progress_of(lines).language, trial, body)
     if interval is None:
         return page

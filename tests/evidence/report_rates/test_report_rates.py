@@ -41,7 +41,14 @@ def rek() -> Plan:
     force_n = {"water": 0.3, "honey": 1.2, "light_oil": 0.6}
     felt = {
         (block.id, name): (
-            TrialFeatures(force_n.get(name, 0.3), 3 * force_n.get(name, 0.3), 0.1, 0.05, 0.1, protocol.delay_s(name)),
+            TrialFeatures(
+                force_mean_n=force_n.get(name, 0.3),
+                force_peak_n=3 * force_n.get(name, 0.3),
+                speed_rms_mps=0.1,
+                push_share=0.05,
+                roughness_n=0.1,
+                delay_s=protocol.delay_s(name),
+            ),
         )
         for block in protocol.main_blocks
         for name in block.conditions
