@@ -46,7 +46,7 @@ class Mark:
     words: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Watched:
     """A recorded trial, or one of its ``intervals`` (0: it has none); times are since its task began [s].
 

@@ -273,7 +273,18 @@ def go(name: str) -> Any:
     return lambda visit: visit.window.go(name)
 
 
-CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
+CHOSEN = NewSession(
+    source="demo",
+    participant="P001",
+    session=1,
+    seed=7,
+    operator="AK",
+    language="en",
+    device="mouse",
+    windowed=True,
+    screen=None,
+    results=Path("nowhere"),
+)
 STAY: dict[str, Any] = {
     "home": go("home"), "begin": home("session_asked", CHOSEN), "begin twice": home("session_asked", CHOSEN),
     "bug meanwhile": lambda visit: visit.show_bug(ValueError("x")), "called off": ends(),

@@ -127,7 +127,18 @@ def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded:
     place.path.mkdir(parents=True)
     ran = {"key_hash": "", "protocol_hash": recorded, "protocol": {"study": {"version": study.study.version}}}
     receipt.write(place.receipt, ran)
-    chosen = NewSession("rek2024", "P002", 1, 7, "AK", "en", "scripted", True, None, tmp_path)
+    chosen = NewSession(
+        source="rek2024",
+        participant="P002",
+        session=1,
+        seed=7,
+        operator="AK",
+        language="en",
+        device="scripted",
+        windowed=True,
+        screen=None,
+        results=tmp_path,
+    )
     assert ran_otherwise(chosen) == who
     found = checks(replace(small.WELL, ran_otherwise=who), study)
     assert [check.verdict for check in found if check.name == "Study file"] == ["warning"] * bool(who)

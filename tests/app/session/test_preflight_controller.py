@@ -28,7 +28,18 @@ from study_app.session.preflight import Measurements
 from study_app.session.start import NewSession, Ready
 from tests.session import small
 
-CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
+CHOSEN = NewSession(
+    source="demo",
+    participant="P001",
+    session=1,
+    seed=7,
+    operator="AK",
+    language="en",
+    device="mouse",
+    windowed=True,
+    screen=None,
+    results=Path("nowhere"),
+)
 FACTS = replace(
     small.WELL,
     timing=Timing(ticks=2000, rate_hz=1000.0, lateness_p99_s=6e-5, worst_gap_s=2e-3, overruns=0),
