@@ -78,7 +78,9 @@ def test_the_target_is_drawn_where_it_was() -> None:
 
 
 def frame(number: int, due_ns: int, age_ns: int | None = None) -> VideoFrame:
-    return VideoFrame(number, 2, 2, 8, bytes(16), due_ns, age_ns, PERIOD_NS)
+    return VideoFrame(
+        number=number, width=2, height=2, stride=8, pixels=bytes(16), due_ns=due_ns, age_ns=age_ns, period_ns=PERIOD_NS
+    )
 
 
 class FakeVideo:

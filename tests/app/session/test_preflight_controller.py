@@ -187,7 +187,7 @@ class ConnectedLater:
     listens = False
 
     def statuses(self) -> tuple[OutletStatus, ...]:
-        return (OutletStatus("LSL markers", listens=self.listens),)
+        return (OutletStatus(title="LSL markers", listens=self.listens),)
 
 
 def test_a_recording_program_that_is_connected_meanwhile_is_shown(ask: Callable[..., Preflight], qtbot: Any) -> None:

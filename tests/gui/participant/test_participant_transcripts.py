@@ -215,7 +215,20 @@ def filmed(
     width, height = size
     pixels = np.zeros((height, width, 4), np.uint8)
     pixels[..., :3] = colour or (0, 0, 0)
-    frame = VideoFrame(number, width, height, 4 * width, memoryview(pixels), 0, None, 33_333_333) if colour else None
+    frame = (
+        VideoFrame(
+            number=number,
+            width=width,
+            height=height,
+            stride=4 * width,
+            pixels=memoryview(pixels),
+            due_ns=0,
+            age_ns=None,
+            period_ns=33_333_333,
+        )
+        if colour
+        else None
+    )
     return replace(follow_view(x, (0.03, 0.01, 0)), video=frame)
 
 
