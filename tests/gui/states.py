@@ -252,7 +252,13 @@ def of_home(act: Callable[[Any], object]) -> Callable[[Any], object]:
     return lambda window: act(window.place("home"))
 
 
-STOPPED = Interrupted(STUDY / "P007", "demo", "P007", "P007 was interrupted in trial 3", "31 of 62 answers are on disk")
+STOPPED = Interrupted(
+    folder=STUDY / "P007",
+    source="demo",
+    participant="P007",
+    heading="P007 was interrupted in trial 3",
+    line="31 of 62 answers are on disk",
+)
 HOME: Actions = {
     "sessions": of_home(lambda home: home.sessions.show_sessions(PEOPLE, "results", NOW)),
     "all kinds": of_home(lambda home: home.sessions.kind.setCurrentIndex(4)),

@@ -46,8 +46,26 @@ FOUND = [
     Backend("falcon-emulated", "the program", state=READY, can="another program's"),
 ]
 SCREENS = (
-    ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0),
-    ScreenShown(2, "DP-1", 1920, 1080, 144.0, 1.0, 527.0, 296.0),
+    ScreenShown(
+        number=1,
+        name="eDP-1",
+        width_px=1366,
+        height_px=768,
+        refresh_hz=60.0,
+        scaling=1.0,
+        width_mm=344.0,
+        height_mm=194.0,
+    ),
+    ScreenShown(
+        number=2,
+        name="DP-1",
+        width_px=1920,
+        height_px=1080,
+        refresh_hz=144.0,
+        scaling=1.0,
+        width_mm=527.0,
+        height_mm=296.0,
+    ),
 )
 WELL = Measurements(
     device="mouse",

@@ -322,7 +322,10 @@ PATIENCE_S: Final = 0.3
 """What takes longer than this says that it goes on."""
 NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install 'liquid-study[analysis]'"
 MISTAKE: Final = Trouble(
-    "A bug in the program stopped the evaluation", "The terminal shows the details.", "Refresh", "again"
+    title="A bug in the program stopped the evaluation",
+    sentence="The terminal shows the details.",
+    button="Refresh",
+    remedy="again",
 )
 
 Decided: TypeAlias = LeaveOut | TakeBack | OpenKey
@@ -653,7 +656,9 @@ class ResultsPlace(Place):
                 self._take_sessions(answer)
             case StudyFound() if newest:
                 self._blocks = answer.blocks
-                nothing = Trouble("No figures", "This study has no questionnaire.", "Refresh", "again")
+                nothing = Trouble(
+                    title="No figures", sentence="This study has no questionnaire.", button="Refresh", remedy="again"
+                )
                 self._show(
                     trials=answer.trials,
                     doubts=answer.doubts,
@@ -673,7 +678,11 @@ class ResultsPlace(Place):
             chosen = max(found.studies, key=lambda one: one.newest_s).folder
         if chosen is None:
             sentence = f"The first session of a study creates its folder in {self.results}."
-            self.show_view(ResultsView(trouble=Trouble("No studies yet", sentence, "Go to Home", "home")))
+            self.show_view(
+                ResultsView(
+                    trouble=Trouble(title="No studies yet", sentence=sentence, button="Go to Home", remedy="home")
+                )
+            )
             return
         self._show(studies=found.studies)
         self._read(chosen)
@@ -718,21 +727,27 @@ class ResultsPlace(Place):
             self._read(order.folder)  # it may have changed meanwhile, and what was being read was given up
         elif refused.stopped:
             all_drawn = self._blocks and len(self._redrawn) >= self._blocks
-            trouble = None if all_drawn else Trouble("Stopped", "There are no figures yet.", "Go on", "read")
+            trouble = (
+                None
+                if all_drawn
+                else Trouble(title="Stopped", sentence="There are no figures yet.", button="Go on", remedy="read")
+            )
             self._show(untested=bool(all_drawn), trouble=trouble, drawing=None, testing=None)
         elif isinstance(order, FindStudies):
-            trouble = Trouble("The results folder cannot be read", sentence, "Refresh", "again")
+            trouble = Trouble(
+                title="The results folder cannot be read", sentence=sentence, button="Refresh", remedy="again"
+            )
             self.show_view(ResultsView(trouble=trouble))
         elif refused.lacks_extra:
             sentence = sentence.replace("this needs", "Figures need")
-            trouble = Trouble("Your data are complete", sentence, "Refresh", "again")
+            trouble = Trouble(title="Your data are complete", sentence=sentence, button="Refresh", remedy="again")
             self._show(trouble=trouble, figures=(), drawing=None, testing=None)
         elif self.view.listed and not self.view.sessions:
             sentence = "Results appear after the first session has started."
-            trouble = Trouble("No sessions yet", sentence, "Go to Home", "home")
+            trouble = Trouble(title="No sessions yet", sentence=sentence, button="Go to Home", remedy="home")
             self._show(trouble=trouble, figures=(), drawing=None, testing=None)
         else:
-            trouble = Trouble("The study cannot be read", sentence, "Refresh", "again")
+            trouble = Trouble(title="The study cannot be read", sentence=sentence, button="Refresh", remedy="again")
             self._show(trouble=trouble, figures=(), drawing=None, testing=None)
 
     def _show(self, **changes: Any) -> None:

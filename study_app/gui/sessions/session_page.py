@@ -40,7 +40,7 @@ from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import row_of
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrialRecord:
     """One presentation of a trial.
 

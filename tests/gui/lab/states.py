@@ -44,7 +44,7 @@ def flowing() -> dict[str, Any]:
         ),
         "tail_a": tail,
         "tail_b": replace_fields(tail, positions_m=-places, segments=1, breaks=breaks & (share < 0.1)),
-        "now": Now((0.01, 0.005, 0.004), (2.0, 1.0, 0.5), (0.3, -0.2, 0.1)),
+        "now": Now(position_m=(0.01, 0.005, 0.004), force_n=(2.0, 1.0, 0.5), wake_mps=(0.3, -0.2, 0.1)),
         "limiters": (
             dataclasses.replace(acting[0], ticks=14, acting=True),
             dataclasses.replace(acting[1], ticks=1500),

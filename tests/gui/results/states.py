@@ -57,7 +57,11 @@ RESULTS: Actions = {
     "drawing": of_results(figures=(), drawing=Progress("drawing", 0.4)),
     "testing": of_results(testing=Progress("testing: Unusable", 0.7)),
     "untested": then("work.stop", untested=True),
-    "trouble": then("work.again", figures=(), trouble=Trouble("It cannot be", "P002 is damaged.", "Look", "again")),
+    "trouble": then(
+        "work.again",
+        figures=(),
+        trouble=Trouble(title="It cannot be", sentence="P002 is damaged.", button="Look", remedy="again"),
+    ),
     "reading": then("trouble.button", sessions=(), figures=()),
     "no sessions": of_results(sessions=(), figures=(), listed=True),
     "no study": of_results(studies=(), chosen=None, sessions=(), figures=()),
@@ -86,7 +90,19 @@ WRITING: Actions = {
     "opened": lambda dialog: dialog.go_on.click(),
 }
 
-TRIAL = TrialRecord(1, 1, "Part 1, L2", "complete", True, (), 9, (), "", "", None)
+TRIAL = TrialRecord(
+    number=1,
+    attempt=1,
+    words="Part 1, L2",
+    outcome="complete",
+    valid=True,
+    broken=(),
+    answers=9,
+    unconfirmed=(),
+    notes="",
+    lost="",
+    excluded=None,
+)
 BROKEN = replace(
     TRIAL,
     number=2,
