@@ -17,6 +17,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import pytest
+
 import study_app
 
 COMPILED = {"kernel", "part", "workings", "njit", "cfunc", "intrinsic", "overload"}
@@ -79,6 +81,9 @@ def modules_of(sources: Mapping[str, str]) -> dict[str, Module]:
                 module.meanings |= {each.asname: ("", each.name) for each in node.names if each.asname}
             elif isinstance(node, ast.ClassDef):
                 module.meanings[node.name] = (name, node.name)
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.Assign) and (meant := module.class_of(node.value)) is not None:
+                module.meanings |= {each.id: meant for each in node.targets if isinstance(each, ast.Name)}
         found[name] = module
     return found
 
@@ -191,3 +196,94 @@ def test_values_of_one_type_are_passed_by_name() -> None:
     }
     assert len(sources) > 300
     assert faults_of(sources) == []
+
+
+SHAPES = """
+from dataclasses import KW_ONLY, dataclass, field
+from typing import NamedTuple
+
+from numba import njit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sphere:
+    x_m: float
+    y_m: float
+    z_m: float
+
+
+@dataclass
+class Pair:
+    low: float
+    high: float | None
+    name: str
+
+
+@dataclass
+class Curve:
+    first: float
+    last: float
+    _: KW_ONLY
+    middle: float
+    area: float = field(default=0.0)
+
+
+class Quartiles(NamedTuple):
+    q1: float
+    median: float
+    q3: float
+
+
+class Labels:
+    def __init__(self, *words: str) -> None: ...
+
+
+Vector = tuple[float, float, float]
+
+
+def position_m() -> Vector: ...
+
+
+@njit
+def compiled() -> tuple[float, float, float]: ...
+"""
+"""What keeps to the rules, and what the faulty modules below use."""
+
+
+@pytest.mark.parametrize(
+    ("faulty", "what"),
+    [
+        (
+            "@dataclass\nclass Wide:\n    a: float\n    b: 'float | None'\n    c: float = 0.0",
+            "Wide has more than 2 fields",
+        ),
+        ("@dataclass\nclass Wider(shapes.Pair):\n    third: float", "Wider has more than 2 fields"),
+        ("Quartiles(1.0, 2.0, 3.0)", "Quartiles takes more than 2 values"),
+        ("Quartiles(*found)", "Quartiles is constructed from an unpacked tuple"),
+        ("Q = Quartiles; Q(1.0, 2.0, 3.0)", "Quartiles takes more than 2 values"),
+        ("shapes.Pair(*found, name='a')", "Pair is constructed from an unpacked tuple"),
+        ("def ends() -> tuple[int, float, float]: ...", "ends returns tuple[int, float, float]"),
+        ("def ends() -> 'list[tuple[float, float | None, float]] | None': ...", "ends returns"),
+        ("def parts() -> tuple[NDArray[A], NDArray[A], NDArray[A]]: ...", "parts returns"),
+    ],
+)
+def test_each_rule_finds_what_breaks_it_in_another_module(faulty: str, what: str) -> None:
+    imports = "from dataclasses import dataclass\nfrom app import shapes\nfrom app.shapes import Quartiles\n"
+    (fault,) = faults_of({"app/shapes.py": SHAPES, "app/faulty.py": imports + faulty})
+    place, _, said = fault.partition(": ")
+    assert place.startswith("app/faulty.py:")
+    assert said.startswith(what)
+
+
+def test_what_keeps_to_the_rules_is_no_fault() -> None:
+    uses = (
+        "from app.shapes import Curve, Labels, Pair, Quartiles, Sphere",
+        "Curve(1.0, 2.0, middle=1.5)",
+        "Labels(*words)",
+        "Pair(1.0, 2.0, 'a')",
+        "Quartiles(1.0, 2.0, q3=3.0)",
+        "Sphere(**found)",
+        "def shape() -> tuple[int, ...]: ...",
+        "def named() -> tuple[str, str, str]: ...",
+    )
+    assert faults_of({"app/shapes.py": SHAPES, "app/uses.py": "\n".join(uses)}) == []

@@ -202,8 +202,14 @@ class Tick:
 
     def __init__(self, name: str, setup: Mapping[str, float], *, sent: bool) -> None:
         place, values = ENGINES[name]
-        given = {name: setup[name] for name in ("density_kg_m3", "viscosity_pa_s", "diameter_m")}
-        scene = scene_of(MODELS[place], Case(liquid_id="liquid", **given, speed_mps=0.0), values)
+        case = Case(
+            liquid_id="liquid",
+            density_kg_m3=setup["density_kg_m3"],
+            viscosity_pa_s=setup["viscosity_pa_s"],
+            diameter_m=setup["diameter_m"],
+            speed_mps=0.0,
+        )
+        scene = scene_of(MODELS[place], case, values)
         dynamics = None
         if sent:
             scene = scene.model_copy(update={"velocity": Ewma()})

@@ -249,7 +249,8 @@ TANKS = {
         captures_pointer=True, size=NARROW,
     ),
     "explore": Case(
-        task_page(explore(), progress=Progress(part=1, parts=2, label="Liquid setting 1", index=1, of=3)), view(lit=None, elapsed_s=29.9), SPACE,
+        task_page(explore(), progress=Progress(part=1, parts=2, label="Liquid setting 1", index=1, of=3)),
+        view(lit=None, elapsed_s=29.9), SPACE,
         view((0.0, -0.03, -0.03), lit=None, elapsed_s=30.0), SPACE, view(lit=None, elapsed_s=111.0), KEY.Key_Escape,
         size=NARROW,
     ),
