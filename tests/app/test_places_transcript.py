@@ -97,6 +97,10 @@ RESULTS: list[tuple[str, Any]] = [
 ]  # fmt: skip
 
 
+def exclusion(asked: tuple[Any, ...]) -> dict[str, Any]:
+    return dict(zip(("participant", "session", "trial", "by", "reason"), asked, strict=True))
+
+
 def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
     done: list[str] = []
     workers: list[Worker] = []
@@ -110,9 +114,9 @@ def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
     qtbot.addWidget(place)
     asks: dict[str, Any] = {
         "entered": place.enter, "left": place.leave, "study_asked": place._choose, "remedy_asked": place._mend,
-        "leave_out_asked": lambda asked: place._decide("leaving out", of.LeaveOut, *asked),
-        "take_back_asked": lambda asked: place._decide("taking the exclusion back", of.TakeBack, *asked),
-        "unblind_asked": lambda *asked: place._decide("opening the key", of.OpenKey, *asked),
+        "leave_out_asked": lambda asked: place._decide("leaving out", of.LeaveOut, **exclusion(asked)),
+        "take_back_asked": lambda asked: place._decide("taking the exclusion back", of.TakeBack, **exclusion(asked)),
+        "unblind_asked": lambda by, reason: place._decide("opening the key", of.OpenKey, by=by, reason=reason),
         "tables_asked": lambda *asked: place._write(of.WriteTables, *asked),
         "report_asked": lambda to, _extras: place._write(of.WriteReport, to), "stop_asked": place._stop_writing,
         "open_asked": place._opener, "choose": place.choose, "others": place.show_results,

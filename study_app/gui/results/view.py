@@ -505,7 +505,7 @@ class ResultsPlace(Place):
             width=QUESTION_PX,
         )
         decide = partial(self._decide, "opening the key", OpenKey)
-        dialog.accepted.connect(lambda: decide(dialog.value("by"), dialog.value("reason")))
+        dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open(dialog)
 
     def _open_session(self, session: SessionFacts) -> None:
@@ -516,7 +516,13 @@ class ResultsPlace(Place):
         there = [one for one in self.view.sessions if one.excluded is None]
         dialog = LeaveOutDialog(self, self.theme, there, self.view.trials, self.sessions.rows.chosen)
         decide = partial(self._decide, "leaving out", LeaveOut)
-        dialog.accepted.connect(lambda: decide(*dialog.chosen, dialog.value("by"), dialog.value("reason")))
+
+        def leave_out() -> None:
+            participant, session, trial = dialog.chosen
+            by, reason = dialog.value("by"), dialog.value("reason")
+            decide(participant=participant, session=session, trial=trial, by=by, reason=reason)
+
+        dialog.accepted.connect(leave_out)
         self._open(dialog)
 
     def _ask_take_back(self, one: Exclusion) -> None:
@@ -531,8 +537,9 @@ class ResultsPlace(Place):
             needs=NEEDS,
             width=QUESTION_PX,
         )
-        decide = partial(self._decide, "taking the exclusion back", TakeBack, *one.what)
-        dialog.accepted.connect(lambda: decide(dialog.value("by"), dialog.value("reason")))
+        which = {"participant": one.participant, "session": one.session, "trial": one.trial}
+        decide = partial(self._decide, "taking the exclusion back", TakeBack, **which)
+        dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open(dialog)
 
     def _ask_tables(self) -> None:
@@ -767,9 +774,9 @@ class ResultsPlace(Place):
             self._show(trouble=None)
             self.look()
 
-    def _decide(self, what: str, order: Callable[..., Decided], *details: Any) -> None:
+    def _decide(self, what: str, order: Callable[..., Decided], **details: Any) -> None:
         if self.view.chosen is not None:
-            self._ask(order(self.view.chosen, *details), what)
+            self._ask(order(folder=self.view.chosen, **details), what)
 
     def _write(self, make: Callable[..., WriteTables | WriteReport], *details: Any) -> None:
         if self.view.chosen is not None:
